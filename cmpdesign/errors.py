@@ -1,0 +1,15 @@
+"""The errors that a user can meet: each names the value, the limit, the unit and the remedy."""
+
+from __future__ import annotations
+
+
+class CmpDesignError(Exception):
+    """Base of every error that cmpdesign raises on purpose; the command line prints it on one line."""
+
+
+class DesignError(CmpDesignError, ValueError):
+    """A design whose parameters are unknown, out of range or contradict each other."""
+
+
+class OutputError(CmpDesignError, OSError):
+    """A file or folder that could not be written; what stood there before is unchanged."""

@@ -1,0 +1,56 @@
+"""What extraction returns, and what it says when it finds little or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Status(IntEnum):
+    """How a marker's position was found."""
+
+    LOST = 0
+    MEASURED = 1
+    REPAIRED = 2  # mild omission, eq. 6
+    FITTED = 3  # heavy omission, quadratic fit within its layer
+
+
+class Reason(StrEnum):
+    """Why nothing, or little, was found in an image."""
+
+    NO_COLOR = "no_color"
+    NO_PATTERN = "no_pattern"
+    REFERENCE_LOST = "reference_lost"
+    AMBIGUOUS = "ambiguous"
+
+
+@dataclass(frozen=True, eq=False)
+class Markers:
+    """The markers of one image, by id.
+
+    Attributes:
+        xy_px: (M, 2) float64 in the image frame ((0, 0) is the centre of the top-left pixel), NaN where lost.
+        cov_px2: (M, 2, 2) float64, NaN where lost.
+        status: (M,) uint8, a ``Status`` each.
+        virtual_xy_px: (E, m, 2) float64, in the order of the layout's edges, from the smaller id; NaN where lost.
+        virtual_status: (E, m) uint8.
+        mirrored: the pattern is seen from its back; None when nothing was found.
+        reason: why nothing or little was found; None when all went well.
+        timings_ms: stage name -> milliseconds.
+        stages: stage name -> that stage's result, for debugging and drawing.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    status: NDArray[np.uint8]
+    virtual_xy_px: NDArray[np.float64]
+    virtual_status: NDArray[np.uint8]
+    mirrored: bool | None
+    reason: Reason | None
+    timings_ms: Mapping[str, float]
+    stages: Mapping[str, Any] = field(default_factory=dict, repr=False)
