@@ -1,0 +1,15 @@
+"""The errors that the extractor raises on purpose. A poor image is data, never an error: ``types.Reason``."""
+
+from __future__ import annotations
+
+
+class ExtractorError(Exception):
+    """Base of the extractor's errors; the message is one line."""
+
+
+class LayoutError(ExtractorError, ValueError):
+    """A layout file that cannot be read or contradicts itself; names file, field, value and expectation."""
+
+
+class ImageError(ExtractorError, ValueError):
+    """An image whose type, shape or size cannot be read as a color picture."""

@@ -1,0 +1,180 @@
+"""Typed reading of a JSON document: each function returns the value asked for or raises ``LayoutError``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import chain
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.errors import LayoutError
+
+# One kilometre: far above any sensor, far below where squares of lengths lose their digits.
+MAX_MM = 1e6
+MAX_INT = 2**31 - 1
+
+
+def fail(field: str, value: str, expected: str) -> NoReturn:
+    raise LayoutError(f"{field} is {value}; expected {expected}")
+
+
+def shown(value: object) -> str:
+    """A JSON value on one short printable line."""
+    match value:
+        case dict():
+            return f"an object of {len(value)} fields"
+        case list():
+            return f"a list of {len(value)}"
+        case bool() | None:
+            return json.dumps(value)
+        case str():
+            return ascii(value if len(value) <= 40 else value[:37] + "...")
+        case int():
+            return str(value) if abs(value) <= 10**30 else f"an integer of {value.bit_length()} bits"
+    return repr(value)
+
+
+def document(text: str) -> dict[str, Any]:
+    """The JSON object in ``text``; NaN, Infinity and names given twice are refused."""
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_twins)
+    except json.JSONDecodeError as error:
+        raise LayoutError(
+            f"not JSON, or truncated: {error.msg} at line {error.lineno}, column {error.colno}"
+        ) from None
+    except RecursionError:
+        raise LayoutError("nested too deeply; expected lists and objects at most a few levels deep") from None
+    except LayoutError:
+        raise
+    except ValueError:  # the interpreter's limit on an integer's digits
+        raise LayoutError("holds an integer of thousands of digits; expected at most 10 digits") from None
+    if not isinstance(value, dict):
+        fail("the document", shown(value), "an object")
+    return value
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise LayoutError(f"holds the value {name}; expected finite numbers only")
+
+
+def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        names = [name for name, _ in pairs]
+        twin = next(name for name in names if names.count(name) > 1)
+        raise LayoutError(f"the field {shown(twin)} is given more than once; expected once")
+    return fields
+
+
+def known_fields(holder: dict[str, Any], names: Sequence[str], prefix: str = "") -> None:
+    """Every name is there and no other."""
+    for name in names:
+        if name not in holder:
+            fail(prefix + name, "missing", f"one of the fields {', '.join(names)}")
+    for name in holder:
+        if name not in names:
+            fail(prefix + shown(name), "unknown", f"only the fields {', '.join(names)}")
+
+
+def mapping(value: object, field: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        fail(field, shown(value), "an object")
+    return value
+
+
+def text_field(value: object, field: str) -> str:
+    if not isinstance(value, str) or not value.isprintable() or not value:
+        fail(field, shown(value), "a printable text")
+    return value
+
+
+def integer(value: object, field: str, low: int, high: int) -> int:
+    if type(value) is not int or not low <= value <= high:
+        fail(field, shown(value), f"an integer from {low} to {high}")
+    return value
+
+
+def length_mm(value: object, field: str) -> float:
+    """A finite length in mm, zero or more."""
+    if type(value) not in (int, float) or not 0 <= value <= MAX_MM:  # type: ignore[operator]
+        fail(field, shown(value), f"a length from 0 to {MAX_MM:g} mm")
+    return float(value)  # type: ignore[arg-type]
+
+
+def integers(value: object, field: str, high: int, length: int | None = None) -> NDArray[np.int32]:
+    """(N,) int32 from 0 to ``high``."""
+    column = _column(value, field, length)
+    return _integers(column, field, high, 1)
+
+
+def integer_rows(value: object, field: str, high: int, widths: tuple[int, ...]) -> NDArray[np.int32]:
+    """(N, W) int32 from 0 to ``high``; every row as wide as the first, whose width is one of ``widths``."""
+    flat, width = _flat_rows(value, field, widths)
+    return _integers(flat, field, high, width).reshape(-1, width)
+
+
+def lengths_mm(value: object, field: str, length: int) -> NDArray[np.float64]:
+    """(N,) finite float64 in mm, of either sign."""
+    return _lengths_mm(_column(value, field, length), field, 1)
+
+
+def points_mm(value: object, field: str) -> NDArray[np.float64]:
+    """(N, 2) finite float64 in mm."""
+    flat, width = _flat_rows(value, field, (2,))
+    return _lengths_mm(flat, field, width).reshape(-1, 2)
+
+
+def choices(value: object, field: str, length: int, names: Sequence[str]) -> NDArray[np.uint8]:
+    """(N,) uint8, each text's place in ``names``."""
+    column = _column(value, field, length)
+    codes = {name: code for code, name in enumerate(names)}
+    found = [codes.get(item, -1) if type(item) is str else -1 for item in column]
+    if -1 in found:
+        at = found.index(-1)
+        fail(f"{field}[{at}]", shown(column[at]), f"one of {', '.join(names)}")
+    return np.array(found, dtype=np.uint8)
+
+
+def _column(value: object, field: str, length: int | None) -> list[Any]:
+    if not isinstance(value, list):
+        fail(field, shown(value), "a list")
+    if not value:
+        fail(field, "empty", "at least one entry")
+    if length is not None and len(value) != length:
+        fail(field, f"a list of {len(value)}", f"{length} entries, one for each of its companions")
+    return value
+
+
+def _flat_rows(value: object, field: str, widths: tuple[int, ...]) -> tuple[list[Any], int]:
+    rows = _column(value, field, None)
+    first = len(rows[0]) if type(rows[0]) is list else -1
+    width = first if first in widths else widths[0]
+    if set(map(type, rows)) != {list} or set(map(len, rows)) != {width}:
+        at = next(i for i, row in enumerate(rows) if type(row) is not list or len(row) != width)
+        fail(f"{field}[{at}]", shown(rows[at]), f"a list of {width}")
+    return list(chain.from_iterable(rows)), width
+
+
+def _integers(flat: list[Any], field: str, high: int, width: int) -> NDArray[np.int32]:
+    if set(map(type, flat)) != {int} or min(flat) < 0 or max(flat) > high:
+        at = next(i for i, item in enumerate(flat) if type(item) is not int or not 0 <= item <= high)
+        fail(_place(field, at, width), shown(flat[at]), f"an integer from 0 to {high}")
+    return np.array(flat, dtype=np.int32)
+
+
+def _lengths_mm(flat: list[Any], field: str, width: int) -> NDArray[np.float64]:
+    if not set(map(type, flat)) <= {int, float} or not all(-MAX_MM <= item <= MAX_MM for item in flat):
+        at = next(i for i, item in enumerate(flat) if not _is_length(item))
+        fail(_place(field, at, width), shown(flat[at]), f"a number from {-MAX_MM:g} to {MAX_MM:g} mm")
+    return np.array(flat, dtype=np.float64)
+
+
+def _is_length(item: object) -> bool:
+    return type(item) in (int, float) and -MAX_MM <= item <= MAX_MM  # type: ignore[operator]
+
+
+def _place(field: str, at: int, width: int) -> str:
+    return f"{field}[{at}]" if width == 1 else f"{field}[{at // width}][{at % width}]"
