@@ -1,0 +1,50 @@
+"""Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
+
+Everything is imported where it is first used, so that ``import cmpdesign`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cmpdesign.build import build_layout as build_layout
+    from cmpdesign.checks import check_design as check_design
+    from cmpdesign.design import Design as Design
+    from cmpdesign.design import load_design as load_design
+    from cmpdesign.errors import CmpDesignError as CmpDesignError
+    from cmpdesign.errors import DesignError as DesignError
+    from cmpdesign.errors import OutputError as OutputError
+    from cmpdesign.layout import Layout as Layout
+    from cmpdesign.report import report as report
+    from cmpdesign.writers.layout_file import write_layout as write_layout
+    from cmpdesign.writers.svg import write_svg as write_svg
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "CmpDesignError": "cmpdesign.errors",
+    "Design": "cmpdesign.design",
+    "DesignError": "cmpdesign.errors",
+    "Layout": "cmpdesign.layout",
+    "OutputError": "cmpdesign.errors",
+    "build_layout": "cmpdesign.build",
+    "check_design": "cmpdesign.checks",
+    "load_design": "cmpdesign.design",
+    "report": "cmpdesign.report",
+    "write_layout": "cmpdesign.writers.layout_file",
+    "write_svg": "cmpdesign.writers.svg",
+}
+
+__all__ = sorted([*_HOMES, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'cmpdesign' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

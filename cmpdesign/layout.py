@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 COLORS = ("red", "green", "blue", "black", "white")
 RED, GREEN, BLUE, BLACK, WHITE = range(5)
 
-# Coordinates are held to a femtometre's neighbourhood so that every machine writes the same digits.
+# Coordinates are held to a picometre, so that every machine writes the same digits.
 DECIMALS = 9
 
 
@@ -55,8 +55,10 @@ class Layout:
     outline_mm: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        for name in ("marker_layer", "marker_index", "marker_xy_mm", "cell_corners", "cell_color", "edges", "outline_mm"):
-            getattr(self, name).setflags(write=False)
+        for array in (self.marker_layer, self.marker_index, self.marker_xy_mm):
+            array.setflags(write=False)
+        for array in (self.cell_corners, self.cell_color, self.edges, self.outline_mm):
+            array.setflags(write=False)
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
 
@@ -72,8 +74,28 @@ class Layout:
         return float(width), float(height)
 
     @cached_property
+    def present(self) -> NDArray[np.bool_]:
+        """(M,) True where a marker touches a colored or white cell; the others cannot be seen."""
+        seen = np.zeros(len(self.marker_xy_mm), dtype=np.bool_)
+        seen[self.cell_corners[self.cell_color != BLACK]] = True
+        seen.setflags(write=False)
+        return seen
+
+    @cached_property
+    def virtual_xy_mm(self) -> NDArray[np.float64]:
+        """(E, m, 2) virtual markers: j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""
+        start, end = self.marker_xy_mm[self.edges[:, 0]], self.marker_xy_mm[self.edges[:, 1]]
+        share = (np.arange(self.virtual_per_edge) + 1) / (self.virtual_per_edge + 1)
+        points = start[:, None] + share[:, None] * (end - start)[:, None]
+        points.setflags(write=False)
+        return points
+
+    @cached_property
     def digest(self) -> str:
-        """SHA-256 (hex) of the geometry: little-endian int32 layer, index, corners, color, edges, then float64 x, y."""
+        """SHA-256 (hex) of the geometry: int32 layer, index, corners, color, edges, then float64 x, y.
+
+        All little-endian, in C order.
+        """
         digest = hashlib.sha256()
         for column, dtype in (
             (self.marker_layer, "<i4"),

@@ -1,0 +1,77 @@
+"""The registry of patterns. A module in this folder that calls ``register`` is tested, drawn and offered."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.graphs import Graph
+from cmpdesign.numbering import Ints
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a pattern may ask about a design.
+
+    Attributes:
+        layers: the number of layers, 1 to 200.
+        aspect: height over width (b / a), for patterns that take it.
+        spacing: "angle" or "arc", for patterns that take it.
+    """
+
+    layers: int
+    aspect: float = 1.0
+    spacing: str = "angle"
+
+
+# (layer, index, shape) -> (N, 2) positions for a pitch of one, origin at marker 0, y up.
+Positions = Callable[[Ints, Ints, Shape], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A registered pattern: its graph, where its markers lie, and the options that only some patterns take."""
+
+    name: str
+    graph: Graph
+    positions: Positions
+    options: frozenset[str]
+
+    @property
+    def summary(self) -> str:
+        """The first line of the pattern's docstring."""
+        return (self.positions.__doc__ or "").strip().partition("\n")[0]
+
+
+_registered: dict[str, Pattern] = {}
+
+
+def register(name: str, graph: Graph, options: tuple[str, ...] = ()) -> Callable[[Positions], Positions]:
+    """Decorate the function that returns a pattern's positions.
+
+    Raises:
+        ValueError: the name is taken.
+    """
+
+    def enter(positions: Positions) -> Positions:
+        if name in _registered:
+            raise ValueError(f"the pattern {name!r} is registered twice")
+        _registered[name] = Pattern(name, graph, positions, frozenset(options))
+        return positions
+
+    return enter
+
+
+@cache
+def patterns() -> Mapping[str, Pattern]:
+    """Every registered pattern by name, in alphabetical order."""
+    for module in pkgutil.iter_modules(__path__):
+        import_module(f"{__name__}.{module.name}")
+    return MappingProxyType(dict(sorted(_registered.items())))

@@ -1,0 +1,51 @@
+"""The elliptical pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.graphs import TRIANGULAR
+from cmpdesign.numbering import Ints
+from cmpdesign.patterns import Shape, register
+
+
+@register("elliptical", TRIANGULAR, options=("aspect", "spacing"))
+def elliptical(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+    """Layers are similar ellipses (the article, fig. 3b), b / a = aspect.
+
+    ::
+
+              . - * - .
+          *               *        a: layers * pitch, to the right
+        /    . - * - .     \\       b: aspect * a, upward
+       *   *     0     *    *      |<->| pitch: from ellipse to ellipse, on the x axis
+        \\    ' - * - '     /
+          *               *        spacing "angle": equal steps of the parameter angle t
+              ' - * - '            spacing "arc":   equal steps along the ellipse
+    """
+    turn = (120 - 60 * index / np.maximum(layer, 1)) / 360
+    angle = 2 * np.pi * turn if shape.spacing == "angle" else _angle_from_arc(turn, shape.aspect)
+    return layer[..., None] * np.stack([np.cos(angle), shape.aspect * np.sin(angle)], axis=-1)
+
+
+def _angle_from_arc(turn: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:
+    """The parameter angle t at which the arc from 0 to t is the share ``turn`` of the perimeter.
+
+    For (cos t, aspect sin t), the arc from the top down to t is E(pi/2 - t | 1 - aspect^2), Legendre's
+    incomplete integral of the second kind (DLMF 19.30.2). Newton's method: the speed never vanishes.
+    """
+    from scipy.special import ellipe, ellipeinc
+
+    m = 1 - aspect**2
+    quarter = ellipe(m)
+    target = 4 * quarter * turn
+    angle = 2 * np.pi * turn
+    for _ in range(50):
+        arc = quarter - ellipeinc(np.pi / 2 - angle, m)
+        step = (arc - target) / np.hypot(np.sin(angle), aspect * np.cos(angle))
+        # Half a radian at most: a flat ellipse's speed is nearly zero at its tips.
+        angle = angle - np.clip(step, -0.5, 0.5)
+        if np.abs(step).max(initial=0.0) < 1e-14:
+            break
+    return np.asarray(angle, dtype=np.float64)

@@ -1,0 +1,30 @@
+"""The honeycomb pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.graphs import TRIANGULAR
+from cmpdesign.numbering import Ints, axial_from_layer
+from cmpdesign.patterns import Shape, register
+
+
+@register("honeycomb", TRIANGULAR)
+def honeycomb(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+    """Equilateral triangles; the layers are regular hexagons (the article, fig. 3a).
+
+    ::
+
+           *---*---*
+          / \\ / \\ / \\        |<->| pitch: every edge
+         *---*---*---*
+        / \\ / \\ / \\ / \\      layers = 2
+       *---*---0---*---*
+        \\ / \\ / \\ / \\ /
+         *---*---*---*
+          \\ / \\ / \\ /
+           *---*---*
+    """
+    q, r = axial_from_layer(layer, index)
+    return np.stack([q + r / 2, r * (np.sqrt(3) / 2)], axis=-1)

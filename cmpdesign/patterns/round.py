@@ -1,0 +1,30 @@
+"""The round pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.graphs import TRIANGULAR
+from cmpdesign.numbering import Ints
+from cmpdesign.patterns import Shape, register
+
+
+@register("round", TRIANGULAR)
+def round_(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+    """Layers are concentric circles, one pitch apart, their markers at equal angles (the article, fig. 3c).
+
+    ::
+
+            . -*- .
+         *          *        |<->| pitch: from circle to circle
+        /   . -*- .  \\
+       |  *         * |
+       *  |   0   |   *      marker i of layer k lies at 120 - 60 i / k degrees
+       |  *         * |
+        \\   ' -*- '  /
+         *          *
+            ' -*- '
+    """
+    angle = np.radians(120 - 60 * index / np.maximum(layer, 1))
+    return layer[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)

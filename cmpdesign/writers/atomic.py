@@ -1,0 +1,80 @@
+"""Files that appear whole or not at all: written beside their place, then renamed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from cmpdesign.errors import OutputError
+
+
+def write_file(path: str | Path, content: str | bytes) -> None:
+    """Write text (UTF-8, "\\n") or bytes; what stood there before stays until the new file is complete.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = Path(path)
+    with _clear_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _refuse_folder(path)
+        with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=path.parent) as stage:
+            staged = Path(stage) / path.name
+            _write_through(staged, content)
+            staged.replace(path)
+
+
+def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:
+    """Write several files into a folder: all are complete on disk before the first one is renamed into place.
+
+    Args:
+        folder: made if missing.
+        files: name -> content.
+
+    Returns:
+        The paths in the order of ``files``.
+
+    Raises:
+        OutputError: one of them cannot be written; then none of them has been replaced.
+    """
+    folder = Path(folder)
+    paths = [folder / name for name in files]
+    with _clear_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in paths:
+            _refuse_folder(path)
+        with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=folder) as stage:
+            for name, content in files.items():
+                _write_through(Path(stage) / name, content)
+            for path in paths:
+                (Path(stage) / path.name).replace(path)
+    return paths
+
+
+def _write_through(path: Path, content: str | bytes) -> None:
+    """Write and sync: a full disk shows here, not after the rename."""
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _refuse_folder(path: Path) -> None:
+    if path.is_dir():
+        raise IsADirectoryError(21, "is a folder; give a file's name", str(path))
+
+
+@contextmanager
+def _clear_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(
+            f"{path}: cannot be written ({error.strerror or error}); nothing was changed"
+        ) from error
