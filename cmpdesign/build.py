@@ -79,13 +79,13 @@ def _clipped(design: Design, mesh: Mesh, xy_mm: Points) -> Mesh:
     keep = inside[mesh.corners].all(axis=1)
     if not keep[mesh.reference_cell]:
         raise DesignError(
-            f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts the reference cell "
-            "away: nothing could be numbered; make the outline larger or the pitch smaller"
+            f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts the reference "
+            "cell away: nothing could be numbered; make the outline larger or the pitch smaller"
         )
     if not _reference_surrounded(mesh, keep):
         raise DesignError(
-            f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts cells around the "
-            "reference cell away; make the outline larger or the pitch smaller"
+            f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts cells around "
+            "the reference cell away; make the outline larger or the pitch smaller"
         )
     reference = int(np.count_nonzero(keep[: mesh.reference_cell]))
     return replace(mesh, corners=mesh.corners[keep], color=mesh.color[keep], reference_cell=reference)

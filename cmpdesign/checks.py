@@ -15,13 +15,13 @@ from cmpdesign.design import Design
 from cmpdesign.layout import BLACK, BLUE, COLORS, GREEN, RED, WHITE, Layout
 from cmpdesign.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
 
-# A desktop CO2 laser removes a kerf of 0.1 to 0.2 mm and an inkjet dot on film spreads to about 0.1 mm: a cell
-# whose inscribed circle is no wider than that comes out as a dot, and at twice the width its corners are round.
+# A desktop CO2 laser removes a kerf of 0.1 to 0.2 mm and an inkjet dot on film spreads to about 0.1 mm: a
+# cell whose inscribed circle is no wider comes out as a dot, and up to three times that with round corners.
 CELL_ERROR_MM, CELL_WARNING_MM = 0.1, 0.3
 # A corner rounded to the radius r is missing over r / sin(angle / 2): 2 r at 60 degrees, 6 r at 20 degrees.
 CORNER_WARNING_DEG = 20.0
-# The three hues are told apart by hue alone and at best 120 degrees apart. LEDs and white balance shift them by
-# up to some 20 degrees each, so that two inks less than 45 degrees apart may change places.
+# The three inks are told apart by hue alone, at best 120 degrees apart. LEDs and white balance shift each by
+# some 20 degrees, so that two inks less than 45 degrees apart may change places.
 HUE_ERROR_DEG = 45.0
 # Below this saturation, noise of 2/255 turns the hue of a mid-bright ink by several degrees.
 SATURATION_ERROR = 0.35
@@ -35,8 +35,8 @@ CAMERA_PX = (640, 480)
 EDGE_ERROR_PX, EDGE_WARNING_PX = 6.0, 12.0
 # Without a black frame the rim's gridlines have whatever lies behind the pattern as their other side.
 BORDER_WARNING_PITCHES = 0.25
-# Ids of markers that the clip outline took away still take their place in every array.
-PRESENT_WARNING = 0.5
+# Markers that the clip outline took away still fill every array. A hexagon around a rectangle loses half.
+PRESENT_WARNING = 0.33
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def cell_areas_mm2(layout: Layout) -> Values:
 
 
 def cell_widths_mm(layout: Layout) -> Values:
-    """(C,) diameter of every cell's inscribed circle, 4 area / perimeter (exact for triangles and squares)."""
+    """(C,) diameter of every cell's inscribed circle: 4 area / perimeter, exact for triangles and squares."""
     corners = layout.marker_xy_mm[layout.cell_corners]
     sides = np.roll(corners, -1, axis=1) - corners
     perimeters = np.hypot(sides[..., 0], sides[..., 1]).sum(axis=1)

@@ -37,7 +37,7 @@ Positions = Callable[[Ints, Ints, Shape], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Pattern:
-    """A registered pattern: its graph, where its markers lie, and the options that only some patterns take."""
+    """A registered pattern: its graph, where its markers lie, the options that only some patterns take."""
 
     name: str
     graph: Graph
