@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -57,9 +58,7 @@ Angle = Annotated[
     BeforeValidator(parse_angle_deg),
     WithJsonSchema(_quantity_schema(tuple(ANGLES_DEG), zero=True, signed=True)),
 ]
-Color = Annotated[
-    str, Field(pattern=r"^#[0-9a-f]{6}$"), BeforeValidator(lambda v: v.lower() if isinstance(v, str) else v)
-]
+Color = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$"), AfterValidator(str.lower)]
 
 
 class _Strict(BaseModel):
@@ -166,7 +165,7 @@ class Design(_Strict):
         if all(given):
             return (
                 "pitch_mm, layers and an overall size (width_mm, height_mm) fix the size twice; "
-                "leave one of the three out"
+                "leave one of the three out (a template's by --set layers=none)"
             )
         if sum(given) == 2 or (self.pitch_mm is not None and self.clip != "none"):
             return ""
@@ -210,7 +209,8 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = 
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette.
+        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette, and the text "none"
+            takes the field out.
 
     Raises:
         DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.
@@ -260,7 +260,10 @@ def _override(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
             target = target.setdefault(table, {})
             if not isinstance(target, dict):
                 raise DesignError(f"{dotted}: {table} is not a table{_nearest(dotted, Design.model_fields)}")
-        target[field] = _plain(text)
+        if text == "none":
+            target.pop(field, None)
+        else:
+            target[field] = _plain(text)
 
 
 def _plain(text: str) -> object:
@@ -289,7 +292,10 @@ def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
             parts.append(f"{path} is missing")
         elif item["type"] == "value_error":
             parts.append(f"{path}: {message}" if path else message)
+        elif item["type"] == "string_pattern_mismatch":
+            parts.append(f'{path} = {item["input"]!r} is no color; write it as "#c8322d"')
         else:
+            unit = next((f" {unit}" for unit in ("mm", "deg") if path.endswith(f"_{unit}")), "")
             message = message.removeprefix("Input should be ")
-            parts.append(f"{path} = {item['input']!r} must be {message}")
+            parts.append(f"{path} = {item['input']!r} must be {message}{unit}")
     return "; ".join(parts)

@@ -61,7 +61,7 @@ def _parse(value: object, units: Mapping[str, Decimal], kind: str, example: str)
     number, unit = match.groups()
     factor = units.get(_ALIASES.get(unit, unit)) if unit else Decimal(1)
     if factor is None:
-        raise ValueError(f"{value!r} has the unit {unit!r}; a {kind} takes {', '.join(units)}")
+        raise ValueError(f"{value!r} has the unit {unit!r}; units of {kind} are {', '.join(units)}")
     return _finite(float(Decimal(number) * factor), value, kind)
 
 

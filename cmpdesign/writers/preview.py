@@ -1,4 +1,4 @@
-"""preview.png: the pattern as a dimensioned drawing, to look at; measures come from the SVG and the layout."""
+"""preview.png: the pattern as a dimensioned drawing, to look at."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write_preview(layout: Layout, path: str | Path) -> None:
 
 
 def layout_to_png(layout: Layout) -> bytes:
-    """The preview as PNG bytes: pattern, overall dimensions, key figures; ids where there is room for them."""
+    """The preview as PNG bytes: pattern, overall dimensions, key figures, ids where there is room."""
     import cv2
 
     return bytes(cv2.imencode(".png", draw_preview(layout))[1])
@@ -51,7 +51,7 @@ def draw_preview(layout: Layout) -> Image:
     corner = layout.outline_mm.min(axis=0)[0], layout.outline_mm.max(axis=0)[1]
 
     def to_px(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        return origin + scale * (xy_mm - corner) * (1, -1)
+        return np.asarray(origin + scale * (xy_mm - corner) * (1, -1))
 
     image = _filled(image, layout, to_px(layout.outline_mm), to_px(layout.marker_xy_mm))
     _ids(image, layout, to_px(layout.marker_xy_mm), scale)
@@ -176,7 +176,9 @@ def _text(
     x, y = (at[0], at[1]) if left else (at[0] - width / 2, at[1] + height / 2)
     place = [round(float(x)), round(float(y))]
     if outline:
-        cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), weight + 2, cv2.LINE_AA)
+        for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            around = [place[0] + dx, place[1] + dy]
+            cv2.putText(image, text, around, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), weight, cv2.LINE_AA)
     cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, color, weight, cv2.LINE_AA)
 
 

@@ -14,6 +14,7 @@ from cmpdesign.writers.atomic import write_file
 
 SCALE_STRIP_MM = 6.0
 _INK = "#000000"
+_FONT = {"font_family": "sans-serif"}
 
 ToSheet = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -67,7 +68,7 @@ def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mir
 
 
 def _sheet_frame(layout: Layout, mirror: bool) -> ToSheet:
-    left, bottom = layout.outline_mm.min(axis=0)
+    left = layout.outline_mm[:, 0].min()
     right, top = layout.outline_mm.max(axis=0)
 
     def to_sheet(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -103,7 +104,7 @@ def _scale(drawing: Any, layout: Layout, mirror: bool) -> Any:
     width, height = layout.size_mm
     length = scale_length_mm(width)
     y = height + 1.5
-    group = drawing.g(id="scale", fill=_INK, font_size=2, font_family="sans-serif")
+    group = drawing.g(id="scale", fill=_INK, font_size=2, **_FONT)
     left = width - length if mirror else 0.0
     group.add(drawing.rect(insert=(left, y), size=(length, 0.4)))
     x = width if mirror else 0.0
