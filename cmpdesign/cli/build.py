@@ -1,0 +1,115 @@
+"""``cmpdesign build``: a design's files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from cmpdesign.design import Design
+    from cmpdesign.layout import Layout
+    from cmpdesign.report import Report
+
+FILES = {"svg": "pattern.svg", "layout": "layout.json", "preview": "preview.png", "report": "report.json"}
+
+DesignArgument = Annotated[str, typer.Argument(metavar="DESIGN", help="A template's name or a TOML file.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Override a parameter, as in pitch_mm=60mil; may be repeated."
+    ),
+]
+
+
+def build(
+    design: DesignArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the files; made if missing.")
+    ] = Path("out"),
+    override: SetOption = None,
+    only: Annotated[
+        str, typer.Option(metavar="NAMES", help=f"Which files, separated by commas: {', '.join(FILES)}.")
+    ] = ",".join(FILES),
+) -> None:
+    """Write a design's files: SVG, layout file, preview and report."""
+    from cmpdesign.build import build_layout
+    from cmpdesign.design import load_design
+    from cmpdesign.report import report
+    from cmpdesign.writers.atomic import write_folder
+
+    names = chosen_files(only)
+    parameters = load_design(design, overrides(override))
+    layout = build_layout(parameters)
+    figures = report(parameters, layout)
+    contents = {FILES[name]: _content(name, parameters, layout, figures) for name in names}
+    for path in write_folder(output, contents):
+        console().print(f"wrote {printable(path)}")
+    print_figures(figures)
+    for finding in figures.findings:
+        verb = "will not work" if finding.severity == "error" else "may not work"
+        print_warning(f"{verb}: {finding}")
+
+
+def overrides(texts: list[str] | None) -> dict[str, str]:
+    """``--set`` as name -> text; raises ``CmpDesignError`` where a text has no name or no "="."""
+    found: dict[str, str] = {}
+    for text in texts or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise CmpDesignError(f"--set {text}: expected NAME=VALUE, as in pitch_mm=1.5mm")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def chosen_files(only: str) -> list[str]:
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    for name in names:
+        if name not in FILES:
+            raise CmpDesignError(f"--only {name}: unknown; there are {', '.join(FILES)}")
+    if not names:
+        raise CmpDesignError(f"--only names no file; there are {', '.join(FILES)}")
+    return [name for name in FILES if name in names]
+
+
+def _content(name: str, design: Design, layout: Layout, figures: Report) -> str | bytes:
+    if name == "svg":
+        from cmpdesign.writers.svg import layout_to_svg
+
+        return layout_to_svg(
+            layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror
+        )
+    if name == "layout":
+        from cmpdesign.writers.layout_file import layout_to_json
+
+        return layout_to_json(layout)
+    if name == "preview":
+        from cmpdesign.writers.preview import layout_to_png
+
+        return layout_to_png(layout)
+    from cmpdesign.report import report_to_json
+
+    return report_to_json(figures)
+
+
+def print_figures(figures: Report) -> None:
+    from rich.table import Table
+
+    cells = ", ".join(f"{count} {color}" for color, count in figures.cells.items() if count)
+    unseen = figures.markers - figures.present_markers
+    rows = {
+        "pattern": f"{figures.pattern}, {figures.layers} layers, pitch {figures.pitch_mm:.4g} mm",
+        "markers": f"{figures.present_markers}" + (f" ({unseen} more ids are never seen)" if unseen else ""),
+        "virtual markers": f"{figures.virtual_markers} on {figures.edges} edges ({figures.points} points)",
+        "cells": f"{sum(figures.cells.values())}: {cells}",
+        "overall size": "{:.2f} x {:.2f} mm, border included".format(*figures.size_mm),
+        "smallest feature": f"{figures.smallest_feature_mm:.3f} mm (circle inside the narrowest cell)",
+    }
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console().print(table)

@@ -1,0 +1,46 @@
+"""What all commands share in talking to the terminal."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+BAD_INPUT = 2
+
+
+def console(stderr: bool = False) -> Console:
+    """Plain text where no terminal reads it; values are never taken for markup."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, highlight=False, markup=False, soft_wrap=True)
+
+
+def is_expected(error: BaseException) -> bool:
+    """True for the errors raised on purpose, by either package; the extractor is not imported to ask."""
+    from_extractor = sys.modules.get("extractor.errors")
+    if from_extractor is not None and isinstance(error, from_extractor.ExtractorError):
+        return True
+    return isinstance(error, CmpDesignError)
+
+
+def one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+def print_error(error: BaseException) -> None:
+    print(f"error: {one_line(error)}", file=sys.stderr)
+
+
+def print_warning(text: str) -> None:
+    print(f"warning: {text}", file=sys.stderr)
+
+
+def printable(path: object) -> str:
+    """A path as it may go to a terminal."""
+    text = str(path)
+    return text if text.isprintable() else ascii(text)

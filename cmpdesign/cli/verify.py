@@ -1,0 +1,163 @@
+"""``cmpdesign verify``: are these pictures the layout's pattern, seen and numbered as designed?"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cmpdesign.cli.terminal import BAD_INPUT, console, one_line, print_error, printable
+
+if TYPE_CHECKING:
+    from cmpdesign.images import Image
+    from cmpdesign.verify import Verdict
+    from extractor import Extractor
+    from extractor.reference import Reference
+
+NOT_VERIFIED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One image's name with its verdict, or with the error that says why it could not be read."""
+
+    name: str
+    verdict: Verdict | None
+    error: str | None
+
+    @property
+    def exit_code(self) -> int:
+        if self.verdict is None:
+            return BAD_INPUT
+        return 0 if self.verdict.verified else NOT_VERIFIED
+
+    def to_json(self) -> dict[str, Any]:
+        if self.verdict is None:
+            return {"image": self.name, "verified": False, "error": self.error}
+        return {"image": self.name, **self.verdict.to_json()}
+
+    def line(self) -> str:
+        if self.verdict is None:
+            return f"{self.name}: error: {self.error}"
+        verdict = self.verdict
+        repaired = verdict.repaired + verdict.fitted
+        counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
+        head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
+        return f"{self.name}: {head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
+
+
+def verify(
+    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+    debug: Annotated[Path | None, typer.Option(help="Folder for a picture of every stage.")] = None,
+    min_share: Annotated[
+        float, typer.Option(min=0, max=1, help="Share of the visible markers that must be measured.")
+    ] = 0.9,
+) -> None:
+    """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
+    from extractor import Extractor, load_layout
+
+    reference = load_layout(layout)
+    extractor = Extractor(reference)
+    names = _distinct([path.stem for path in images])
+    outcomes = []
+    for path, name in _with_progress(list(zip(images, names, strict=True))):
+        outcomes.append(_outcome(path, name, extractor, reference, min_share, (output, debug)))
+        if not as_json and outcomes[-1].verdict is not None:
+            console().print(outcomes[-1].line())
+    report = _report(reference, outcomes, min_share)
+    if output is not None:
+        from cmpdesign.writers.atomic import write_file
+
+        write_file(output / "verify.json", report)
+    if as_json:
+        sys.stdout.write(report)
+    raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
+
+
+def _outcome(
+    path: Path,
+    name: str,
+    extractor: Extractor,
+    reference: Reference,
+    min_share: float,
+    folders: tuple[Path | None, Path | None],
+) -> Outcome:
+    """An image that cannot be read is reported and does not keep the others from being processed."""
+    from cmpdesign.images import ImageFileError, read_image
+    from cmpdesign.verify import verify as verify_image
+
+    try:
+        image = read_image(path)
+    except ImageFileError as error:
+        print_error(error)
+        return Outcome(printable(path), None, one_line(error))
+    verdict = verify_image(extractor, reference, image, min_share)
+    _write_pictures(image, reference, verdict, name, *folders)
+    return Outcome(printable(path), verdict, None)
+
+
+def _write_pictures(
+    image: Image, reference: Reference, verdict: Verdict, name: str, output: Path | None, debug: Path | None
+) -> None:
+    from cmpdesign.images import to_png
+    from cmpdesign.writers.atomic import write_file
+
+    if output is not None:
+        from extractor.draw import draw_markers
+
+        write_file(output / f"{name}.overlay.png", to_png(draw_markers(image, reference, verdict.markers)))
+    if debug is not None:
+        from extractor.draw import draw_stages
+
+        pictures = draw_stages(image, reference, verdict.markers)
+        for number, (stage, picture) in enumerate(pictures.items(), start=1):
+            write_file(debug / f"{name}.{number}-{stage}.png", to_png(picture))
+
+
+def _report(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
+    document = {
+        "format": "cmp-verification",
+        "version": 1,
+        "pattern": reference.pattern,
+        "digest": reference.digest,
+        "min_share": min_share,
+        "verified": all(outcome.exit_code == 0 for outcome in outcomes),
+        "images": [outcome.to_json() for outcome in outcomes],
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _distinct(stems: list[str]) -> list[str]:
+    """Names for the written files: stems, numbered where several images share one."""
+    names: list[str] = []
+    for stem in stems:
+        name, number = stem, 1
+        while name in names:
+            number += 1
+            name = f"{stem}-{number}"
+        names.append(name)
+    return names
+
+
+def _with_progress(items: list[tuple[Path, str]]) -> Iterable[tuple[Path, str]]:
+    """The items; with a bar on stderr where there are several and a terminal shows it."""
+    terminal = console(stderr=True)
+    if len(items) < 2 or not terminal.is_terminal:
+        return items
+    return _tracked(items)
+
+
+def _tracked(items: list[tuple[Path, str]]) -> Iterator[tuple[Path, str]]:
+    from rich.progress import track
+
+    yield from track(items, description="verifying", console=console(stderr=True), transient=True)
