@@ -20,13 +20,21 @@ class Status(IntEnum):
     FITTED = 3  # heavy omission, quadratic fit within its layer
 
 
+class VirtualStatus(IntEnum):
+    """How a virtual marker's position was found."""
+
+    LOST = 0
+    MEASURED = 1
+    INTERPOLATED = 2
+
+
 class Reason(StrEnum):
     """Why nothing, or little, was found in an image."""
 
-    NO_COLOR = "no_color"
-    NO_PATTERN = "no_pattern"
-    REFERENCE_LOST = "reference_lost"
-    AMBIGUOUS = "ambiguous"
+    NO_COLOR = "no_color"  # the image is grayscale, or one of the three inks is absent
+    NO_PATTERN = "no_pattern"  # no triangles that meet as those of a pattern do
+    REFERENCE_LOST = "reference_lost"  # a pattern, but its white cell is not to be seen
+    AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +46,7 @@ class Markers:
         cov_px2: (M, 2, 2) float64, NaN where lost.
         status: (M,) uint8, a ``Status`` each.
         virtual_xy_px: (E, m, 2) float64, in the order of the layout's edges, from the smaller id; NaN where lost.
-        virtual_status: (E, m) uint8.
+        virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
         mirrored: the pattern is seen from its back; None when nothing was found.
         reason: why nothing or little was found; None when all went well.
         timings_ms: stage name -> milliseconds.

@@ -1,0 +1,177 @@
+"""Stages 1 and 2: the target area, and which ink every pixel shows, with hues and levels found from the image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .engine import compiled
+
+HUES = 180  # OpenCV's 8-bit hue counts in steps of 2 degrees
+HUE_REACH_DEG = 50.0  # a hue farther than this from its nominal one is not that ink: 60 would be ambiguous
+LEVEL_SHARE = 0.4  # a pixel shows an ink when its chroma exceeds this share of that ink's local level
+TILE_PX = 32
+MIN_CHROMA = 12  # below this, 8-bit hue is noise
+OPENCV_HUE_DEG = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Stage 1. ``mask`` (h, w) bool: pixels that may belong to the pattern, at 1/``shrink`` of the image's scale."""
+
+    mask: NDArray[np.uint8]
+    shrink: int
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """Stage 2.
+
+    Attributes:
+        hsv: (H, W, 3) uint8, OpenCV's scale: H 0..179 (2 degrees a step), S and V 0..255.
+        label: (H, W) uint8, 0 none, 1 red, 2 green, 3 blue.
+        hues_deg: (3,) the inks' hues as found.
+        chroma: (3,) the inks' typical chroma (max - min of B, G, R), 0..255.
+    """
+
+    hsv: NDArray[np.uint8]
+    label: NDArray[np.uint8]
+    hues_deg: NDArray[np.float64]
+    chroma: NDArray[np.float64]
+
+
+def nominal_hues_deg(palette: dict[str, str]) -> NDArray[np.float64]:
+    """(3,) hues in degrees of the palette's red, green and blue."""
+    inks = [[int(palette[c][i : i + 2], 16) for i in (5, 3, 1)] for c in ("red", "green", "blue")]
+    hsv = cv2.cvtColor(np.array([inks], np.float32) / 255, cv2.COLOR_BGR2HSV)
+    return hsv[0, :, 0].astype(np.float64)
+
+
+@compiled
+def _survey(hsv, step):  # type: ignore[no-untyped-def]
+    """Histogram (180 hues, 256 chromas) over every ``step``-th pixel of every ``step``-th row."""
+    histogram = np.zeros((HUES, 256), np.int64)
+    for y in range(0, hsv.shape[0], step):
+        for x in range(0, hsv.shape[1], step):
+            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
+            histogram[hsv[y, x, 0], chroma] += 1
+    return histogram
+
+
+@compiled
+def _tile_levels(hsv, ink_of_hue, tile, step):  # type: ignore[no-untyped-def]
+    """(3, rows, columns) the largest chroma of each ink in every tile."""
+    rows = (hsv.shape[0] + tile - 1) // tile
+    columns = (hsv.shape[1] + tile - 1) // tile
+    level = np.zeros((3, rows, columns), np.float32)
+    for y in range(0, hsv.shape[0], step):
+        for x in range(0, hsv.shape[1], step):
+            ink = ink_of_hue[hsv[y, x, 0]]
+            if ink > 0:
+                chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
+                if chroma > level[ink - 1, y // tile, x // tile]:
+                    level[ink - 1, y // tile, x // tile] = chroma
+    return level
+
+
+@compiled
+def _label(hsv, ink_of_hue, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
+    """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
+    height, width = hsv.shape[:2]
+    label = np.zeros((height, width), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            ink = ink_of_hue[hsv[y, x, 0]]
+            if ink == 0 or target[y // shrink, x // shrink] == 0:
+                continue
+            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
+            if chroma > threshold[ink - 1, y // tile, x // tile]:
+                label[y, x] = ink
+    return label
+
+
+@compiled
+def _tile_chroma(hsv, shrink, step):  # type: ignore[no-untyped-def]
+    """The largest chroma in every tile of ``shrink`` pixels."""
+    rows = (hsv.shape[0] + shrink - 1) // shrink
+    columns = (hsv.shape[1] + shrink - 1) // shrink
+    largest = np.zeros((rows, columns), np.uint8)
+    for y in range(0, hsv.shape[0], step):
+        for x in range(0, hsv.shape[1], step):
+            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
+            if chroma > largest[y // shrink, x // shrink]:
+                largest[y // shrink, x // shrink] = chroma
+    return largest
+
+
+def to_hsv(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 HSV (OpenCV's scale) of an 8-bit BGR image."""
+    return cv2.cvtColor(image, cv2.COLOR_BGR2HSV)  # type: ignore[return-value]
+
+
+def find_target(hsv: NDArray[np.uint8]) -> Target:
+    """Stage 1: flood the image from outside; what the flood cannot reach may be pattern.
+
+    Tiles without color are water; closing seals the gaps between cells first, so that the flood stops at the
+    pattern's rim while its black cells stay dry.
+    """
+    shrink = 8
+    chroma = _tile_chroma(hsv, shrink, 2)
+    threshold = max(MIN_CHROMA, 0.15 * float(np.percentile(chroma, 95)))
+    dry = cv2.morphologyEx((chroma > threshold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    water = cv2.copyMakeBorder(dry, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    cv2.floodFill(water, None, (0, 0), 2)
+    return Target(mask=(water[1:-1, 1:-1] != 2).astype(np.uint8), shrink=shrink)
+
+
+def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """(3,) hues in degrees around which the image's saturated pixels gather, or None without such pixels.
+
+    Circular 3-means from the nominal hues on the chroma-weighted histogram. White balance and colored light move
+    hues; a shift past ``HUE_REACH_DEG`` could rename the inks and is refused.
+    """
+    chroma = np.arange(256)
+    counts = histogram[:, MIN_CHROMA:].sum()
+    if counts == 0:
+        return None
+    cumulated = np.cumsum(histogram[:, MIN_CHROMA:].sum(axis=0)) / counts
+    strong = MIN_CHROMA + int(np.searchsorted(cumulated, 0.98))
+    floor = max(MIN_CHROMA, strong // 4)
+    weight = (histogram[:, floor:] * chroma[floor:]).sum(axis=1).astype(np.float64)
+    hue = np.arange(HUES) * OPENCV_HUE_DEG
+    centers = nominal_deg.copy()
+    for _ in range(8):
+        away = (hue[:, None] - centers + 180) % 360 - 180
+        nearest = np.abs(away).argmin(axis=1)
+        mine = (nearest[:, None] == np.arange(3)) & (np.abs(away) < 40) * True
+        total = (weight[:, None] * mine).sum(axis=0)
+        if np.any(total == 0):
+            return None
+        centers = centers + (weight[:, None] * mine * away).sum(axis=0) / total
+        shift = (centers - nominal_deg + 180) % 360 - 180
+        centers = nominal_deg + np.clip(shift, -HUE_REACH_DEG, HUE_REACH_DEG)
+    return centers % 360
+
+
+def segment(hsv: NDArray[np.uint8], target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
+    """Stage 2: label every pixel of the target area with its ink; None when one of the three inks is absent."""
+    step = 2 if hsv.shape[0] * hsv.shape[1] > 100_000 else 1
+    histogram = _survey(hsv, step)
+    hues = find_hues(histogram, nominal_deg)
+    if hues is None:
+        return None
+    away = np.abs((np.arange(HUES)[:, None] * OPENCV_HUE_DEG - hues + 180) % 360 - 180)
+    ink_of_hue = np.where(away.min(axis=1) < 60, away.argmin(axis=1) + 1, 0).astype(np.uint8)
+    tile = max(TILE_PX, min(hsv.shape[:2]) // 12)
+    level = _tile_levels(hsv, ink_of_hue, tile, step)
+    typical = np.array([np.percentile(v[v > 0], 75) if np.any(v > 0) else 0.0 for v in level])
+    threshold = np.empty(level.shape, np.uint8)
+    for ink in range(3):
+        spread = cv2.blur(cv2.dilate(level[ink], np.ones((3, 3), np.uint8)), (3, 3))
+        local = LEVEL_SHARE * np.maximum(spread, 0.15 * typical[ink])
+        threshold[ink] = np.clip(local, MIN_CHROMA, 255)
+    label = _label(hsv, ink_of_hue, threshold, tile, target.mask, target.shrink)
+    return Segmentation(hsv=hsv, label=label, hues_deg=hues, chroma=typical)

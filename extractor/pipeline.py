@@ -1,0 +1,147 @@
+"""The extractor: from an image to numbered markers, stage by stage, each timed."""
+
+from __future__ import annotations
+
+import time
+from types import MappingProxyType
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .color import find_target, nominal_hues_deg, segment, to_hsv
+from .errors import LayoutError
+from .graph import Graph, connect
+from .image import estimate_noise, prepare
+from .numbering import lattice_of, number
+from .placing import place
+from .reference import Reference
+from .refine import refine
+from .regions import find_seeds, grow
+from .triangles import Triangles, fit_triangles
+from .types import Markers, Reason, Status
+from .virtual import interpolate
+
+WORK_PIXELS = 1_400_000  # larger images are recognised at a reduced scale first
+MIN_WORK_EDGE_PX = 11.0  # shorter edges at the reduced scale need the full one
+MIN_NODES = 3  # markers with all three inks around them, below which there is no pattern
+
+
+class Stages:
+    """Runs stage after stage, keeping each one's result and time."""
+
+    def __init__(self) -> None:
+        self.results: dict[str, Any] = {}
+        self.timings_ms: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def done(self, name: str, result: Any) -> Any:
+        """Book the time since the stage before under ``name`` and hand the result on."""
+        now = time.perf_counter()
+        self.timings_ms[name] = self.timings_ms.get(name, 0.0) + 1e3 * (now - self._last)
+        self.results[name] = result
+        self._last = time.perf_counter()
+        return result
+
+
+class Extractor:
+    """Finds and numbers the markers of one layout in images.
+
+    >>> from extractor import Extractor, load_layout
+    >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
+
+    Raises:
+        LayoutError: the layout is not a triangular pattern.
+    """
+
+    def __init__(self, layout: Reference) -> None:
+        if layout.cell_corners.shape[1] != 3:
+            raise LayoutError(f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read")
+        self.layout = layout
+        self._lattice = lattice_of(layout)
+        self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
+
+    def extract(self, image: NDArray[Any]) -> Markers:
+        """The markers in one image, found without any knowledge of other frames.
+
+        Args:
+            image: (H, W, 3) uint8 BGR; also uint16 (scaled to 8 bits), BGRA (alpha dropped) and grayscale (which has
+                no color to read: nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
+
+        Raises:
+            ImageError: another dtype or shape, or a side below 16 px.
+        """
+        stages = Stages()
+        bgr = stages.done("image", prepare(image))
+        if bgr is None:
+            return self._nothing(Reason.NO_COLOR, stages)
+        triangles = self._recognise(bgr, stages)
+        if triangles is None:
+            return self._nothing(Reason.NO_COLOR, stages)
+        graph = stages.done("connect", connect(triangles))
+        if int((graph.corner_of_node >= 0).all(axis=1).sum()) < min(MIN_NODES, self._lattice.layers):
+            return self._nothing(Reason.NO_PATTERN, stages)
+        numbering = stages.done("number", number(bgr, triangles, graph, self._lattice))
+        if numbering is None:
+            return self._nothing(Reason.REFERENCE_LOST, stages)
+        if numbering.ambiguous:
+            return self._nothing(Reason.AMBIGUOUS, stages)
+        return self._measure(bgr, triangles, graph, numbering, stages)
+
+    def _recognise(self, bgr: NDArray[np.uint8], stages: Stages) -> Triangles | None:
+        """Stages 1 to 5, at a reduced scale where the image is large and its cells are too."""
+        scale = int(np.ceil(np.sqrt(bgr.shape[0] * bgr.shape[1] / WORK_PIXELS)))
+        triangles = self._recognise_at(bgr, scale, stages)
+        if scale > 1 and (triangles is None or triangles.edge_px < MIN_WORK_EDGE_PX * scale):
+            triangles = self._recognise_at(bgr, 1, stages)
+        return triangles
+
+    def _recognise_at(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Triangles | None:
+        work = bgr
+        if scale > 1:
+            height, width = bgr.shape[0] // scale, bgr.shape[1] // scale
+            whole = bgr[: height * scale, : width * scale]
+            work = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
+        hsv = to_hsv(work)
+        target = stages.done("target", find_target(hsv))
+        segmentation = stages.done("segment", segment(hsv, target, self._nominal_hues_deg))
+        if segmentation is None:
+            return None
+        seeds = stages.done("seeds", find_seeds(segmentation))
+        regions = stages.done("grow", grow(segmentation, seeds))
+        return stages.done("triangles", fit_triangles(bgr, regions, scale))  # type: ignore[no-any-return]
+
+    def _measure(
+        self, bgr: NDArray[np.uint8], triangles: Triangles, graph: Graph, numbering: Any, stages: Stages
+    ) -> Markers:
+        """Refinement and virtual markers of what has been numbered."""
+        places = stages.done("place", place(triangles, numbering, len(self.layout.layer)))
+        refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
+        status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
+        virtual, virtual_status = stages.done("virtual", interpolate(self.layout, refined.xy_px, status))
+        return Markers(
+            xy_px=refined.xy_px,
+            cov_px2=refined.cov_px2,
+            status=status,
+            virtual_xy_px=virtual,
+            virtual_status=virtual_status,
+            mirrored=graph.mirrored,
+            reason=None,
+            timings_ms=MappingProxyType(stages.timings_ms),
+            stages=MappingProxyType(stages.results),
+        )
+
+    def _nothing(self, reason: Reason, stages: Stages) -> Markers:
+        markers, edges, count = len(self.layout.layer), len(self.layout.edges), self.layout.virtual_per_edge
+        return Markers(
+            xy_px=np.full((markers, 2), np.nan),
+            cov_px2=np.full((markers, 2, 2), np.nan),
+            status=np.zeros(markers, np.uint8),
+            virtual_xy_px=np.full((edges, count, 2), np.nan),
+            virtual_status=np.zeros((edges, count), np.uint8),
+            mirrored=None,
+            reason=reason,
+            timings_ms=MappingProxyType(stages.timings_ms),
+            stages=MappingProxyType(stages.results),
+        )

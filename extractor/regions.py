@@ -1,0 +1,216 @@
+"""Stages 3 and 4: one seed per domain of an ink, and the adaptive growing algorithm (AGA, the article's eq. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .color import HUES, Segmentation
+from .engine import compiled
+
+GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
+MIN_DOMAIN_PX = 4
+MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """Stage 3. ``xy`` (N, 2) int32 pixels, ``ink`` (N,) uint8 1..3, ``area_px`` (N,) of the domains they stand for."""
+
+    xy: NDArray[np.int32]
+    ink: NDArray[np.uint8]
+    area_px: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Stage 4.
+
+    Attributes:
+        owner: (H, W) int32, the region that a pixel belongs to, counted from 1; 0 is none.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        seed: (N, 2) int32, the pixel about which the moments are taken.
+        moments: (N, 10) float64: sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
+        domain_px: (N,) int64, the area of the domain that the seed stood for.
+    """
+
+    owner: NDArray[np.int32]
+    ink: NDArray[np.uint8]
+    seed: NDArray[np.int32]
+    moments: NDArray[np.float64]
+    domain_px: NDArray[np.int64]
+
+
+@compiled
+def _runs(label):  # type: ignore[no-untyped-def]
+    """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
+
+    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 with the first run of each run's domain.
+    """
+    height, width = label.shape
+    runs = np.empty((max(16, height * width // 8), 4), np.int32)
+    parent = np.empty(runs.shape[0], np.int32)
+    count = 0
+    above, above_end = 0, 0
+    for y in range(height):
+        first = count
+        x = 0
+        cursor = above
+        while x < width:
+            ink = label[y, x]
+            if ink == 0:
+                x += 1
+                continue
+            start = x
+            while x < width and label[y, x] == ink:
+                x += 1
+            if count == runs.shape[0]:
+                runs = np.concatenate((runs, np.empty_like(runs)))
+                parent = np.concatenate((parent, np.empty_like(parent)))
+            runs[count, 0] = y
+            runs[count, 1] = start
+            runs[count, 2] = x - 1
+            runs[count, 3] = ink
+            parent[count] = count
+            while cursor < above_end and runs[cursor, 2] < start:
+                cursor += 1
+            other = cursor
+            while other < above_end and runs[other, 1] < x:
+                if runs[other, 3] == ink:
+                    a, b = count, other
+                    while parent[a] != a:
+                        a = parent[a]
+                    while parent[b] != b:
+                        parent[b] = parent[parent[b]]
+                        b = parent[b]
+                    if a < b:
+                        parent[b] = a
+                    else:
+                        parent[a] = b
+                other += 1
+            count += 1
+        above, above_end = first, count
+    for i in range(count):
+        parent[i] = parent[parent[i]]
+    return runs[:count], parent[:count]
+
+
+@compiled
+def _seeds(runs, root):  # type: ignore[no-untyped-def]
+    """Per domain: the pixel of it nearest to its geometric center, its ink and its area."""
+    number = np.full(runs.shape[0], -1, np.int32)
+    domains = 0
+    for i in range(runs.shape[0]):
+        if root[i] == i:
+            number[i] = domains
+            domains += 1
+    area = np.zeros(domains, np.int64)
+    sums = np.zeros((domains, 2))
+    ink = np.zeros(domains, np.uint8)
+    for i in range(runs.shape[0]):
+        d = number[root[i]]
+        length = runs[i, 2] - runs[i, 1] + 1
+        area[d] += length
+        sums[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
+        sums[d, 1] += length * runs[i, 0]
+        ink[d] = runs[i, 3]
+    best = np.full(domains, np.inf)
+    xy = np.zeros((domains, 2), np.int32)
+    for i in range(runs.shape[0]):
+        d = number[root[i]]
+        cx = sums[d, 0] / area[d]
+        x = min(max(int(round(cx)), runs[i, 1]), runs[i, 2])
+        distance = (x - cx) ** 2 + (runs[i, 0] - sums[d, 1] / area[d]) ** 2
+        if distance < best[d]:
+            best[d] = distance
+            xy[d, 0] = x
+            xy[d, 1] = runs[i, 0]
+    return xy, ink, area
+
+
+def find_seeds(segmentation: Segmentation) -> Seeds:
+    """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
+
+    The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
+    """
+    xy, ink, area = _seeds(*_runs(segmentation.label))
+    keep = area >= MIN_DOMAIN_PX
+    return Seeds(xy=xy[keep], ink=ink[keep], area_px=area[keep])
+
+
+@compiled
+def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[no-untyped-def]
+    """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it."""
+    height, width = label.shape
+    owner = np.zeros((height, width), np.int32)
+    queue = np.empty((height * width, 2), np.int32)
+    moments = np.zeros((seed_xy.shape[0], MOMENTS))
+    limit2 = threshold * threshold
+    half = HUES // 2
+    for region in range(seed_xy.shape[0]):
+        sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
+        if owner[sy, sx] != 0:
+            continue
+        queue[0, 0] = sx
+        queue[0, 1] = sy
+        owner[sy, sx] = region + 1
+        h0 = int(hsv[sy, sx, 0])
+        sum_h, sum_s, sum_v = 0.0, float(hsv[sy, sx, 1]), float(hsv[sy, sx, 2])
+        mean_h, mean_s, mean_v = float(h0), sum_s, sum_v
+        begin, end = 0, 1
+        while begin < end and end <= limit_px:
+            wave_end = end
+            for i in range(begin, wave_end):
+                for side in range(4):
+                    x = queue[i, 0] + (1 if side == 0 else -1 if side == 1 else 0)
+                    y = queue[i, 1] + (1 if side == 2 else -1 if side == 3 else 0)
+                    if x < 0 or y < 0 or x >= width or y >= height or owner[y, x] != 0:
+                        continue
+                    if label[y, x] != ink and label[y, x] != 0:
+                        continue
+                    s, v = float(hsv[y, x, 1]), float(hsv[y, x, 2])
+                    # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
+                    dh = (float(hsv[y, x, 0]) - mean_h + half) % HUES - half
+                    ds, dv = s - mean_s, v - mean_v
+                    scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
+                    if dh * dh + ds * ds + dv * dv >= limit2 * scale:
+                        continue
+                    owner[y, x] = region + 1
+                    queue[end, 0] = x
+                    queue[end, 1] = y
+                    end += 1
+                    sum_h += (float(hsv[y, x, 0]) - h0 + half) % HUES - half
+                    sum_s += s
+                    sum_v += v
+            begin = wave_end
+            mean_h = (h0 + sum_h / end) % HUES
+            mean_s = sum_s / end
+            mean_v = sum_v / end
+        if end > limit_px:
+            continue  # a leak or a background: no cell is that large
+        for i in range(end):
+            x, y = float(queue[i, 0] - sx), float(queue[i, 1] - sy)
+            moments[region, 0] += 1.0
+            moments[region, 1] += x
+            moments[region, 2] += y
+            moments[region, 3] += x * x
+            moments[region, 4] += x * y
+            moments[region, 5] += y * y
+            moments[region, 6] += x * x * x
+            moments[region, 7] += x * x * y
+            moments[region, 8] += x * y * y
+            moments[region, 9] += y * y * y
+    return owner, moments
+
+
+def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
+    """Stage 4 (AGA): from each seed, add 4-neighbours while eq. 3 stays below 0.15 and update the mean as it grows.
+
+    Eq. 3 is taken over OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of hue are circular;
+    ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
+    """
+    limit_px = segmentation.label.size // 6
+    owner, moments = _grow(segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD)
+    return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)

@@ -1,0 +1,202 @@
+"""Stage 5: a triangle for every region that is one, first from its moments, then from its edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .engine import compiled
+from .regions import Regions
+from .sampling import clamp, sample_dot, sample_patch
+
+# In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
+# radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
+CORNER_RADIUS = np.sqrt(8.0)
+THIRD_MOMENT = 8.0**1.5 / 10.0
+MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a square have 0
+MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
+MIN_AREA_PX = 4
+MAX_GROWTH = 3.0  # of a domain's area over its region's
+STATIONS = 5
+HALF_PROFILE = 6  # samples on each side of an edge
+WINDOW = 1.2  # reach of a profile in units of the distance from the cell's center to the edge
+MIN_CONTRAST = 12.0  # of an ink against what lies beyond its edge, over the three channels, 8-bit
+MIN_SINE = 0.05  # two edges that meet at less than 3 degrees have no corner
+MAX_CORNER_SHIFT = 1.0  # in units of the corner's distance from the center
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Stage 5.
+
+    Attributes:
+        corner_px: (T, 3, 2) float64 in the image frame, clockwise as seen in the image.
+        ink: (T,) uint8, 1 red, 2 green, 3 blue.
+        region: (T,) int32, the region it was fitted to.
+    """
+
+    corner_px: NDArray[np.float64]
+    ink: NDArray[np.uint8]
+    region: NDArray[np.int32]
+
+    @property
+    def edge_px(self) -> float:
+        """The median edge; 0 without triangles."""
+        if len(self.ink) == 0:
+            return 0.0
+        return float(np.median(np.linalg.norm(self.corner_px - np.roll(self.corner_px, 1, axis=1), axis=2)))
+
+
+@compiled
+def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
+    """Triangles with the regions' moments up to the third order, and which regions are triangles at all."""
+    count = moments.shape[0]
+    corners = np.zeros((count, 3, 2))
+    good = np.zeros(count, np.bool_)
+    for i in range(count):
+        n = moments[i, 0]
+        if n < min_area:
+            continue
+        mx, my = moments[i, 1] / n, moments[i, 2] / n
+        # a pixel is a square, not a point: it adds 1/12 to each variance
+        xx = moments[i, 3] / n - mx * mx + 1.0 / 12.0
+        xy = moments[i, 4] / n - mx * my
+        yy = moments[i, 5] / n - my * my + 1.0 / 12.0
+        determinant = xx * yy - xy * xy
+        if determinant <= 0.0 or (xx + yy) ** 2 > MAX_ELONGATION * determinant:
+            continue
+        xxx = moments[i, 6] / n - 3 * mx * moments[i, 3] / n + 2 * mx**3
+        xxy = moments[i, 7] / n - 2 * mx * moments[i, 4] / n - my * moments[i, 3] / n + 2 * mx * mx * my
+        xyy = moments[i, 8] / n - 2 * my * moments[i, 4] / n - mx * moments[i, 5] / n + 2 * mx * my * my
+        yyy = moments[i, 9] / n - 3 * my * moments[i, 5] / n + 2 * my**3
+        # whitened z = L^-1 (p - mean), L the Cholesky factor of the covariance
+        a = np.sqrt(xx)
+        b = xy / a
+        c = np.sqrt(determinant / xx)
+        ia, ic = 1.0 / a, 1.0 / c
+        ib = -b * ia * ic
+        uuu = ia**3 * xxx
+        uuv = ia * ia * (ib * xxx + ic * xxy)
+        uvv = ia * (ib * ib * xxx + 2 * ib * ic * xxy + ic * ic * xyy)
+        vvv = ib**3 * xxx + 3 * ib * ib * ic * xxy + 3 * ib * ic * ic * xyy + ic**3 * yyy
+        real, imaginary = uuu - 3 * uvv, 3 * uuv - vvv
+        if np.hypot(real, imaginary) < MIN_TRIANGULARITY * THIRD_MOMENT:
+            continue
+        angle = np.arctan2(imaginary, real) / 3.0
+        # growing stops where the blurred rim darkens; the domain, cut nearer to the half level, tells the size
+        radius = CORNER_RADIUS * np.sqrt(min(max(domain_px[i] / n, 1.0), MAX_GROWTH))
+        for k in range(3):
+            u = radius * np.cos(angle + k * 2.0 * np.pi / 3.0)
+            v = radius * np.sin(angle + k * 2.0 * np.pi / 3.0)
+            corners[i, k, 0] = seed[i, 0] + mx + a * u
+            corners[i, k, 1] = seed[i, 1] + my + b * u + c * v
+        good[i] = True
+    return corners, good
+
+
+@compiled
+def _fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
+    """Move every triangle's edges to where its ink has fallen halfway to the color beyond; in place.
+
+    The ink's profile across the edge, 1 inside and 0 outside, is integrated: its area is the edge's position
+    whatever the blur, so no blur has to be known. A line through the stations' positions is the edge.
+    """
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    ink, beyond, unit = np.zeros(3), np.zeros(3), np.zeros(3)
+    offset, along = np.zeros(STATIONS), np.zeros(STATIONS)
+    lines = np.zeros((3, 3))
+    for i in range(corners.shape[0]):
+        if not good[i]:
+            continue
+        good[i] = False
+        cx, cy = corners[i, :, 0].mean(), corners[i, :, 1].mean()
+        if not sample_patch(flat, height, width, cx, cy, 0.2 * np.hypot(corners[i, 0, 0] - cx, corners[i, 0, 1] - cy), ink):
+            continue
+        complete = True
+        for k in range(3):
+            x0, y0 = corners[i, k, 0], corners[i, k, 1]
+            dx, dy = corners[i, (k + 1) % 3, 0] - x0, corners[i, (k + 1) % 3, 1] - y0
+            length = np.hypot(dx, dy)
+            nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
+            depth = (x0 - cx) * nx + (y0 - cy) * ny
+            mx, my = x0 + 0.5 * dx, y0 + 0.5 * dy
+            # profiles run along the median, not the normal: so they stay clear of the other edges in any triangle
+            reach = WINDOW * np.hypot(mx - cx, my - cy)
+            ux, uy = WINDOW * (mx - cx) / reach, WINDOW * (my - cy) / reach
+            if depth < 0.3 or not sample_patch(flat, height, width, 2 * mx - cx, 2 * my - cy, 0.4 * depth, beyond):
+                complete = False
+                break
+            contrast = 0.0
+            for c in range(3):
+                contrast += (ink[c] - beyond[c]) ** 2
+            if contrast < MIN_CONTRAST**2:
+                complete = False
+                break
+            zero = 0.0
+            for c in range(3):
+                unit[c] = (ink[c] - beyond[c]) / contrast
+                zero += unit[c] * beyond[c]
+            slant = ux * nx + uy * ny
+            step = reach / HALF_PROFILE
+            used = 0
+            for j in range(STATIONS):
+                t = 0.25 + 0.5 * j / (STATIONS - 1)
+                sx, sy = x0 + t * dx, y0 + t * dy
+                area = 0.0
+                for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
+                    share = sample_dot(
+                        flat, height, width, sx + m * step * ux, sy + m * step * uy, unit[0], unit[1], unit[2]
+                    )
+                    weight = 0.5 if abs(m) == HALF_PROFILE else 1.0
+                    area += weight * clamp(share - zero, -0.2, 1.2)
+                if area == area:
+                    offset[used] = slant * (area * step - reach)
+                    along[used] = t - 0.5
+                    used += 1
+            if used < 4:
+                complete = False
+                break
+            mean_offset, mean_along = offset[:used].mean(), along[:used].mean()
+            spread = ((along[:used] - mean_along) ** 2).sum()
+            slope = ((along[:used] - mean_along) * (offset[:used] - mean_offset)).sum() / spread
+            # the line n . p = distance through the two ends, moved along the normal
+            shift0 = mean_offset + slope * (-0.5 - mean_along)
+            shift1 = mean_offset + slope * (0.5 - mean_along)
+            ax, ay = x0 + shift0 * nx, y0 + shift0 * ny
+            bx, by = x0 + dx + shift1 * nx, y0 + dy + shift1 * ny
+            norm = np.hypot(bx - ax, by - ay)
+            lines[k, 0] = (by - ay) / norm
+            lines[k, 1] = -(bx - ax) / norm
+            lines[k, 2] = lines[k, 0] * ax + lines[k, 1] * ay
+        if not complete:
+            continue
+        longest = 0.0
+        for k in range(3):
+            a, b = lines[(k + 2) % 3], lines[k]
+            cross = a[0] * b[1] - a[1] * b[0]
+            if abs(cross) < MIN_SINE:
+                complete = False
+                break
+            x = (a[2] * b[1] - a[1] * b[2]) / cross
+            y = (a[0] * b[2] - a[2] * b[0]) / cross
+            size = np.hypot(corners[i, k, 0] - cx, corners[i, k, 1] - cy)
+            longest = max(longest, np.hypot(x - corners[i, k, 0], y - corners[i, k, 1]) / size)
+            corners[i, k, 0] = x
+            corners[i, k, 1] = y
+        good[i] = complete and longest < MAX_CORNER_SHIFT
+
+
+def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:
+    """Stage 5: keep the regions that are triangles by shape and size, and place their edges with sub-pixel accuracy.
+
+    Args:
+        image: (H, W, 3) uint8 BGR, at full scale.
+        regions: grown at 1/``scale`` of the image's scale.
+        scale: full-scale pixels per pixel of the regions.
+    """
+    corners, good = _fit(regions.moments, regions.seed, regions.domain_px, float(MIN_AREA_PX))
+    corners = (corners + 0.5) * scale - 0.5
+    _fit_edges(image, corners, good)
+    return Triangles(corner_px=corners[good], ink=regions.ink[good], region=np.flatnonzero(good).astype(np.int32))
