@@ -1,0 +1,52 @@
+"""Scenes: what a camera sees of a pattern, with the exact truth. They make test images and evaluate designs.
+
+    layout + surface + camera + light + optics + sensor + damage -> image + truth
+"""
+
+from __future__ import annotations
+
+from cmpdesign.scene.background import Busy, Gradient, Paper, Picture, Plain
+from cmpdesign.scene.camera import Camera
+from cmpdesign.scene.damage import Blob, Damage, Glare, Scratch
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.light import Led, Light, colored_leds
+from cmpdesign.scene.optics import Optics
+from cmpdesign.scene.render import Rendered, render
+from cmpdesign.scene.scene import Scene
+from cmpdesign.scene.sensor import Sensor
+from cmpdesign.scene.standard import STANDARD_SIZE, standard_layout, standard_scene
+from cmpdesign.scene.surface import Press, Shear, Surface, Twist, composed
+from cmpdesign.scene.truth import Truth, load_truth, save_truth
+
+__all__ = [
+    "STANDARD_SIZE",
+    "Blob",
+    "Busy",
+    "Camera",
+    "Damage",
+    "Glare",
+    "Gradient",
+    "Led",
+    "Light",
+    "Optics",
+    "Paper",
+    "Picture",
+    "Plain",
+    "Press",
+    "Rendered",
+    "Scene",
+    "SceneError",
+    "Scratch",
+    "Sensor",
+    "Shear",
+    "Surface",
+    "Truth",
+    "Twist",
+    "colored_leds",
+    "composed",
+    "load_truth",
+    "render",
+    "save_truth",
+    "standard_layout",
+    "standard_scene",
+]

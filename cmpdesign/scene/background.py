@@ -1,0 +1,126 @@
+"""What lies behind the pattern: a color, a picture, or something generated that may look like a pattern."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.errors import SceneError
+
+RGB = tuple[float, float, float]
+Planes = NDArray[np.float32]
+
+
+class Background(Protocol):
+    """Draws itself as (3, height, width) float32, channels B, G, R, 0 to 255."""
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes: ...
+
+
+@dataclass(frozen=True)
+class Plain:
+    """One color."""
+
+    rgb: RGB = (20.0, 20.0, 20.0)
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
+        width, height = size
+        color = np.asarray(self.rgb[::-1], dtype=np.float32)[:, None, None]
+        return np.broadcast_to(color, (3, height, width))
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """A color that turns into another along a direction, counter-clockwise from the right."""
+
+    rgb_from: RGB = (60.0, 70.0, 80.0)
+    rgb_to: RGB = (190.0, 180.0, 170.0)
+    angle_deg: float = 30.0
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
+        width, height = size
+        angle = np.radians(self.angle_deg)
+        x, y = np.linspace(-1, 1, width), np.linspace(1, -1, height)
+        along = np.cos(angle) * x[None, :] + np.sin(angle) * y[:, None]
+        share = 0.5 + 0.5 * along / (abs(np.cos(angle)) + abs(np.sin(angle)))
+        ends = np.asarray([self.rgb_from[::-1], self.rgb_to[::-1]])[:, :, None, None]
+        return np.asarray(ends[0] * (1 - share) + ends[1] * share, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Paper: a warm white with fibres, grain and slow shading."""
+
+    rgb: RGB = (236.0, 230.0, 216.0)
+    grain: float = 4.0
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
+        import cv2
+
+        width, height = size
+        fine = cv2.GaussianBlur(rng.standard_normal((height, width), dtype=np.float32), (0, 0), 0.8)
+        fibres = cv2.GaussianBlur(rng.standard_normal((height, width), dtype=np.float32), (0, 0), 6.0, sigmaY=1.2)
+        coarse = rng.standard_normal((max(height // 64, 2), max(width // 64, 2)), dtype=np.float32)
+        shade = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+        texture = self.grain * (fine / fine.std() + 0.5 * fibres / fibres.std() + 0.7 * shade)
+        return np.asarray(np.asarray(self.rgb[::-1], dtype=np.float32)[:, None, None] + texture, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Busy:
+    """A cluttered desk: discs, boxes, lines and triangles in all colors.
+
+    Attributes:
+        shapes: how many.
+        triangles: draw triangles in red, green, blue and white only, the hardest clutter for this pattern.
+    """
+
+    shapes: int = 150
+    triangles: bool = False
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
+        import cv2
+
+        width, height = size
+        scale = min(size) / 12
+        image = np.full((height, width, 3), rng.uniform(40, 200, 3), dtype=np.float32)
+        pure = [(45, 50, 200), (60, 150, 40), (190, 60, 45), (235, 235, 235)]
+        for _ in range(self.shapes):
+            centre = rng.uniform((0, 0), (width, height))
+            reach = scale * rng.uniform(0.15, 1.0)
+            color = pure[rng.integers(4)] if self.triangles else tuple(rng.uniform(0, 255, 3))
+            kind = 3 if self.triangles else rng.integers(4)
+            turn = rng.uniform(0, 2 * np.pi)
+            if kind == 0:
+                cv2.circle(image, centre.astype(int).tolist(), int(reach), color, -1, cv2.LINE_AA)
+            elif kind == 1:
+                far = centre + 4 * reach * np.array([np.cos(turn), np.sin(turn)])
+                cv2.line(image, centre.astype(int).tolist(), far.astype(int).tolist(), color, 2, cv2.LINE_AA)
+            else:
+                corners = turn + 2 * np.pi * np.arange(6 - kind) / (6 - kind)
+                points = centre + reach * np.stack([np.cos(corners), np.sin(corners)], axis=-1)
+                cv2.fillPoly(image, [points.astype(np.int32)], color, cv2.LINE_AA)
+        return np.ascontiguousarray(image.transpose(2, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An image (H, W, 3) uint8 BGR, stretched over the whole frame."""
+
+    image: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        if self.image.dtype != np.uint8 or self.image.ndim != 3 or self.image.shape[2] != 3 or not self.image.size:
+            raise SceneError(
+                f"the background picture is {self.image.dtype} of shape {self.image.shape}; give uint8 BGR of shape (H, W, 3)"
+            )
+
+    def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
+        import cv2
+
+        shrinks = size[0] < self.image.shape[1]
+        scaled = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC)
+        return np.ascontiguousarray(scaled.transpose(2, 0, 1), dtype=np.float32)

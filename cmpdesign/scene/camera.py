@@ -1,0 +1,100 @@
+"""The camera: a homography from the layout frame (mm) to the image frame (px)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.layout import Layout
+from cmpdesign.scene.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole that looks at the layout's plane.
+
+    Attributes:
+        pitch_px: one pitch of the layout at marker 0, in pixels (before the tilt foreshortens it).
+        rotation_deg: turn of the pattern in the image, counter-clockwise as seen.
+        tilt_deg: angle between the optical axis and the pattern's normal, -85 to 85.
+        tilt_axis_deg: direction of the line in the image about which it tilts, counter-clockwise from the right.
+        centre_px: where marker 0 lies; None: the image's centre.
+        focal_px: focal length and distance in one; small means strong perspective. None: 1.5 times the
+            image's longer side.
+        mirrored: looks at the pattern's back; None: as the layout was designed.
+    """
+
+    pitch_px: float = 20.0
+    rotation_deg: float = 0.0
+    tilt_deg: float = 0.0
+    tilt_axis_deg: float = 0.0
+    centre_px: tuple[float, float] | None = None
+    focal_px: float | None = None
+    mirrored: bool | None = None
+
+    def __post_init__(self) -> None:
+        if not self.pitch_px > 0:
+            raise SceneError(f"pitch_px is {self.pitch_px:g}; it must be above 0 px")
+        if not abs(self.tilt_deg) <= 85:
+            raise SceneError(f"tilt_deg is {self.tilt_deg:g}; it must lie between -85 and 85 degrees")
+        if self.focal_px is not None and not self.focal_px > 0:
+            raise SceneError(f"focal_px is {self.focal_px:g}; it must be above 0 px")
+
+
+def is_mirrored(camera: Camera, layout: Layout) -> bool:
+    """Whether this camera sees the layout's back."""
+    return layout.mirrored if camera.mirrored is None else camera.mirrored
+
+
+def pitch_mm(layout: Layout) -> float:
+    """The layout's pitch; the median length of its edges where the parameters give none."""
+    if "pitch_mm" in layout.parameters:
+        return float(layout.parameters["pitch_mm"])
+    ends = layout.marker_xy_mm[layout.edges]
+    return float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+
+
+def homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> NDArray[np.float64]:
+    """H_image_from_layout, (3, 3) float64, H[2, 2] = 1; ``size`` is the image's (width, height)."""
+    width, height = size
+    scale = camera.pitch_px / pitch_mm(layout)
+    focal = camera.focal_px if camera.focal_px is not None else 1.5 * max(size)
+    centre_x, centre_y = camera.centre_px or ((width - 1) / 2, (height - 1) / 2)
+
+    turn = np.radians(camera.rotation_deg)
+    side = -1.0 if is_mirrored(camera, layout) else 1.0
+    cos, sin = np.cos(turn), np.sin(turn)
+    # The image's y points down, so a turn that looks counter-clockwise is clockwise in its numbers.
+    planar = scale * np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0])
+
+    axis = np.radians(camera.tilt_axis_deg)
+    tilted = _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))[:, :2] @ planar
+    pose = np.column_stack([tilted, [0.0, 0.0, focal]])
+    intrinsics = np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
+    return np.asarray(intrinsics @ pose / focal, dtype=np.float64)
+
+
+def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Rotation matrix about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+
+
+def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (..., 2) through a homography.
+
+    Raises:
+        SceneError: a point lies behind the camera.
+    """
+    x, y = xy[..., 0], xy[..., 1]
+    depth = h[2, 0] * x + h[2, 1] * y + h[2, 2]
+    if not np.all(depth > 1e-3):
+        raise SceneError(
+            "a part of the pattern lies behind the camera; take a smaller tilt_deg, a smaller pitch_px or a larger focal_px"
+        )
+    u = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
+    v = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
+    return np.stack([u, v], axis=-1)

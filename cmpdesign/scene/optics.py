@@ -1,0 +1,84 @@
+"""The optics: a Gaussian blur over the pixel's box, as weights of cubic B-splines.
+
+A pixel is the integral of the scene over its box, after a Gaussian blur. Coverage that is sampled by boxes and
+blurred afterwards is off by up to a twelfth of a square pixel in the blur, because an edge's position inside a pixel
+is partly lost. So coverage is sampled by cubic B-splines instead (exactly, see ``coverage``) and the wanted point
+spread, box * Gaussian, is a sum of such splines: its least-squares fit, 1.2 to 2.4 samples to a sigma.
+
+The remaining error: an edge's profile is off by at most 1e-4 of its height, its position by less than 1e-4 px
+for every blur from 0.1 to 20 px. A test measures both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.errors import SceneError
+
+SAMPLES_PER_SIGMA = 1.2
+REACH_SIGMA = 5.5
+
+
+@dataclass(frozen=True)
+class Optics:
+    """Gaussian blur; ``blur_px`` is its sigma, 0 or 0.1 to 20 px."""
+
+    blur_px: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.blur_px == 0 or 0.1 <= self.blur_px <= 20):
+            raise SceneError(f"blur_px is {self.blur_px:g}; it must be 0 or lie between 0.1 and 20 px")
+
+
+@dataclass(frozen=True, eq=False)
+class PointSpread:
+    """A point spread function as a sum of B-splines.
+
+    Attributes:
+        degree: the splines' degree: 0 (the bare pixel box) or 3.
+        oversampling: spline samples to a pixel, along x and y.
+        weights: (2 * reach + 1,) float32, of the samples around the pixel's centre; their sum is 1.
+    """
+
+    degree: int
+    oversampling: int
+    weights: NDArray[np.float32]
+
+    @property
+    def reach(self) -> int:
+        return len(self.weights) // 2
+
+
+@lru_cache(maxsize=64)
+def point_spread(blur_px: float) -> PointSpread:
+    """The splines' weights for a blur; the box alone where the blur is 0."""
+    if blur_px == 0:
+        return PointSpread(0, 1, np.ones(1, dtype=np.float32))
+    oversampling = int(np.ceil(SAMPLES_PER_SIGMA / blur_px - 1e-9))
+    reach = int(np.ceil((REACH_SIGMA * blur_px + 1.0) * oversampling))
+    centres = np.arange(-reach, reach + 1)
+    fine = np.arange(-(reach + 2) * 32, (reach + 2) * 32 + 1) / 32
+    splines = cubic_spline(fine[:, None] - centres) * oversampling
+    weights = np.linalg.lstsq(splines, box_gaussian(fine / oversampling, blur_px), rcond=None)[0]
+    weights = 0.5 * (weights + weights[::-1])
+    return PointSpread(3, oversampling, (weights / weights.sum()).astype(np.float32))
+
+
+def cubic_spline(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The centred cubic B-spline of unit area."""
+    distance = np.abs(x)
+    inner = 2 / 3 - distance**2 + distance**3 / 2
+    outer = np.maximum(2 - distance, 0) ** 3 / 6
+    return np.where(distance < 1, inner, outer)
+
+
+def box_gaussian(x: NDArray[np.float64], blur_px: float) -> NDArray[np.float64]:
+    """The wanted point spread along one axis: a unit box convolved with a Gaussian of sigma ``blur_px``."""
+    from scipy.special import erf
+
+    root = np.sqrt(2) * blur_px
+    return np.asarray(0.5 * (erf((x + 0.5) / root) - erf((x - 0.5) / root)))

@@ -1,0 +1,72 @@
+"""A scene: the parts that make an image. What is absent is neither asked for nor computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from cmpdesign.layout import COLORS, Layout
+from cmpdesign.scene.background import Background, Plain
+from cmpdesign.scene.camera import Camera
+from cmpdesign.scene.damage import Damage
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.light import Light
+from cmpdesign.scene.optics import Optics
+from cmpdesign.scene.sensor import Sensor
+from cmpdesign.scene.surface import Surface
+
+RGB = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that makes one image.
+
+    Attributes:
+        layout: the pattern.
+        camera: where it is seen from.
+        surface: the surface's state; None: flat, as designed.
+        light: None: white and even.
+        background: behind the pattern's outline.
+        optics: the blur; None: none.
+        sensor: None: perfect, 8 bits.
+        damage: None: none.
+        inks: RGB 0 to 255 by color name, over the layout's palette.
+        seed: of everything random; the same scene gives the same bytes.
+    """
+
+    layout: Layout
+    camera: Camera = field(default_factory=Camera)
+    surface: Surface | None = None
+    light: Light | None = None
+    background: Background = field(default_factory=Plain)
+    optics: Optics | None = None
+    sensor: Sensor | None = None
+    damage: Damage | None = None
+    inks: Mapping[str, RGB] = field(default_factory=dict)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in self.inks:
+            if name not in COLORS:
+                raise SceneError(f"ink {name!r} is unknown; the inks are {', '.join(COLORS)}")
+        object.__setattr__(self, "inks", MappingProxyType(dict(self.inks)))
+
+    @property
+    def blur_px(self) -> float:
+        return self.optics.blur_px if self.optics else 0.0
+
+    def ink(self, color: int) -> RGB:
+        """RGB, 0 to 255, of a color of the layout (an index into ``COLORS``).
+
+        Raises:
+            SceneError: neither the scene nor the layout's palette has this ink.
+        """
+        name = COLORS[color]
+        if name in self.inks:
+            return self.inks[name]
+        if name not in self.layout.palette:
+            raise SceneError(f"the layout's palette has no {name}; give it in the scene's inks")
+        digits = self.layout.palette[name].lstrip("#")
+        return int(digits[0:2], 16), int(digits[2:4], 16), int(digits[4:6], 16)

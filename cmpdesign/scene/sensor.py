@@ -1,0 +1,63 @@
+"""The sensor: noise, gamma, quantisation and JPEG, in this order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What turns light into numbers.
+
+    Attributes:
+        noise: sigma of the white Gaussian noise, in units of an 8-bit step (noise 2 is 2/255).
+        gamma: out = 255 (in / 255) ** gamma, after the noise; 1 changes nothing.
+        bits: 8 or 16.
+        jpeg_quality: 1 to 100; None: not compressed. 8 bits only.
+    """
+
+    noise: float = 0.0
+    gamma: float = 1.0
+    bits: int = 8
+    jpeg_quality: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.noise <= 255:
+            raise SceneError(f"noise is {self.noise:g}; it must lie between 0 and 255 8-bit steps")
+        if not 0.1 <= self.gamma <= 10:
+            raise SceneError(f"gamma is {self.gamma:g}; it must lie between 0.1 and 10")
+        if self.bits not in (8, 16):
+            raise SceneError(f"bits is {self.bits}; it must be 8 or 16")
+        if self.jpeg_quality is not None and not (1 <= self.jpeg_quality <= 100 and self.bits == 8):
+            raise SceneError(f"jpeg_quality is {self.jpeg_quality} at {self.bits} bits; it must be 1 to 100, at 8 bits")
+
+
+def expose(
+    sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
+) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Planes (3, H, W) in 8-bit units, B, G, R -> the image (H, W, 3)."""
+    image = np.ascontiguousarray(planes.transpose(1, 2, 0))
+    if sensor.noise:
+        grain = rng.standard_normal(image.shape, dtype=np.float32)
+        grain *= np.float32(sensor.noise)
+        image += grain
+    if sensor.gamma != 1.0:
+        image = 255 * np.power(np.maximum(image, 0) / 255, np.float32(sensor.gamma), dtype=np.float32)
+    if sensor.bits == 16:
+        return np.asarray(np.clip(np.rint(image * 257), 0, 65535), dtype=np.uint16)
+    np.rint(image, out=image)
+    np.clip(image, 0, 255, out=image)
+    eight = image.astype(np.uint8)
+    return eight if sensor.jpeg_quality is None else _jpeg(eight, sensor.jpeg_quality)
+
+
+def _jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    import cv2
+
+    _, coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), dtype=np.uint8)

@@ -1,0 +1,132 @@
+"""The surface's state: smooth maps of the layout frame onto itself, mm to mm, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.errors import SceneError
+
+Points = NDArray[np.float64]
+
+
+class Deformation(Protocol):
+    """A smooth map of (N, 2) float64 points of the layout frame, mm to mm."""
+
+    def __call__(self, xy_mm: Points, /) -> Points: ...
+
+
+def _from_centre(xy_mm: Points, centre_mm: tuple[float, float], radius_mm: float) -> tuple[Points, Points]:
+    """Offsets (N, 2) from the centre in units of the radius, and the bell exp(-r^2 / 2) as (N, 1)."""
+    offset = (xy_mm - np.asarray(centre_mm, dtype=np.float64)) / radius_mm
+    return offset, np.exp(-0.5 * np.sum(offset * offset, axis=1, keepdims=True))
+
+
+def _require_radius(radius_mm: float) -> None:
+    if not radius_mm > 0:
+        raise SceneError(f"radius_mm is {radius_mm:g}; it must be above 0 mm")
+
+
+@dataclass(frozen=True)
+class Press:
+    """Moves points away from (depth_mm > 0, a bulge) or towards (a pinch) a centre.
+
+    The displacement is depth_mm * r exp((1 - r^2) / 2), r = distance / radius_mm: it peaks at the radius with
+    exactly ``depth_mm``. It folds where depth_mm / radius_mm leaves (-0.61, 1.36).
+    """
+
+    radius_mm: float
+    depth_mm: float
+    centre_mm: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_radius(self.radius_mm)
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        offset, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        return xy_mm + self.depth_mm * np.exp(0.5) * bell * offset
+
+
+@dataclass(frozen=True)
+class Twist:
+    """Turns points about a centre, counter-clockwise by ``angle_deg`` there, fading as exp(-r^2 / 2)."""
+
+    radius_mm: float
+    angle_deg: float
+    centre_mm: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_radius(self.radius_mm)
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        offset, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        angle = np.radians(self.angle_deg) * bell[:, 0]
+        cos, sin = np.cos(angle), np.sin(angle)
+        x, y = offset.T
+        turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        return np.asarray(self.centre_mm) + self.radius_mm * turned
+
+
+@dataclass(frozen=True)
+class Shear:
+    """Drags points by ``shift_mm`` at a centre, fading as exp(-r^2 / 2), as a contact drags the skin."""
+
+    radius_mm: float
+    shift_mm: tuple[float, float]
+    centre_mm: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_radius(self.radius_mm)
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        _, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        return xy_mm + bell * np.asarray(self.shift_mm)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Deformations applied in order; any smooth callable of (N, 2) mm points will do."""
+
+    deformations: tuple[Deformation | Callable[[Points], Points], ...]
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        """Positions (N, 2) in mm after all deformations."""
+        for deform in self.deformations:
+            xy_mm = deform(xy_mm)
+        return xy_mm
+
+
+def composed(*deformations: Deformation) -> Surface:
+    """The surface after these deformations, the first one first."""
+    return Surface(tuple(deformations))
+
+
+def require_no_fold(surface: Surface, xy_mm: Points, step_mm: float) -> None:
+    """Check the map's Jacobian determinant (central differences over ``step_mm``) at the points (N, 2).
+
+    Raises:
+        SceneError: the map folds or is not finite somewhere; names the place and the determinant.
+    """
+    x_step, y_step = np.array([step_mm, 0.0]), np.array([0.0, step_mm])
+    along_x = (surface(xy_mm + x_step) - surface(xy_mm - x_step)) / (2 * step_mm)
+    along_y = (surface(xy_mm + y_step) - surface(xy_mm - y_step)) / (2 * step_mm)
+    jacobian = along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0]
+    folded = ~(jacobian > 0)  # also catches NaN
+    if folded.any():
+        worst = int(np.argmin(np.where(np.isnan(jacobian), -np.inf, jacobian)))
+        x, y = xy_mm[worst]
+        raise SceneError(
+            f"the surface folds at ({x:.3g}, {y:.3g}) mm: its Jacobian is {jacobian[worst]:.3g}, "
+            "it must stay above 0; take a smaller displacement or a larger radius_mm"
+        )
+
+
+def points_to_check(markers_mm: Points, cells: Sequence[NDArray[np.int32]] | NDArray[np.int32]) -> Points:
+    """Markers, cell centroids and cell sides' midpoints (N, 2) mm: close enough together to catch a fold."""
+    corners = markers_mm[np.asarray(cells)]
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    return np.concatenate([markers_mm, corners.mean(axis=1), middles.reshape(-1, 2)])
