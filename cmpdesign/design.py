@@ -209,8 +209,8 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = 
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette, and the text "none"
-            takes the field out.
+        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette, and the text
+            "none" takes the field out.
 
     Raises:
         DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.

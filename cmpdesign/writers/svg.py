@@ -91,9 +91,7 @@ def _cells(drawing: Any, layout: Layout, xy: NDArray[np.float64], color: int, na
 
 def _ids(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: bool) -> Any:
     size = round(0.22 * float(layout.parameters["pitch_mm"]), 3)
-    group = drawing.g(
-        id="ids", fill="#ffffff", font_size=size, font_family="sans-serif", text_anchor="middle"
-    )
+    group = drawing.g(id="ids", fill="#ffffff", font_size=size, **_FONT, text_anchor="middle")
     for marker in np.flatnonzero(layout.present).tolist():
         x, y = xy[marker].tolist()
         group.add(_text(drawing, str(marker), x, round(y + 0.35 * size, DECIMALS), mirror))
