@@ -111,7 +111,7 @@ def judge(reference: Reference, image: Image, markers: Markers, min_share: float
         fitted=fitted,
         lost=lost,
         share=measured / present,
-        mirrored=markers.mirrored,
+        mirrored=None if markers.mirrored is None else bool(markers.mirrored),
         contradictions=contradictions,
         markers=markers,
     )
@@ -139,7 +139,7 @@ def _wrong_colors(reference: Reference, contradictions: tuple[int, ...]) -> str 
 
 
 def _wrong_side(reference: Reference, markers: Markers) -> str | None:
-    if markers.mirrored is reference.mirrored:
+    if markers.mirrored == reference.mirrored:
         return None
     seen, designed = ("back", "front") if markers.mirrored else ("front", "back")
     return f"the pattern is seen from the {seen}, but designed to be seen from the {designed}"
@@ -157,8 +157,8 @@ def color_contradictions(reference: Reference, image: Image, xy_px: NDArray[np.f
     """Cells with all corners found whose color in the image is decidedly not the layout's.
 
     The inks are taken from the image: each is the median over the cells that the layout gives that color.
-    They must be the right way round (in each channel, the ink named after it leads), so that a numbering turned
-    by a third, in which all cells agree with each other, is found out too: then every colored cell is returned.
+    They must be the right way round (in each channel, the ink named after it leads): a numbering turned by a
+    third, in which all cells agree with each other, is found out too; then every colored cell is returned.
     """
     cells = np.flatnonzero(np.isfinite(xy_px[reference.cell_corners]).all(axis=(1, 2)))
     color = reference.cell_color[cells]
@@ -183,7 +183,7 @@ def color_contradictions(reference: Reference, image: Image, xy_px: NDArray[np.f
 
 def _chroma(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 3) what remains without the gray part."""
-    return rgb - rgb.mean(axis=1, keepdims=True)
+    return np.asarray(rgb - rgb.mean(axis=1, keepdims=True))
 
 
 def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -195,4 +195,4 @@ def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float
     sampled = cv2.remap(
         image, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    return np.asarray(sampled, dtype=np.float64).mean(axis=1)[:, ::-1]
+    return np.asarray(sampled.astype(np.float64).mean(axis=1)[:, ::-1])

@@ -1,0 +1,128 @@
+"""``make demo``: from a design to a verified sample in three commands, compared with the ground truth."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from cmpdesign.scene import Truth
+    from extractor.types import Markers
+
+OUT = Path("out")
+COMMANDS = (
+    "build tac3d -o out",
+    "render out/layout.json -o out/sample.png --truth out/truth.npz"
+    " --pitch 24 --rotation 12 --tilt 15 --press 0.5 --noise 2",
+    "verify out/layout.json out/sample.png -o out",
+)
+RUNS = 7
+
+
+@dataclass(frozen=True)
+class Score:
+    """Markers against the ground truth.
+
+    Attributes:
+        visible: markers that the image shows.
+        measured, repaired, lost: how many of them were found, and how.
+        wrong: markers that lie nearer to another marker's true place than to their own.
+        rms_px: root mean square error of the measured markers, per axis.
+        max_px: the largest distance from the true place.
+    """
+
+    visible: int
+    measured: int
+    repaired: int
+    lost: int
+    wrong: int
+    rms_px: float
+    max_px: float
+
+
+def score(markers: Markers, truth: Truth) -> Score:
+    """Compare an extraction with the scene's truth."""
+    from scipy.spatial import cKDTree
+
+    status = markers.status
+    found = np.flatnonzero(np.isfinite(markers.xy_px).all(axis=1))
+    nearest = cKDTree(truth.marker_xy_px).query(markers.xy_px[found])[1]
+    measured = status == 1
+    error = markers.xy_px[measured] - truth.marker_xy_px[measured]
+    seen = status[truth.visible]
+    return Score(
+        visible=len(seen),
+        measured=int((seen == 1).sum()),
+        repaired=int((seen >= 2).sum()),
+        lost=int((seen == 0).sum()),
+        wrong=int((nearest != found).sum()),
+        rms_px=float(np.sqrt(np.mean(error**2))) if len(error) else float("nan"),
+        max_px=float(np.hypot(*error.T).max()) if len(error) else float("nan"),
+    )
+
+
+def main() -> int:
+    """Run the commands, print the table; returns the worst exit code."""
+    from cmpdesign.cli.app import app
+    from cmpdesign.cli.terminal import console
+
+    for command in COMMANDS:
+        console().print(f"\n$ cmpdesign {command}", style="bold")
+        code = app(command.split(), standalone_mode=False)
+        if code:
+            return int(code)
+    console().print()
+    console().print(_table(), soft_wrap=False)
+    return 0
+
+
+def _table() -> Table:
+    """The sample once more, warm: figures against the truth, and the median run's stages."""
+    from cmpdesign.images import read_image
+    from cmpdesign.scene import load_truth
+    from extractor import Extractor, load_layout
+
+    extractor, image = Extractor(load_layout(OUT / "layout.json")), read_image(OUT / "sample.png")
+    runs = [extractor.extract(image) for _ in range(RUNS)]
+    markers = sorted(runs, key=lambda run: sum(run.timings_ms.values()))[RUNS // 2]
+    height, width = image.shape[:2]
+    return _drawn(score(markers, load_truth(OUT / "truth.npz")), markers, f"{width} x {height} px")
+
+
+def _drawn(figures: Score, markers: Markers, size: str) -> Table:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title=f"sample.png, {size}: extracted and compared with the truth", box=SIMPLE_HEAD)
+    table.add_column("markers")
+    table.add_column("", justify="right")
+    table.add_column("stage")
+    table.add_column("ms", justify="right")
+    left = [
+        ("visible", f"{figures.visible}"),
+        ("measured", f"{figures.measured}"),
+        ("repaired", f"{figures.repaired}"),
+        ("lost", f"{figures.lost}"),
+        ("wrong ids", f"{figures.wrong}"),
+        ("RMS error per axis", f"{figures.rms_px:.4f} px"),
+        ("largest error", f"{figures.max_px:.4f} px"),
+    ]
+    times = markers.timings_ms
+    right = [(name, f"{ms:.2f}") for name, ms in times.items()]
+    right.append(("total", f"{sum(times.values()):.2f}"))
+    rows = max(len(left), len(right))
+    left += [("", "")] * (rows - len(left))
+    right = right[:-1] + [("", "")] * (rows - len(right)) + right[-1:]
+    for name_value, stage_ms in zip(left, right, strict=True):
+        table.add_row(*name_value, *stage_ms)
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())
