@@ -55,10 +55,17 @@ class Layout:
     outline_mm: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        for array in (self.marker_layer, self.marker_index, self.marker_xy_mm):
-            array.setflags(write=False)
-        for array in (self.cell_corners, self.cell_color, self.edges, self.outline_mm):
-            array.setflags(write=False)
+        columns: tuple[NDArray[Any], ...] = (
+            self.marker_layer,
+            self.marker_index,
+            self.marker_xy_mm,
+            self.cell_corners,
+            self.cell_color,
+            self.edges,
+            self.outline_mm,
+        )
+        for column in columns:
+            column.setflags(write=False)
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
 

@@ -175,8 +175,9 @@ def test_quarter_turns_are_exact() -> None:
 
 
 @pytest.mark.parametrize("pattern", NAMES)
-def test_no_negative_zeros_and_no_more_digits_than_stated(pattern: str) -> None:
-    built = layout(pattern, 5, rotation_deg=90)
+@pytest.mark.parametrize("angle_deg", [0, 60, 90, 180])
+def test_no_negative_zeros_and_no_more_digits_than_stated(pattern: str, angle_deg: float) -> None:
+    built = layout(pattern, 5, rotation_deg=angle_deg)
     for points in (built.marker_xy_mm, built.outline_mm):
         assert not np.signbit(points[points == 0]).any()
         np.testing.assert_array_equal(np.round(points, 9), points)
@@ -243,10 +244,11 @@ def test_overall_size_and_pitch_give_as_many_layers_as_fit(
     assert layout(pattern, built.parameters["layers"] + 1, pitch_mm=pitch_mm).size_mm[0] > width_mm - 1e-7
 
 
-def test_a_size_that_just_fits_is_not_lost_to_rounding() -> None:
+@pytest.mark.parametrize("pitch_mm", [1.5, 1.1, 1 / 3])
+def test_a_size_that_just_fits_is_not_lost_to_rounding(pitch_mm: float) -> None:
     for n in range(1, 41):
-        width_mm = 2 * 1.5 * n + 1.5 + 2
-        built = build_layout(Design(pattern="square", pitch_mm=1.5, width_mm=width_mm))
+        width_mm = pitch_mm * (2 * n + 1) + 2
+        built = build_layout(Design(pattern="square", pitch_mm=pitch_mm, width_mm=width_mm))
         assert built.parameters["layers"] == n
 
 

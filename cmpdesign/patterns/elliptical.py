@@ -26,7 +26,8 @@ def elliptical(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
     """
     turn = (120 - 60 * index / np.maximum(layer, 1)) / 360
     angle = 2 * np.pi * turn if shape.spacing == "angle" else _angle_from_arc(turn, shape.aspect)
-    return layer[..., None] * np.stack([np.cos(angle), shape.aspect * np.sin(angle)], axis=-1)
+    ellipse = np.stack([np.cos(angle), shape.aspect * np.sin(angle)], axis=-1)
+    return np.asarray(layer[..., None] * ellipse)
 
 
 def _angle_from_arc(turn: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:

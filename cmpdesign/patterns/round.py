@@ -27,4 +27,5 @@ def round_(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
             ' -*- '
     """
     angle = np.radians(120 - 60 * index / np.maximum(layer, 1))
-    return layer[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.asarray(layer[..., None] * circle)
