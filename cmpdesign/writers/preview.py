@@ -111,7 +111,6 @@ def _dimensions(image: Image, layout: Layout, origin: NDArray[np.int64], size: t
 
 def _title(image: Image, layout: Layout) -> None:
     name = str(layout.parameters.get("name") or layout.pattern)
-    cells = int(np.count_nonzero(layout.cell_color != BLACK))
     virtual = len(layout.edges) * layout.virtual_per_edge
     facts = [
         layout.pattern,
@@ -119,7 +118,7 @@ def _title(image: Image, layout: Layout) -> None:
         f"pitch {float(layout.parameters['pitch_mm']):.4g} mm",
         f"{int(layout.present.sum())} markers",
         f"{virtual} virtual",
-        f"{cells} colored cells",
+        f"{len(layout.cell_corners)} cells",
         *(["seen from the front, used from the back"] if layout.mirrored else []),
     ]
     _text(image, name, (MARGIN_PX, 46), 0.9, _TEXT, left=True, weight=2)

@@ -15,6 +15,8 @@ from cmpdesign.writers.atomic import write_file
 SCALE_STRIP_MM = 6.0
 _INK = "#000000"
 _FONT = {"font_family": "sans-serif"}
+# The mean letter of a wide sans-serif face.
+_EM_PER_LETTER = 0.6
 
 ToSheet = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -99,14 +101,15 @@ def _ids(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: bool) ->
 
 
 def _scale(drawing: Any, layout: Layout, mirror: bool) -> Any:
+    """A bar with its length beside it, and below them a caption that shrinks until it fits the sheet."""
     width, height = layout.size_mm
     length = scale_length_mm(width)
-    y = height + 1.5
-    group = drawing.g(id="scale", fill=_INK, font_size=2, **_FONT)
-    left = width - length if mirror else 0.0
-    group.add(drawing.rect(insert=(left, y), size=(length, 0.4)))
-    x = width if mirror else 0.0
-    group.add(_text(drawing, f"{length:g} mm · {_caption(layout)}", x, y + 3.2, mirror))
+    caption = _caption(layout)
+    size = round(min(2.0, width / (_EM_PER_LETTER * len(caption))), 3)
+    group = drawing.g(id="scale", fill=_INK, font_size=size, **_FONT)
+    group.add(drawing.rect(insert=(width - length if mirror else 0.0, height + 1.5), size=(length, 0.4)))
+    for text, left, y in ((f"{length:g} mm", length + 0.5, height + 2.2), (caption, 0.0, height + 5.0)):
+        group.add(_text(drawing, text, width - left if mirror else left, y, mirror))
     return group
 
 
