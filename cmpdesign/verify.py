@@ -168,11 +168,10 @@ def color_contradictions(reference: Reference, image: Image, xy_px: NDArray[np.f
     level = _cell_levels(image, xy_px[reference.cell_corners[cells]])
     black = np.median(level[color == BLACK], axis=0)
     medians = np.array([np.median(level[color == ink], axis=0) for ink in inks]) - black
-    gain = np.maximum(medians.mean(axis=0), 1e-9)
-    scaled = medians / gain
-    if not (scaled.argmax(axis=0) == inks).all():
+    gain = medians.mean(axis=0)
+    if (gain <= 0).any() or (medians.argmax(axis=0) != inks).any():
         return tuple(cells[color < BLACK].tolist())
-    chroma, ink_chroma = _chroma((level - black) / gain), _chroma(scaled)
+    chroma, ink_chroma = _chroma((level - black) / gain), _chroma(medians / gain)
     ink_size = np.linalg.norm(ink_chroma, axis=1)
     usual = float(ink_size.min())
     nearest = (chroma @ (ink_chroma / ink_size[:, None]).T).argmax(axis=1)
