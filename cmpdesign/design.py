@@ -108,8 +108,12 @@ class Design(_Strict):
         None, ge=1, le=MAX_LAYERS, strict=True, description="Layers around the centre."
     )
     pitch_mm: Length | None = Field(None, description="Distance between neighbouring markers (layers).")
-    width_mm: Length | None = Field(None, description="Overall width, border included, rotation included.")
-    height_mm: Length | None = Field(None, description="Overall height, border included, rotation included.")
+    width_mm: Length | None = Field(
+        None, description="Overall width with border and rotation, before clipping."
+    )
+    height_mm: Length | None = Field(
+        None, description="Overall height with border and rotation, before clipping."
+    )
     aspect: float | None = Field(
         None, ge=ASPECT_MIN, le=ASPECT_MAX, description="Elliptical: height over width of a layer, b / a."
     )
@@ -148,6 +152,14 @@ class Design(_Strict):
             raise ValueError(
                 f"{value!r} is no pattern{_nearest(value, patterns())}; there are {', '.join(patterns())}"
             )
+        return value
+
+    @field_validator("name")
+    @classmethod
+    def _one_printable_line(cls, value: str) -> str:
+        # It goes into captions and XML, which has no way to write control characters.
+        if not value.isprintable():
+            raise ValueError(f"{value!r} has line breaks or control characters; write it on one line")
         return value
 
     @model_validator(mode="after")

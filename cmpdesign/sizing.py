@@ -70,14 +70,15 @@ def _largest_pitch(corner: Points, border: Points, limit_mm: float) -> float:
     The extent is convex and piecewise linear in the pitch, so Newton's method ends on the exact piece.
     """
     pitch = limit_mm / float(np.ptp(corner))
-    while True:
+    for _ in range(100):
         position = pitch * corner + border
         high, low = int(position.argmax()), int(position.argmin())
         slope, offset = corner[high] - corner[low], border[high] - border[low]
         following = float((limit_mm - offset) / slope)
         if following >= pitch * (1 - 1e-15):
-            return following
+            break
         pitch = following
+    return pitch
 
 
 def _shape(design: Design, layers: int) -> Shape:

@@ -61,6 +61,7 @@ def test_unknown_keys_are_refused_with_the_nearest_known_one() -> None:
         ({"layers": 3, "pitch_mm": 1, "aspect": 0.5}, ["aspect", "elliptical", "honeycomb"]),
         ({"layers": 3, "pitch_mm": 1, "spacing": "arc"}, ["spacing", "elliptical"]),
         ({"pattern": "elliptical", "layers": 3, "pitch_mm": 1, "aspect": 0.2}, ["aspect = 0.2", "0.25"]),
+        ({"layers": 3, "pitch_mm": 1, "name": "two\nlines"}, ["name", "one line"]),
         ({"layers": 3, "pitch_mm": 1, "border_mm": -0.1}, ["border_mm = -0.1", "0 mm"]),
     ],
 )

@@ -43,6 +43,11 @@ def test_the_png_is_deterministic_and_readable(name: str) -> None:
     np.testing.assert_array_equal(image, draw_preview(built))
 
 
+def test_any_name_is_drawn_and_a_long_one_is_cut() -> None:
+    for name in ("Größe µ 模式", "x" * 500, "%d"):
+        draw_preview(build_layout(Design(pattern="honeycomb", layers=1, pitch_mm=1, name=name)))
+
+
 @pytest.mark.parametrize("layers", [1, 40])
 def test_the_smallest_and_a_large_pattern_are_drawn(layers: int) -> None:
     image = draw_preview(build_layout(Design(pattern="honeycomb", layers=layers, pitch_mm=1)))
