@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import OutputError as OutputError
     from cmpdesign.layout import Layout as Layout
-    from cmpdesign.report import report as report
     from cmpdesign.writers.layout_file import write_layout as write_layout
     from cmpdesign.writers.svg import write_svg as write_svg
 
@@ -32,7 +31,6 @@ _HOMES = {
     "build_layout": "cmpdesign.build",
     "check_design": "cmpdesign.checks",
     "load_design": "cmpdesign.design",
-    "report": "cmpdesign.report",
     "write_layout": "cmpdesign.writers.layout_file",
     "write_svg": "cmpdesign.writers.svg",
 }

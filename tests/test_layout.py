@@ -368,3 +368,14 @@ def test_docstring_examples() -> None:
         outcome = doctest.testmod(module)
         assert outcome.attempted > 0
         assert outcome.failed == 0
+
+
+def test_every_exported_name_is_there_whatever_was_imported_before() -> None:
+    import cmpdesign.report
+
+    names = [name for name in cmpdesign.__all__ if name != "__version__"]
+    assert "build_layout" in names
+    for name in names:
+        assert getattr(cmpdesign, name).__name__ == name
+    with pytest.raises(AttributeError, match="nothing_of_the_kind"):
+        _ = cmpdesign.nothing_of_the_kind
