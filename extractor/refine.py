@@ -20,7 +20,8 @@ from .sampling import clamp, sample_dot, sample_patch
 STATIONS = 12  # at most, along an edge
 SAMPLES = 7  # at most, on each side of it
 REACH_SIGMA = 2.5  # how far a profile reaches, in units of the blur
-CLEAR_SIGMA = 3.2  # how far from a corner the other gridline no longer shows, in units of the blur
+CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
+MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
 MAX_STEPS = 60  # of the conjugate gradient
 ROUNDS = 2
@@ -69,6 +70,15 @@ def _edge_frame(flat, height, width, a, b, c, ink, beyond):  # type: ignore[no-u
 
 
 @compiled
+def _sine(a, b, c):  # type: ignore[no-untyped-def]
+    """Sine of the angle at a between b and c, 1 where it is obtuse."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+    if ux * vx + uy * vy <= 0.0:
+        return 1.0
+    return max(abs(ux * vy - uy * vx) / (np.hypot(ux, uy) * np.hypot(vx, vy)), 0.05)
+
+
+@compiled
 def _share(flat, height, width, x, y, ink, beyond, contrast):  # type: ignore[no-untyped-def]
     """How much of the ink a point shows: 1 in the cell, 0 beyond the edge, NaN outside the image."""
     u0, u1, u2 = (ink[0] - beyond[0]) / contrast, (ink[1] - beyond[1]) / contrast, (ink[2] - beyond[2]) / contrast
@@ -87,7 +97,7 @@ def _edge_blurs(image, xy, cells, every):  # type: ignore[no-untyped-def]
         length, nx, ny, contrast = _edge_frame(flat, height, width, a, b, c, ink, beyond)
         if length == 0.0:
             continue
-        reach = 0.28 * length
+        reach = MAX_REACH * abs((c[0] - a[0]) * nx + (c[1] - a[1]) * ny)
         step = reach / 8
         total = 0.0
         for t in range(3):
@@ -119,9 +129,11 @@ def _measure(image, xy, cells, sigma, noise):  # type: ignore[no-untyped-def]
         if length == 0.0:
             continue
         rows[e, 0], rows[e, 1] = nx, ny
-        margin = min(max(CLEAR_SIGMA * sigma / length, 0.15), 0.35)
-        stations = min(max(int(length * (1 - 2 * margin)), 3), STATIONS)
-        reach = min(REACH_SIGMA * sigma, 0.28 * length)
+        # the sharper a corner, the longer the edge runs close to its neighbour
+        start = min(max(CLEAR_SIGMA * sigma / (length * _sine(a, b, c)), 0.15), 0.4)
+        end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * _sine(b, a, c)), 0.15), 0.4)
+        stations = min(max(int(length * (end - start)), 3), STATIONS)
+        reach = min(REACH_SIGMA * sigma, MAX_REACH * abs((c[0] - a[0]) * nx + (c[1] - a[1]) * ny))
         samples = min(max(int(np.ceil(reach)), 2), SAMPLES)
         step = reach / samples
         norm = 0.0
@@ -130,9 +142,9 @@ def _measure(image, xy, cells, sigma, noise):  # type: ignore[no-untyped-def]
             kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
             step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
             norm += kernel[m + samples] ** 2
-        information = contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (1 - 2 * margin) / stations
+        information = contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
         for j in range(stations):
-            t = margin + (1 - 2 * margin) * (j + 0.5) / stations
+            t = start + (end - start) * (j + 0.5) / stations
             x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
             product = 0.0
             for m in range(-samples, samples + 1):

@@ -1,0 +1,216 @@
+"""Pictures of what was found: the overlay of an image, and one picture for every stage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .image import prepare
+from .reference import Reference
+from .types import Markers, Status
+
+Picture = NDArray[np.uint8]
+
+SHORT_SIDE_PX = 1000  # smaller images are enlarged to about this, so that ids can be read
+ID_EDGE_PX = 30  # edges this long have room for an id beside every marker
+SHIFT = 4  # OpenCV draws with 4 fractional bits
+INK_BGR = np.array([[40, 40, 40], [60, 60, 230], [80, 190, 60], [230, 110, 60]], np.uint8)
+STATUS_BGR = {
+    Status.MEASURED: (80, 255, 255),
+    Status.REPAIRED: (0, 160, 255),
+    Status.FITTED: (255, 120, 255),
+}
+WHITE_BGR = (255, 255, 255)
+
+
+def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) -> Picture:
+    """The image with its gridlines, markers (colored by status), ids and a caption.
+
+    Args:
+        image: as given to ``Extractor.extract``.
+
+    Returns:
+        (H * s, W * s, 3) uint8 BGR, enlarged by a whole number s where the image is small.
+    """
+    base = _base(image)
+    scale = _scale(base)
+    canvas = _enlarged(base, scale, 0.55)
+    points = _at(markers.xy_px, scale)
+    _draw_edges(canvas, reference, points)
+    _draw_reference(canvas, reference, points)
+    edge = _median_edge(reference, points)
+    radius = float(np.clip(edge / 9, 1.5, 6.0))
+    for status, color in STATUS_BGR.items():
+        for x, y in points[markers.status == status]:
+            _dot(canvas, x, y, radius, color)
+    if edge >= ID_EDGE_PX:
+        _draw_ids(canvas, points, edge)
+    _caption(canvas, _summary(markers))
+    return canvas
+
+
+def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> dict[str, Picture]:
+    """One picture for every stage that was reached, in order."""
+    base = _base(image)
+    scale = _scale(base)
+    results = markers.stages
+    pictures: dict[str, Picture] = {}
+    if results.get("target") is not None:
+        pictures["target"] = _draw_target(base, scale, results["target"])
+    if results.get("segment") is not None:
+        pictures["segment"] = _fit(INK_BGR[results["segment"].label], base, scale)
+    if "seeds" in results:
+        pictures["seeds"] = _draw_seeds(base, scale, results["segment"], results["seeds"])
+    if "grow" in results:
+        pictures["grow"] = _draw_regions(base, scale, results["grow"])
+    if "triangles" in results:
+        pictures["triangles"] = _draw_triangles(base, scale, results["triangles"])
+    if "connect" in results:
+        pictures["connect"] = _draw_graph(base, scale, results["connect"])
+    if "place" in results:
+        pictures["number"] = _draw_spiral(base, scale, reference, results["place"].xy_px)
+        pictures["markers"] = draw_markers(image, reference, markers)
+    return pictures
+
+
+def _base(image: NDArray[Any]) -> Picture:
+    bgr = prepare(image)
+    if bgr is None:
+        gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
+        bgr = cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[assignment]
+    return bgr
+
+
+def _scale(base: Picture) -> int:
+    return max(1, round(SHORT_SIDE_PX / min(base.shape[:2])))
+
+
+def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
+    """Enlarged without smoothing, so that every pixel can be seen, and dimmed under what is drawn."""
+    height, width = base.shape[:2]
+    big = cv2.resize(base, (width * scale, height * scale), interpolation=cv2.INTER_NEAREST)
+    return cv2.convertScaleAbs(big, alpha=brightness)  # type: ignore[return-value]
+
+
+def _fit(picture: Picture, base: Picture, scale: int) -> Picture:
+    size = (base.shape[1] * scale, base.shape[0] * scale)
+    return cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)  # type: ignore[return-value]
+
+
+def _at(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """Image coordinates (pixel centres at integers) in the enlarged picture."""
+    return (xy_px + 0.5) * scale - 0.5
+
+
+def _dot(canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1) -> None:
+    one = 1 << SHIFT
+    cv2.circle(canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT)
+
+
+def _lines(canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1) -> None:
+    """Closed polygons or open two-point lines: (N, K, 2)."""
+    fixed = np.round(lines * (1 << SHIFT)).astype(np.int32)
+    cv2.polylines(canvas, list(fixed), lines.shape[1] > 2, color, thickness, cv2.LINE_AA, SHIFT)
+
+
+def _draw_edges(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
+    lines = points[reference.edges]
+    _lines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], (190, 190, 190))
+
+
+def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
+    corners = points[reference.cell_corners[reference.reference_cell]]
+    if np.isfinite(corners).all():
+        _lines(canvas, corners[None], WHITE_BGR, 2)
+        _dot(canvas, *points[reference.reference_marker], 9.0, WHITE_BGR, 2)
+
+
+def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
+    lines = points[reference.edges]
+    lengths = np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1)
+    known = lengths[np.isfinite(lengths)]
+    return float(np.median(known)) if len(known) else 0.0
+
+
+def _draw_ids(canvas: Picture, points: NDArray[np.float64], edge: float) -> None:
+    size = float(np.clip(edge / 110, 0.3, 0.6))
+    for marker in np.flatnonzero(np.isfinite(points[:, 0])):
+        x, y = points[marker]
+        at = (round(x + edge * 0.08), round(y - edge * 0.08))
+        cv2.putText(canvas, str(marker), at, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 3, cv2.LINE_AA)
+        cv2.putText(canvas, str(marker), at, cv2.FONT_HERSHEY_SIMPLEX, size, WHITE_BGR, 1, cv2.LINE_AA)
+
+
+def _summary(markers: Markers) -> str:
+    if markers.reason is not None and not np.any(markers.status):
+        return f"nothing found: {markers.reason.replace('_', ' ')}"
+    counts = {status.name.lower(): int(np.sum(markers.status == status)) for status in STATUS_BGR}
+    side = "back" if markers.mirrored else "front"
+    found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    return f"{found} of {len(markers.status)} markers, seen from the {side}"
+
+
+def _caption(canvas: Picture, text: str) -> None:
+    height, width = canvas.shape[:2]
+    size = float(np.clip(width / 1600, 0.4, 1.0))
+    cv2.rectangle(canvas, (0, height - round(34 * size)), (width, height), (25, 25, 25), -1)
+    at = (round(12 * size), height - round(11 * size))
+    cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+
+
+def _draw_target(base: Picture, scale: int, target: Any) -> Picture:
+    height, width = base.shape[:2]
+    big = cv2.resize(target.mask, None, fx=target.shrink, fy=target.shrink, interpolation=cv2.INTER_NEAREST)
+    mask = cv2.resize(big, (width, height), interpolation=cv2.INTER_NEAREST)
+    return _enlarged(np.where(mask[..., None] > 0, base, base // 4).astype(np.uint8), scale, 1.0)
+
+
+def _draw_seeds(base: Picture, scale: int, segmentation: Any, seeds: Any) -> Picture:
+    canvas = _fit((INK_BGR[segmentation.label] // 2).astype(np.uint8), base, scale)
+    for x, y in _at(seeds.xy.astype(np.float64), _work_scale(base, scale, segmentation.label)):
+        _dot(canvas, x, y, 4.0, WHITE_BGR)
+    return canvas
+
+
+def _draw_regions(base: Picture, scale: int, regions: Any) -> Picture:
+    ink = np.concatenate([[0], regions.ink]).astype(np.uint8)
+    return _fit(INK_BGR[ink[regions.owner]], base, scale)
+
+
+def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
+    """Pixels of the picture for one pixel of the scale at which regions were grown."""
+    return scale * round(base.shape[1] / work.shape[1])
+
+
+def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
+    canvas = _enlarged(base, scale, 0.4)
+    for ink in (1, 2, 3):
+        color = tuple(int(c) for c in np.minimum(INK_BGR[ink].astype(int) + 60, 255))
+        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), color, 2)  # type: ignore[arg-type]
+    return canvas
+
+
+def _draw_graph(base: Picture, scale: int, graph: Any) -> Picture:
+    """Nodes by the number of triangles that meet: three are yellow, two orange, one grey."""
+    canvas = _enlarged(base, scale, 0.4)
+    members = (graph.corner_of_node >= 0).sum(axis=1)
+    for count, color in ((1, (160, 160, 160)), (2, (0, 160, 255)), (3, (80, 255, 255))):
+        for x, y in _at(graph.xy_px[members == count], scale):
+            _dot(canvas, x, y, 3.0 + count, color)
+    return canvas
+
+
+def _draw_spiral(base: Picture, scale: int, reference: Reference, xy_px: NDArray[np.float64]) -> Picture:
+    """The order of the search: from the white cell's bottom corner around every layer, blue to red."""
+    canvas = _enlarged(base, scale, 0.4)
+    points = _at(xy_px, scale)
+    found = np.flatnonzero(np.isfinite(points[:, 0]))
+    shades = cv2.applyColorMap(np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO)
+    for start, end, shade in zip(found[:-1], found[1:], shades[:, 0], strict=False):
+        if end == start + 1:
+            _lines(canvas, points[[start, end]][None], tuple(int(c) for c in shade), 2)  # type: ignore[arg-type]
+    _draw_reference(canvas, reference, points)
+    return canvas
