@@ -99,11 +99,11 @@ def _drawn(figures: Score, markers: Markers, size: str) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(title=f"sample.png, {size}: extracted and compared with the truth", box=SIMPLE_HEAD)
-    table.add_column("markers")
-    table.add_column("", justify="right")
-    table.add_column("stage")
-    table.add_column("ms", justify="right")
+    table = Table(box=SIMPLE_HEAD, caption=f"{size}, one image; times: the median of {RUNS} warm runs")
+    table.add_column("against the truth", min_width=20)
+    table.add_column("", justify="right", min_width=10)
+    table.add_column("stage", min_width=12)
+    table.add_column("ms", justify="right", min_width=6)
     left = [
         ("visible", f"{figures.visible}"),
         ("measured", f"{figures.measured}"),
