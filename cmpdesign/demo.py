@@ -19,7 +19,7 @@ OUT = Path("out")
 COMMANDS = (
     "build tac3d -o out",
     "render out/layout.json -o out/sample.png --truth out/truth.npz"
-    " --pitch 24 --rotation 12 --tilt 15 --press 0.5 --noise 2",
+    " --pitch 22 --rotation 12 --tilt 15 --press 0.8 --noise 2",
     "verify out/layout.json out/sample.png -o out",
 )
 RUNS = 7

@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 import pytest
 from test_cli import refused, run
+from typer.testing import CliRunner
 
+from cmpdesign.cli import app
 from cmpdesign.scene import load_truth
 
 
@@ -123,6 +125,15 @@ def test_not_verified_says_why(made: Path, tmp_path: Path) -> None:
     assert run("render", made / "layout.json", "-o", back, *arguments).exit_code == 0
     result = run("verify", made / "layout.json", back)
     assert result.exit_code == 1 and "seen from the back" in result.stdout
+
+
+def test_a_bar_over_many_images_stays_on_stderr(made: Path, tmp_path: Path) -> None:
+    images = [made / "good.png", made / "none.png", made / "good.png"]
+    arguments = [str(value) for value in ("verify", made / "layout.json", *images)]
+    result = CliRunner().invoke(app, arguments, env={"FORCE_COLOR": "1"})
+    assert "verifying" in result.stderr and "error: " in result.stderr
+    lines = result.stdout.splitlines()
+    assert len(lines) == 2 and all("verified (91 of 91" in line for line in lines)
 
 
 def test_one_bad_file_among_many(made: Path, tmp_path: Path) -> None:

@@ -41,15 +41,6 @@ class Outcome:
             return {"image": self.name, "verified": False, "error": self.error}
         return {"image": self.name, **self.verdict.to_json()}
 
-    def line(self) -> str:
-        if self.verdict is None:
-            return f"{self.name}: error: {self.error}"
-        verdict = self.verdict
-        repaired = verdict.repaired + verdict.fitted
-        counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
-        head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
-        return f"{self.name}: {head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
-
 
 def verify(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
@@ -69,18 +60,17 @@ def verify(
     reference = load_layout(layout)
     extractor = Extractor(reference)
     names = _distinct([path.stem for path in images])
-    outcomes = []
-    for path, name in _with_progress(list(zip(images, names, strict=True))):
-        outcomes.append(_outcome(path, name, extractor, reference, min_share, (output, debug)))
-        if not as_json and outcomes[-1].verdict is not None:
-            console().print(outcomes[-1].line())
+    outcomes = [
+        _outcome(path, name, extractor, reference, min_share, (output, debug))
+        for path, name in _with_progress(list(zip(images, names, strict=True)))
+    ]
     report = _report(reference, outcomes, min_share)
     if output is not None:
         from cmpdesign.writers.atomic import write_file
 
         write_file(output / "verify.json", report)
-    if as_json:
-        sys.stdout.write(report)
+    # After the bar: while it stands, it redirects whatever is printed to its own stream.
+    sys.stdout.write(report if as_json else _lines(outcomes))
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
@@ -122,6 +112,18 @@ def _write_pictures(
         pictures = draw_stages(image, reference, verdict.markers)
         for number, (stage, picture) in enumerate(pictures.items(), start=1):
             write_file(debug / f"{name}.{number}-{stage}.png", to_png(picture))
+
+
+def _lines(outcomes: list[Outcome]) -> str:
+    """A line for every image that was read; what could not be read has been reported on stderr."""
+    return "".join(f"{item.name}: {_line(item.verdict)}\n" for item in outcomes if item.verdict is not None)
+
+
+def _line(verdict: Verdict) -> str:
+    repaired = verdict.repaired + verdict.fitted
+    counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
+    head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
+    return f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
 
 
 def _report(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
