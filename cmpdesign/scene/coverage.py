@@ -151,7 +151,9 @@ def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
 def _filtered(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
     """The point spread's weights along the last axis, one result a pixel."""
     windows = np.lib.stride_tricks.sliding_window_view(samples, len(spread.weights), axis=-1)
-    return np.asarray(windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64))
+    return np.asarray(
+        windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64)
+    )
 
 
 def _accumulate(task: Task, top: int, rows: int, degree: int) -> NDArray[np.float64]:

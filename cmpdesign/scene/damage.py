@@ -63,7 +63,9 @@ class Scratch:
         offset = xy_mm - start
         length = offset @ along
         aside = np.abs(offset @ np.array([-along[1], along[0]]))
-        return np.asarray((length >= 0) & (length <= np.linalg.norm(end - start)) & (aside <= 0.5 * self.width_mm))
+        return np.asarray(
+            (length >= 0) & (length <= np.linalg.norm(end - start)) & (aside <= 0.5 * self.width_mm)
+        )
 
 
 @dataclass(frozen=True)

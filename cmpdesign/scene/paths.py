@@ -72,7 +72,9 @@ def _pieces(start: Points, end: Points, image_from_layout: Callable[[Points], Po
         more = np.ceil(pieces[open_sides] * np.sqrt(np.minimum(error / CHORD_PX, 64.0)) * 1.05)
         pieces[open_sides] = more.astype(np.int64)
         if pieces.max(initial=0) > MAX_PIECES:
-            raise SceneError("the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map")
+            raise SceneError(
+                "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
+            )
     return pieces
 
 

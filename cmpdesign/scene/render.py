@@ -54,7 +54,7 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     if min(size) < 1:
         raise SceneError(f"size is {size[0]} x {size[1]}; it must be at least 1 x 1 px")
     view = look(scene, size)
-    gone = _gone(scene)
+    gone = missing_cells(scene)
     planes = _pattern(scene, view, gone, size, engine)
     if scene.damage and (scene.damage.blobs or scene.damage.scratches):
         planes = _with_dirt(planes, scene.damage, scene.blur_px, view, size, engine)
@@ -64,6 +64,11 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
         planes = planes + glare.plane(size)
     image = expose(scene.sensor or Sensor(), planes, _rng(scene, NOISE))
     return Rendered(image, _truth(scene, view, gone, size))
+
+
+def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
+    """The truth of ``render`` without its image."""
+    return _truth(scene, look(scene, size), missing_cells(scene), size)
 
 
 def look(scene: Scene, size: tuple[int, int]) -> View:
@@ -85,13 +90,16 @@ def _rng(scene: Scene, stream: int) -> np.random.Generator:
     return np.random.default_rng([scene.seed, stream])
 
 
-def _gone(scene: Scene) -> NDArray[np.bool_]:
+def missing_cells(scene: Scene) -> NDArray[np.bool_]:
+    """(C,) bool: the cells that fell out of this scene's pattern."""
     if scene.damage is None:
         return np.zeros(len(scene.layout.cell_color), dtype=np.bool_)
     return missing(scene.damage, scene.layout, _rng(scene, MISSING))
 
 
-def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, int], engine: Engine) -> Planes:
+def _pattern(
+    scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, int], engine: Engine
+) -> Planes:
     """Ground over background, inks over ground: (3, H, W), B, G, R, blurred."""
     layout = scene.layout
     drawn = np.flatnonzero((layout.cell_color != BLACK) & ~gone)
@@ -104,7 +112,9 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int,
 
     # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
     black = _bgr(scene.ink(BLACK))
-    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(-1, 3)
+    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
+        -1, 3
+    )
     values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
     values[0, 3] = 1.0
     values[1:, :3] = over_black
