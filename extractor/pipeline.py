@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import find_target, nominal_hues_deg, segment, to_hsv
+from .color import find_target, nominal_hues_deg, segment, to_colors
 from .errors import LayoutError
 from .graph import Graph, connect
 from .image import estimate_noise, prepare
@@ -103,9 +103,9 @@ class Extractor:
             height, width = bgr.shape[0] // scale, bgr.shape[1] // scale
             whole = bgr[: height * scale, : width * scale]
             work = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
-        hsv = to_hsv(work)
-        target = stages.done("target", find_target(hsv))
-        segmentation = stages.done("segment", segment(hsv, target, self._nominal_hues_deg))
+        colors = stages.done("color", to_colors(work))
+        target = stages.done("target", find_target(colors))
+        segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
             return None
         seeds = stages.done("seeds", find_seeds(segmentation))
