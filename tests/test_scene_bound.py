@@ -48,7 +48,7 @@ def test_it_scales_with_noise_blur_and_contrast() -> None:
 def test_a_marker_alone_matches_the_derivative_of_the_image(marker: int, axis: int) -> None:
     """With all other markers known, the information on one is the rendered image's squared derivative.
 
-    Where edges meet, within the blur of a corner, they share their pixels and tell less: a few per cent at this pitch.
+    Where edges meet, within the blur of a corner, they share pixels and tell less: a few per cent here.
     """
     layout = standard_layout(layers=2)
     camera, size, step_px = Camera(pitch_px=160), (700, 600), 0.2

@@ -1,4 +1,4 @@
-"""Coverage is exact: against polygon clipping, against quadrature of the point spread, and twin against twin."""
+"""Coverage is exact: against polygon clipping, against quadrature of the point spread, twin against twin."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def quadrature(points: Points, blur_px: float, size: tuple[int, int]) -> Points:
 
 
 def edge_response(distance: Points, blur_px: float) -> Points:
-    """Integral of ``box_gaussian`` from -inf: what a pixel shows that lies ``distance`` inside a half plane."""
+    """Integral of ``box_gaussian`` from -inf: what a pixel ``distance`` inside a half plane shows."""
 
     def ramp(z: Points) -> Points:
         return z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
@@ -117,7 +117,7 @@ def test_area_and_centroid_are_conserved(engine: Engine, blur_px: float) -> None
     assert image.sum() == pytest.approx(0.5 * (along[0] * across[1] - along[1] * across[0]), rel=1e-5)
     x = (image.sum(axis=0) @ np.arange(64)) / image.sum()
     y = (image.sum(axis=1) @ np.arange(60)) / image.sum()
-    # The unblurred box clips the shape to pixels, whose centroids it forgets: third of a thousandth here.
+    # The bare box forgets where inside a pixel the shape lies; a spline's first moment does not.
     tolerance = 1e-3 if blur_px == 0 else 1e-4
     assert (x, y) == pytest.approx(tuple(points.mean(axis=0)), abs=tolerance)
 

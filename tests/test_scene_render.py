@@ -1,4 +1,4 @@
-"""Scenes: the image agrees with its truth, every part does what it says, and the same scene gives the same bytes."""
+"""Scenes: the image agrees with its truth, every part does what it says, same scene, same bytes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def small(layout: Layout) -> Scene:
 
 
 def edge_on_rows(image: NDArray[np.uint16], at: Points, reach: int) -> Points:
-    """Where a steep edge crosses the rows nearest to the points ``at`` (N, 2) px: x by the row's integrated profile.
+    """Where a steep edge crosses the rows nearest to the points ``at`` (N, 2) px, by integrated profiles.
 
     Blur and pixel boxes leave the integral of an edge's profile as it is, so nothing here knows the renderer.
     """

@@ -124,7 +124,8 @@ class Picture:
             or not self.image.size
         ):
             raise SceneError(
-                f"the background picture is {self.image.dtype} of shape {self.image.shape}; give uint8 BGR of shape (H, W, 3)"
+                f"the background picture is {self.image.dtype} of shape {self.image.shape}; "
+                "give uint8 BGR of shape (H, W, 3)"
             )
 
     def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:

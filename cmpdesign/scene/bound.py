@@ -1,10 +1,15 @@
 """The Cramer-Rao bound of a scene: how precisely its image can tell the markers' positions at all.
 
 An edge of contrast A (norm over the channels), blur s and pixel noise sigma carries the Fisher information
-A^2 / (2 sqrt(pi) s sigma^2) per pixel of its length about its offset along its normal: the integral of the squared
-derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's own box. A gridline is straight
-between its two markers, so a point at the fraction t moves with the weights 1 - t and t. All gridlines together give
-a sparse information matrix; the diagonal blocks of its inverse bound every marker's covariance.
+A^2 / (2 sqrt(pi) s sigma^2) per pixel of its length about its offset along its normal: the integral of the
+squared derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's own box. A
+gridline is straight between its two markers, so a point at the fraction t moves with the weights 1 - t and
+t. All gridlines together give a sparse information matrix; the diagonal blocks of its inverse bound every
+marker's covariance.
+
+Every edge counts as if it were alone. Near a corner six of them share their pixels and tell less, so the
+true bound lies higher, by the more the fewer pixels an edge has: for a deviation, about 17 % at 20 px and
+blur 1.
 """
 
 from __future__ import annotations
@@ -21,7 +26,7 @@ from cmpdesign.scene.render import missing_cells, render_truth
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
 
-# Markers that the image says nothing about would make the matrix singular: a prior of 1000 px decides nothing.
+# A marker that the image says nothing about would make the matrix singular: a prior of 1000 px cures that.
 PRIOR_PER_PX2 = 1e-6
 SOLVED_AT_ONCE = 512
 
@@ -29,8 +34,8 @@ SOLVED_AT_ONCE = 512
 def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
     """The smallest covariance (M, 2, 2) px^2 that an unbiased estimate of the markers can have.
 
-    Uses the scene's inks, light, blur, noise, damage and true positions. Gamma, JPEG, quantisation and the bending of
-    gridlines are left out. NaN for markers that are not visible.
+    Uses the scene's inks, light, blur, noise, missing cells and true positions. Gamma, JPEG, quantisation and
+    the bending of gridlines are left out. NaN for markers that are not visible.
 
     Raises:
         SceneError: the scene has no noise, so nothing bounds it.

@@ -16,10 +16,10 @@ class Camera:
     """A pinhole that looks at the layout's plane.
 
     Attributes:
-        pitch_px: one pitch of the layout at the pattern's middle, in pixels (before the tilt foreshortens it).
+        pitch_px: one pitch of the layout at the pattern's middle, before the tilt foreshortens it.
         rotation_deg: turn of the pattern in the image, counter-clockwise as seen.
         tilt_deg: angle between the optical axis and the pattern's normal, -85 to 85.
-        tilt_axis_deg: direction of the line in the image about which it tilts, counter-clockwise from the right.
+        tilt_axis_deg: direction of the line about which it tilts, counter-clockwise from the right.
         centre_px: where the middle of the pattern's outline lies; None: the image's centre.
         focal_px: focal length and distance in one; small means strong perspective. None: 1.5 times the
             image's longer side.
@@ -85,7 +85,7 @@ def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """Rotation matrix about a unit axis (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))
 
 
 def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,8 +98,9 @@ def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float
     depth = h[2, 0] * x + h[2, 1] * y + h[2, 2]
     if not np.all(depth > 1e-3):
         raise SceneError(
-            "a part of the pattern lies behind the camera; take a smaller tilt_deg, a smaller pitch_px or a larger focal_px"
+            "a part of the pattern lies behind the camera; "
+            "take a smaller tilt_deg, a smaller pitch_px or a larger focal_px"
         )
     u = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
     v = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
-    return np.stack([u, v], axis=-1)
+    return np.asarray(np.stack([u, v], axis=-1), dtype=np.float64)

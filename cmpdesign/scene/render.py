@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cmpdesign.layout import BLACK
 from cmpdesign.scene.camera import homography, is_mirrored, pitch_mm, project
 from cmpdesign.scene.coverage import Engine, coverage
-from cmpdesign.scene.damage import Damage, bled, missing
+from cmpdesign.scene.damage import Blob, Damage, Scratch, bled, missing
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import gain
 from cmpdesign.scene.optics import point_spread
@@ -147,7 +147,7 @@ def _with_dirt(
     planes: Planes, damage: Damage, blur_px: float, view: View, size: tuple[int, int], engine: Engine
 ) -> Planes:
     """Blobs and scratches over the pattern; where they overlap, they mix."""
-    spots = [*damage.blobs, *damage.scratches]
+    spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
     outlines: list[Segments] = [
         segments(spot.polygon()[None], view.image_from_layout, view.curved) for spot in spots
     ]
@@ -181,7 +181,7 @@ def _truth(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, i
 
 
 def _cell_samples(scene: Scene) -> Points:
-    """(C, samples, 2) mm: points spread over every cell, halfway from its centre to corners and sides, and the centre."""
+    """(C, samples, 2) mm: every cell's centre, and points towards its corners and sides."""
     corners = scene.layout.marker_xy_mm[scene.layout.cell_corners]
     centre = corners.mean(axis=1, keepdims=True)
     rim = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
@@ -193,7 +193,8 @@ def _covered(scene: Scene, view: View, xy_mm: Points) -> NDArray[np.bool_]:
     covered = np.zeros(xy_mm.shape[:2], dtype=np.bool_)
     if scene.damage is None:
         return covered
-    for spot in (*scene.damage.blobs, *scene.damage.scratches):
+    spots: list[Blob | Scratch] = [*scene.damage.blobs, *scene.damage.scratches]
+    for spot in spots:
         covered |= spot.covers(xy_mm)
     if scene.damage.glare:
         xy_px = view.image_from_layout(xy_mm.reshape(-1, 2)).reshape(xy_mm.shape)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from cmpdesign.scene.errors import SceneError
 
-
 Depth = TypeVar("Depth", np.uint8, np.uint16)
 
 
