@@ -58,7 +58,9 @@ def _chroma(hsv):  # type: ignore[no-untyped-def]
     flat = hsv.reshape(-1)
     out = np.empty(height * width, np.uint8)
     for i in range(height * width):
-        out[i] = (np.int32(flat[3 * i + 1]) * np.int32(flat[3 * i + 2]) * np.int32(257) + np.int32(32768)) >> 16
+        out[i] = (
+            np.int32(flat[3 * i + 1]) * np.int32(flat[3 * i + 2]) * np.int32(257) + np.int32(32768)
+        ) >> 16
     return out.reshape(height, width)
 
 
@@ -87,7 +89,9 @@ def _tile_levels(hsv, chroma, ink_of_hue, tile, step):  # type: ignore[no-untype
                     ink = ink_of_hue[hsv[y, x, 0]]
                     strongest[ink] = max(strongest[ink], chroma[y, x])
             for ink in range(3):
-                level[ink, y // tile, column] = max(level[ink, y // tile, column], np.float32(strongest[ink + 1]))
+                level[ink, y // tile, column] = max(
+                    level[ink, y // tile, column], np.float32(strongest[ink + 1])
+                )
     return level
 
 

@@ -37,7 +37,7 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     """
     base = _base(image)
     scale = _scale(base)
-    canvas = _enlarged(base, scale, 0.55)
+    canvas = _enlarged(base, scale, 0.7)
     points = _at(markers.xy_px, scale)
     _draw_edges(canvas, reference, points)
     _draw_reference(canvas, reference, points)
@@ -78,14 +78,14 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
 
 def _base(image: NDArray[Any]) -> Picture:
     bgr = prepare(image)
-    if bgr is None:
-        gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
-        bgr = cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[assignment]
-    return bgr
+    if bgr is not None:
+        return bgr
+    gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
+    return cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[return-value]
 
 
 def _scale(base: Picture) -> int:
-    return max(1, round(SHORT_SIDE_PX / min(base.shape[:2])))
+    return max(1, round(SHORT_SIDE_PX / int(min(base.shape[:2]))))
 
 
 def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
@@ -105,12 +105,18 @@ def _at(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
     return (xy_px + 0.5) * scale - 0.5
 
 
-def _dot(canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1) -> None:
+def _dot(
+    canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1
+) -> None:
     one = 1 << SHIFT
-    cv2.circle(canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT)
+    cv2.circle(
+        canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT
+    )
 
 
-def _lines(canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1) -> None:
+def _lines(
+    canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1
+) -> None:
     """Closed polygons or open two-point lines: (N, K, 2)."""
     fixed = np.round(lines * (1 << SHIFT)).astype(np.int32)
     cv2.polylines(canvas, list(fixed), lines.shape[1] > 2, color, thickness, cv2.LINE_AA, SHIFT)
@@ -125,7 +131,8 @@ def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.fl
     corners = points[reference.cell_corners[reference.reference_cell]]
     if np.isfinite(corners).all():
         _lines(canvas, corners[None], WHITE_BGR, 2)
-        _dot(canvas, *points[reference.reference_marker], 9.0, WHITE_BGR, 2)
+        x, y = points[reference.reference_marker]
+        _dot(canvas, x, y, 9.0, WHITE_BGR, 2)
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
@@ -182,7 +189,7 @@ def _draw_regions(base: Picture, scale: int, regions: Any) -> Picture:
 
 def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
     """Pixels of the picture for one pixel of the scale at which regions were grown."""
-    return scale * round(base.shape[1] / work.shape[1])
+    return float(scale * round(base.shape[1] / work.shape[1]))
 
 
 def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
@@ -208,7 +215,9 @@ def _draw_spiral(base: Picture, scale: int, reference: Reference, xy_px: NDArray
     canvas = _enlarged(base, scale, 0.4)
     points = _at(xy_px, scale)
     found = np.flatnonzero(np.isfinite(points[:, 0]))
-    shades = cv2.applyColorMap(np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO)
+    shades = cv2.applyColorMap(
+        np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO
+    )
     for start, end, shade in zip(found[:-1], found[1:], shades[:, 0], strict=False):
         if end == start + 1:
             _lines(canvas, points[[start, end]][None], tuple(int(c) for c in shade), 2)  # type: ignore[arg-type]

@@ -48,7 +48,9 @@ def _candidates(corner_px, ink):  # type: ignore[no-untyped-def]
         for k in range(3):
             a, b = corner_px[i, (k + 1) % 3], corner_px[i, (k + 2) % 3]
             p = corner_px[i, k]
-            reach[3 * i + k] = MERGE_SHARE * min(np.hypot(a[0] - p[0], a[1] - p[1]), np.hypot(b[0] - p[0], b[1] - p[1]))
+            reach[3 * i + k] = MERGE_SHARE * min(
+                np.hypot(a[0] - p[0], a[1] - p[1]), np.hypot(b[0] - p[0], b[1] - p[1])
+            )
     # a grid of buckets as wide as the longest reach: candidates stand in the 3 x 3 buckets around
     width = max(reach.max(), 1e-9)
     low_x, low_y = flat[:, 0].min(), flat[:, 1].min()

@@ -24,13 +24,21 @@ def prepare(image: NDArray[Any]) -> NDArray[np.uint8] | None:
         ImageError: not an array, a float or signed type, another shape, or a side below 16 px.
     """
     if not isinstance(image, np.ndarray):
-        raise ImageError(f"image is {type(image).__name__}; give a numpy array (H, W, 3) of uint8 in BGR order")
+        raise ImageError(
+            f"image is {type(image).__name__}; give a numpy array (H, W, 3) of uint8 in BGR order"
+        )
     if image.dtype not in (np.uint8, np.uint16):
-        raise ImageError(f"image has dtype {image.dtype}; give uint8 or uint16 (scale float images to 0..255 first)")
+        raise ImageError(
+            f"image has dtype {image.dtype}; give uint8 or uint16 (scale float images to 0..255 first)"
+        )
     if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
-        raise ImageError(f"image has shape {image.shape}; give (H, W, 3) BGR, (H, W, 4) BGRA or (H, W) grayscale")
+        raise ImageError(
+            f"image has shape {image.shape}; give (H, W, 3) BGR, (H, W, 4) BGRA or (H, W) grayscale"
+        )
     if min(image.shape[:2]) < MIN_SIDE_PX:
-        raise ImageError(f"image is {image.shape[1]} x {image.shape[0]} px; give at least {MIN_SIDE_PX} px a side")
+        raise ImageError(
+            f"image is {image.shape[1]} x {image.shape[0]} px; give at least {MIN_SIDE_PX} px a side"
+        )
     if image.ndim == 2 or image.shape[2] == 1:
         return None
     color = image[:, :, :3]

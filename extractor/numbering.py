@@ -93,8 +93,12 @@ def _gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ign
             y = (corner_px[ta, ka, 1] + corner_px[tb, kb, 1]) / 6 + (pa[1] + pb[1]) / 3
             radius = 0.2 * np.hypot(pa[0] - x, pa[1] - y)
             inside = sample_patch(flat, height, width, x, y, radius, beyond)
-            inside &= sample_patch(flat, height, width, corner_px[ta, :, 0].mean(), corner_px[ta, :, 1].mean(), radius, one)
-            inside &= sample_patch(flat, height, width, corner_px[tb, :, 0].mean(), corner_px[tb, :, 1].mean(), radius, other)
+            inside &= sample_patch(
+                flat, height, width, corner_px[ta, :, 0].mean(), corner_px[ta, :, 1].mean(), radius, one
+            )
+            inside &= sample_patch(
+                flat, height, width, corner_px[tb, :, 0].mean(), corner_px[tb, :, 1].mean(), radius, other
+            )
             if inside:
                 ratio[n, ink] = 2.0 * beyond.sum() / max(one.sum() + other.sum(), 1.0)
                 center[n, ink, 0] = x
@@ -243,5 +247,7 @@ def number(
         return None
     if tie:
         nothing = np.full_like(best[1].marker_of_corner, -1)
-        return Numbering(nothing, np.full_like(best[1].cell_of_triangle, -1), best[1].white_px, best[1].conflicts, True)
+        return Numbering(
+            nothing, np.full_like(best[1].cell_of_triangle, -1), best[1].white_px, best[1].conflicts, True
+        )
     return best[1]

@@ -57,7 +57,9 @@ class Extractor:
 
     def __init__(self, layout: Reference) -> None:
         if layout.cell_corners.shape[1] != 3:
-            raise LayoutError(f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read")
+            raise LayoutError(
+                f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
+            )
         self.layout = layout
         self._lattice = lattice_of(layout)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))

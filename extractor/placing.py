@@ -37,7 +37,9 @@ def place(triangles: Triangles, numbering: Numbering, count: int) -> Places:
     around = (0.5 * (sides + np.roll(sides, 1, axis=1))).reshape(-1)
     members = np.bincount(ids, minlength=count)
     with np.errstate(invalid="ignore"):
-        xy = np.stack([np.bincount(ids, weights=flat[:, a], minlength=count) / members for a in (0, 1)], axis=1)
+        xy = np.stack(
+            [np.bincount(ids, weights=flat[:, a], minlength=count) / members for a in (0, 1)], axis=1
+        )
         edge = np.bincount(ids, weights=around, minlength=count) / members
     apart = np.linalg.norm(flat - xy[ids], axis=1) > MAX_SPREAD * edge[ids]
     xy[ids[apart]] = np.nan

@@ -24,7 +24,7 @@ MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
 LEVEL_REACH = 0.15  # of the cell's height, how far around its middle the ink is averaged
 MAX_STEPS = 60  # of the conjugate gradient
-ROUNDS = (4, 12)  # stations along an edge at most, in each round
+ROUNDS = (4, 24)  # stations along an edge at most, in each round
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 
@@ -109,8 +109,8 @@ def _edge_blurs(image, xy, cells, levels, every):  # type: ignore[no-untyped-def
             continue
         i, k = e // 3, e % 3
         a, b, c = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]], xy[cells[i, (k + 2) % 3]]
-        u0, u1, u2, zero, contrast = levels[e]
-        length, nx, ny, depth = _outward(a, b, c)
+        u0, u1, u2, zero = levels[e, :4]
+        _, nx, ny, depth = _outward(a, b, c)
         reach = MAX_REACH * depth
         step = reach / 8
         total = 0.0
@@ -156,7 +156,9 @@ def _measure(image, xy, cells, levels, sigma, noise, most):  # type: ignore[no-u
             kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
             step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
             norm += kernel[m + samples] ** 2
-        information = contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
+        information = (
+            contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
+        )
         for j in range(stations):
             t = start + (end - start) * (j + 0.5) / stations
             x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])

@@ -132,7 +132,7 @@ def _seeds(runs, root):  # type: ignore[no-untyped-def]
     for i in range(runs.shape[0]):
         d = number[root[i]]
         cx = sums[d, 0] / area[d]
-        x = min(max(int(round(cx)), runs[i, 1]), runs[i, 2])
+        x = min(max(round(cx), runs[i, 1]), runs[i, 2])
         distance = (x - cx) ** 2 + (runs[i, 0] - sums[d, 1] / area[d]) ** 2
         if distance < best[d]:
             best[d] = distance
@@ -223,5 +223,7 @@ def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
     ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
     """
     limit_px = segmentation.label.size // 6
-    owner, moments = _grow(segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD)
+    owner, moments = _grow(
+        segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
+    )
     return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)
