@@ -10,9 +10,9 @@ from cmpdesign.design import load_design
 from cmpdesign.patterns import patterns
 from cmpdesign.report import report
 from cmpdesign.templates import templates
-from cmpdesign.writers.preview import draw_preview
+from cmpdesign.writers.preview import MARGIN_PX, TITLE_PX, draw_preview
 
-WIDTH_PX = 560
+WIDTH_PX = 520
 PATTERN_LAYERS = 4  # few enough that ids can be read
 HEAD = """# Gallery
 
@@ -71,7 +71,8 @@ def _template(name: str) -> str:
 
 
 def _preview(name: str, overrides: dict[str, str]) -> bytes:
-    picture = draw_preview(build_layout(load_design(name, overrides)))
+    # The title's facts stand in the text; what is cut off is the title.
+    picture = draw_preview(build_layout(load_design(name, overrides)))[MARGIN_PX + TITLE_PX - 35 :]
     height = round(picture.shape[0] * WIDTH_PX / picture.shape[1])
     small = cv2.resize(picture, (WIDTH_PX, height), interpolation=cv2.INTER_AREA)
     stepped = np.where(small > 245, small, small // 4 * 4 + 2).astype(np.uint8)
