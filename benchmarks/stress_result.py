@@ -1,0 +1,108 @@
+"""Reading one case: its image, the extraction, its time beside the plain frame's, its score."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.stress_frames import Shot, layout_of, plain
+from benchmarks.stress_kinds import Case, Kind, frame_of
+from benchmarks.stress_score import NOTHING, Score, score
+from cmpdesign.scene import STANDARD_SIZE
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, Markers, parse_layout
+
+LARGE_PX = 3_000_000  # read once only, and left out of a quick run
+Image = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One image read.
+
+    Attributes:
+        ms: processor time of the best run. ratio: to the plain frame's; NaN for other sizes of image.
+        reason: the extractor's; an exception's text where it raised one.
+    """
+
+    case: Case
+    score: Score
+    ms: float
+    ratio: float
+    reason: str
+    raised: bool
+
+
+@cache
+def extractor_of(pattern: str, layers: int) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(layout_of(pattern, layers))))
+
+
+@cache
+def plain_image(pattern: str) -> Image:
+    return plain(pattern, 0).shoot().image
+
+
+def timed(extractor: Extractor, image: Image, runs: int) -> tuple[Markers, float]:
+    """The markers, and the best run's ms of processor time."""
+    best = math.inf
+    for _ in range(runs):
+        started = time.process_time()
+        markers = extractor.extract(image)
+        best = min(best, 1e3 * (time.process_time() - started))
+    return markers, best
+
+
+def layers_of(shot: Shot) -> int:
+    """Of the layout to look for: the scene's; the standard one's in images without a pattern."""
+    return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
+
+
+def read(case: Case, kind: Kind, runs: int) -> tuple[Result, Shot, Markers | None]:
+    """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on."""
+    shot = frame_of(case, kind).shoot()
+    pixels = shot.image.shape[0] * shot.image.shape[1]
+    try:
+        extractor = extractor_of(case.pattern, layers_of(shot))
+        standard, plain_ms = shot.image.shape[:2] == STANDARD_SIZE[::-1], math.nan
+        if standard:
+            plain_ms = timed(extractor_of(case.pattern, 11), plain_image(case.pattern), runs)[1]
+        markers, ms = timed(extractor, shot.image, 1 if pixels > LARGE_PX else runs)
+    except Exception as error:
+        return Result(case, NOTHING, math.nan, math.nan, repr(error), True), shot, None
+    figures = score(markers, shot, promised=kind.promised)
+    reason = str(markers.reason) if markers.reason else ""
+    return Result(case, figures, ms, ms / plain_ms, reason, False), shot, markers
+
+
+def warm_up() -> None:
+    """Compile, so that no time of it is counted."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    extractor_of("honeycomb", 11).extract(plain_image("honeycomb"))
+
+
+def overlay(shot: Shot, case: Case, markers: Markers) -> NDArray[np.uint8]:
+    """The extractor's own overlay, with a red line from every wrong marker to its true place."""
+    import cv2
+
+    from benchmarks.stress_score import wrong_markers
+    from extractor.draw import draw_markers
+
+    extractor = extractor_of(case.pattern, layers_of(shot))
+    canvas = draw_markers(shot.image, extractor.layout, markers)
+    if shot.scene is not None:
+        scale = canvas.shape[0] / shot.image.shape[0]
+        truth = min(shot.truths, key=lambda t: wrong_markers(markers, shot.scene.layout, t).sum())  # type: ignore[union-attr]
+        for marker in np.flatnonzero(wrong_markers(markers, shot.scene.layout, truth)):
+            ends = ((np.stack([markers.xy_px[marker], truth.marker_xy_px[marker]]) + 0.5) * scale).astype(int)
+            cv2.line(canvas, tuple(ends[0].tolist()), tuple(ends[1].tolist()), (0, 0, 255), 2, cv2.LINE_AA)
+            cv2.circle(canvas, tuple(ends[0].tolist()), 7, (0, 0, 255), 2, cv2.LINE_AA)
+    return canvas
