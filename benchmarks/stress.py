@@ -1,4 +1,4 @@
-"""The stress suite: how much is read, and how much of it wrong, in every condition of ``stress_conditions``.
+"""The stress suite: how much is read, and how much of it wrong, in every condition of ``stress_suite``.
 
     python -m benchmarks.stress [--quick] [--table] [--json FILE] [--plot FILE]
     python -m benchmarks.stress --only "blur=3/round" --save DIR     some cases: their images and overlays
@@ -16,52 +16,14 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(_threads, "1")  # before numpy and numba: times are of one core
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
-
-from benchmarks.stress_conditions import KINDS, PATTERNS
-from benchmarks.stress_kinds import Case, frame_of
-from benchmarks.stress_report import failures, plot, rows_of, summary, table, write_json
-from benchmarks.stress_result import LARGE_PX, Result, overlay, read, warm_up
-
-BY_NAME = {kind.name: kind for kind in KINDS}
-
-
-def cases(*, quick: bool) -> list[Case]:
-    """All patterns and seeds; in a quick run the patterns take turns, and large images are left out."""
-    chosen, turn = [], 0
-    for kind in KINDS:
-        for step in kind.steps:
-            turn += 1
-            for number, pattern in enumerate(PATTERNS):
-                if quick and number != turn % len(PATTERNS):
-                    continue
-                for repeat in range(1 if quick else kind.repeats):
-                    case = Case(kind.name, step, pattern, 100 * number + repeat)
-                    if not (quick and kind.group == "view" and is_large(case)):
-                        chosen.append(case)
-    return chosen
-
-
-def is_large(case: Case) -> bool:
-    size = frame_of(case, BY_NAME[case.kind]).size
-    return size[0] * size[1] > LARGE_PX
-
-
-def matching(text: str) -> list[Case]:
-    """The full run's cases of a kind (``blur``), a condition (``blur=3``), a case (``blur=3/round/100``)."""
-    every = cases(quick=False)
-    return [
-        case
-        for case in every
-        if text in (case.kind, case.condition) or (case.name + "/").startswith(text.rstrip("/") + "/")
-    ]
+from benchmarks.stress_suite.conditions import BY_NAME, KINDS, cases, matching
+from benchmarks.stress_suite.kinds import Case
+from benchmarks.stress_suite.reading import Result, overlay, read, warm_up, wrong_lines
+from benchmarks.stress_suite.report import failures, one_line, plot, rows_of, summary, table, write_json
 
 
 def _job(job: tuple[Case, int]) -> Result:
-    case, runs = job
-    return read(case, BY_NAME[case.kind], runs)[0]
+    return read(*job)[0]
 
 
 def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
@@ -78,11 +40,8 @@ def with_progress(chosen: list[Case], processes: int, runs: int) -> list[Result]
     for result in run(chosen, processes, runs):
         results.append(result)
         if sys.stderr.isatty() or len(results) % 200 == 0:
-            seconds = time.perf_counter() - started
-            end = "\r" if sys.stderr.isatty() else "\n"
-            print(
-                f"{len(results)}/{len(chosen)} images, {seconds:.0f} s", end=end, file=sys.stderr, flush=True
-            )
+            text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
+            print(text, end="\r" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
     return results
 
 
@@ -93,14 +52,11 @@ def one_by_one(chosen: list[Case], save: Path | None) -> list[Result]:
     warm_up()
     results = []
     for case in chosen:
-        result, shot, markers = read(case, BY_NAME[case.kind], 1)
+        result, shot, markers = read(case, 1)
         results.append(result)
-        figures = result.score
-        print(
-            f"{case.name:<44} visible {figures.visible:>5} measured {figures.measured:>5} repaired "
-            f"{figures.repaired:>4} fitted {figures.fitted:>4} lost {figures.lost:>5} WRONG {figures.wrong:>4}  "
-            f"{'promised' if figures.promised else 'not promised'}  {result.ms:.0f} ms  {result.reason}"
-        )
+        print(one_line(result))
+        for line in wrong_lines(shot, markers):
+            print(f"    {line}")
         if save is not None:
             save.mkdir(parents=True, exist_ok=True)
             stem = case.name.replace("/", "-").replace(" ", "_")

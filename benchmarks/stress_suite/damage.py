@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_frames import Frame
-from benchmarks.stress_kinds import Kind
+from benchmarks.stress_suite.frames import RGB, Frame
+from benchmarks.stress_suite.kinds import Kind, grouped
 from cmpdesign.layout import BLACK, RED, Layout
-from cmpdesign.scene import Blob, Damage, Glare, Press, Scratch, composed
+from cmpdesign.scene import Blob, Glare, Press, Scratch
 from cmpdesign.scene.standard import INKS
 
 Cells = NDArray[np.intp]
@@ -17,7 +17,7 @@ DIRT = (90.0, 80.0, 70.0)
 
 
 def without(frame: Frame, cells: Cells) -> Frame:
-    return frame.having(damage=Damage(missing_cells=tuple(int(cell) for cell in cells)))
+    return frame.damaged(missing_cells=tuple(int(cell) for cell in cells))
 
 
 def droppable(layout: Layout) -> Cells:
@@ -28,7 +28,7 @@ def droppable(layout: Layout) -> Cells:
 
 
 def centres(layout: Layout) -> NDArray[np.float64]:
-    return layout.marker_xy_mm[layout.cell_corners].mean(axis=1)
+    return np.asarray(layout.marker_xy_mm[layout.cell_corners].mean(axis=1))
 
 
 def rings(layout: Layout) -> NDArray[np.int32]:
@@ -96,14 +96,14 @@ def places(frame: Frame, count: int, least_mm: float = 2.0) -> NDArray[np.float6
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def blobs(frame: Frame, count: int, radius_mm: float, rgb: tuple[float, float, float] = DIRT) -> Frame:
+def blobs(frame: Frame, count: int, radius_mm: float, rgb: RGB = DIRT) -> Frame:
     spots = tuple(Blob((x, y), radius_mm, rgb) for x, y in places(frame, count, 1.5 + radius_mm))
-    return frame.having(damage=Damage(blobs=spots))
+    return frame.damaged(blobs=spots)
 
 
 def scratches(
-    frame: Frame, count: int, width_mm: float, rgb: tuple[float, float, float] = (150.0, 150.0, 150.0), aside: float = 2.5
-) -> Frame:  # fmt: skip
+    frame: Frame, count: int, width_mm: float, rgb: RGB = (150.0, 150.0, 150.0), aside: float = 2.5
+) -> Frame:
     """Bands across the whole pattern, ``aside`` mm or more from the centre."""
     reach, rng = max(frame.layout.size_mm), frame.rng
     bands = []
@@ -112,7 +112,7 @@ def scratches(
         middle = normal * (aside + 0.5 * width_mm + rng.uniform(0, 4) * (aside > 0))
         start, end = middle - reach * along, middle + reach * along
         bands.append(Scratch((start[0], start[1]), (end[0], end[1]), width_mm, rgb))
-    return frame.having(damage=Damage(scratches=tuple(bands)))
+    return frame.damaged(scratches=tuple(bands))
 
 
 def glare(frame: Frame, count: int, sigma_px: float, least_px: float) -> Frame:
@@ -120,14 +120,13 @@ def glare(frame: Frame, count: int, sigma_px: float, least_px: float) -> Frame:
     rng = frame.rng
     angle, radius = rng.uniform(0, 2 * np.pi, count), rng.uniform(least_px, least_px + 80, count)
     x, y = 319.5 + radius * np.cos(angle), 239.5 + radius * np.sin(angle)
-    return frame.having(
-        damage=Damage(glare=tuple(Glare((px, py), sigma_px) for px, py in zip(x, y, strict=True)))
-    )
+    spots = tuple(Glare((px, py), sigma_px) for px, py in zip(x, y, strict=True))
+    return frame.damaged(glare=spots)
 
 
-def white_covered(frame: Frame, rgb: tuple[float, float, float], radius_mm: float) -> Frame:
+def white_covered(frame: Frame, rgb: RGB, radius_mm: float) -> Frame:
     x, y = centres(frame.layout)[frame.layout.reference_cell]
-    return frame.having(damage=Damage(blobs=(Blob((x, y), radius_mm, rgb),)))
+    return frame.damaged(blobs=(Blob((x, y), radius_mm, rgb),))
 
 
 def white_as(frame: Frame, ink: str) -> Frame:
@@ -144,42 +143,60 @@ def white_elsewhere(frame: Frame, radius_mm: float) -> Frame:
     black = np.flatnonzero((frame.layout.cell_color == BLACK) & (rings(frame.layout) <= 4))
     x, y = centres(frame.layout)[frame.rng.choice(black)]
     drop = Blob((x, y), radius_mm, INKS["white"])
-    return frame.having(damage=Damage(missing_cells=(frame.layout.reference_cell,), blobs=(drop,)))
+    return frame.damaged(missing_cells=(frame.layout.reference_cell,), blobs=(drop,))
 
 
 def bulged(frame: Frame) -> Frame:
-    return frame.having(surface=composed(Press(4, 1.2)))
+    return frame.formed(Press(4, 1.2))
 
 
-INK_OF = {0: "red", 1: "green", 2: "blue"}
+def white_glared(frame: Frame, sigma_px: float) -> Frame:
+    """A reflection on the white cell, which lies near the image's centre."""
+    return frame.damaged(glare=(Glare((319.5, 239.5), sigma_px),))
 
-DAMAGE = (
-    Kind("cells missing", "damage", "1", (0.01, 0.02, 0.05, 0.1, 0.2), lambda f, s: f.having(damage=Damage(missing_share=s))),
-    Kind("clusters missing", "damage", "1", (0.01, 0.02, 0.05, 0.1, 0.2), clusters),
-    Kind("one hole", "damage", "1", (0.05, 0.1, 0.2, 0.3), one_hole),
-    Kind("a layer missing", "damage", "layer", (2, 3, 5, 8, 11), layer_missing),
-    Kind("outer layers missing", "damage", "layers", (1, 2, 4), outer_missing),
-    Kind("a sector missing", "damage", "deg", (20, 45, 90, 180), sector_missing),
-    Kind("cells around the white one missing", "damage", "cells", (1, 2, 3, 6), around_white),
-    Kind("one ink missing", "damage", "1", (0.1, 0.25, 0.5), one_ink_missing),
-    Kind("missing, bulged", "damage", "1", (0.02, 0.05, 0.1), lambda f, s: bulged(f.having(damage=Damage(missing_share=s)))),
-    Kind("missing, tilted", "damage", "1", (0.02, 0.05, 0.1), lambda f, s: f.having(damage=Damage(missing_share=s)).seen(tilt_deg=40)),
-    Kind("one blob", "damage", "pitch", (0.5, 1, 2, 3), lambda f, s: blobs(f, 1, s)),
-    Kind("many blobs", "damage", "", (4, 8, 16), lambda f, s: blobs(f, int(s), 0.6)),
-    Kind("red blobs", "damage", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.7, INKS["red"])),
-    Kind("white blobs", "damage", "", (1, 3, 8), lambda f, s: blobs(f, int(s), 0.45, INKS["white"])),
-    Kind("black blobs", "damage", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.8, INKS["black"])),
-    Kind("a scratch", "damage", "pitch", (0.1, 0.3, 0.6, 1, 1.5), lambda f, s: scratches(f, 1, s)),
-    Kind("a black scratch", "damage", "pitch", (0.3, 0.6, 1), lambda f, s: scratches(f, 1, s, INKS["black"])),
-    Kind("a white scratch", "damage", "pitch", (0.1, 0.3, 0.6), lambda f, s: scratches(f, 1, s, INKS["white"])),
-    Kind("scratches", "damage", "", (2, 3, 5), lambda f, s: scratches(f, int(s), 0.3)),
-    Kind("a scratch beside the white cell", "damage", "pitch", (0.2, 0.5, 1), lambda f, s: scratches(f, 1, s, aside=0.9)),
-    Kind("glare", "damage", "px", (10, 20, 40, 60), lambda f, s: glare(f, 1, s, 1.6 * s + 30)),
-    Kind("many glares", "damage", "", (2, 4, 8), lambda f, s: glare(f, int(s), 12, 60)),
-    Kind("bleeding inks", "damage", "pitch", (0.02, 0.05, 0.1), lambda f, s: f.having(damage=Damage(bleed_mm=s))),
-    Kind("white cell missing", "damage", "", (0,), lambda f, s: white_missing(f), promised=False, repeats=3),
-    Kind("white cell in another ink", "damage", "", (0, 1, 2), lambda f, s: white_as(f, INK_OF[int(s)]), promised=False),
-    Kind("white cell under dirt", "damage", "pitch", (0.3, 0.6, 1.2), lambda f, s: white_covered(f, DIRT, s), promised=False),
-    Kind("white cell in glare", "damage", "px", (8, 16, 32), lambda f, s: f.having(damage=Damage(glare=(Glare((319.5, 232.0), s),))), promised=False),
-    Kind("white cell missing, white blob", "damage", "pitch", (0.3, 0.45, 0.6), lambda f, s: white_elsewhere(f, s), promised=False, repeats=2),
-)  # fmt: skip
+
+PRINTED = ("red", "green", "blue")
+
+MISSING = grouped(
+    "missing",
+    Kind("cells missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), lambda f, s: f.damaged(missing_share=s)),
+    Kind("clusters missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), clusters),
+    Kind("one hole", "1", (0.05, 0.1, 0.2, 0.3), one_hole),
+    Kind("a layer missing", "layer", (2, 3, 5, 8, 11), layer_missing),
+    Kind("outer layers missing", "layers", (1, 2, 4), outer_missing),
+    Kind("a sector missing", "deg", (20, 45, 90, 180), sector_missing),
+    Kind("cells around the white one missing", "cells", (1, 2, 3, 6), around_white),
+    Kind("one ink missing", "1", (0.1, 0.25, 0.5), one_ink_missing),
+    Kind("missing, bulged", "1", (0.02, 0.05, 0.1), lambda f, s: bulged(f.damaged(missing_share=s))),
+    Kind(
+        "missing, tilted", "1", (0.02, 0.05, 0.1), lambda f, s: f.damaged(missing_share=s).seen(tilt_deg=40)
+    ),
+)
+
+DIRTY = grouped(
+    "dirt",
+    Kind("one blob", "pitch", (0.5, 1, 2, 3), lambda f, s: blobs(f, 1, s)),
+    Kind("many blobs", "", (4, 8, 16), lambda f, s: blobs(f, int(s), 0.6)),
+    Kind("red blobs", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.7, INKS["red"])),
+    Kind("white blobs", "", (1, 3, 8), lambda f, s: blobs(f, int(s), 0.45, INKS["white"])),
+    Kind("black blobs", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.8, INKS["black"])),
+    Kind("a scratch", "pitch", (0.1, 0.3, 0.6, 1, 1.5), lambda f, s: scratches(f, 1, s)),
+    Kind("a black scratch", "pitch", (0.3, 0.6, 1), lambda f, s: scratches(f, 1, s, INKS["black"])),
+    Kind("a white scratch", "pitch", (0.1, 0.3, 0.6), lambda f, s: scratches(f, 1, s, INKS["white"])),
+    Kind("scratches", "", (2, 3, 5), lambda f, s: scratches(f, int(s), 0.3)),
+    Kind(
+        "a scratch beside the white cell", "pitch", (0.2, 0.5, 1), lambda f, s: scratches(f, 1, s, aside=0.9)
+    ),
+    Kind("glare", "px", (10, 20, 40, 60), lambda f, s: glare(f, 1, s, 1.6 * s + 30)),
+    Kind("many glares", "", (2, 4, 8), lambda f, s: glare(f, int(s), 12, 60)),
+    Kind("bleeding inks", "pitch", (0.02, 0.05, 0.1), lambda f, s: f.damaged(bleed_mm=s)),
+)
+
+NO_WHITE = grouped(
+    "no white",
+    Kind("white cell missing", "", (0,), lambda f, s: white_missing(f), False, 3),
+    Kind("white cell in another ink", "", (0, 1, 2), lambda f, s: white_as(f, PRINTED[int(s)]), False),
+    Kind("white cell under dirt", "pitch", (0.3, 0.6, 1.2), lambda f, s: white_covered(f, DIRT, s), False),
+    Kind("white cell in glare", "px", (8, 16, 32), white_glared, False),
+    Kind("white cell missing, white blob", "pitch", (0.3, 0.45, 0.6), white_elsewhere, False, 3),
+)

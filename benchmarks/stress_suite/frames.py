@@ -11,10 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import Layout
-from cmpdesign.scene import STANDARD_SIZE, Scene, Truth, render, standard_layout, standard_scene
+from cmpdesign.scene import (
+    STANDARD_SIZE,
+    Damage,
+    Light,
+    Optics,
+    Scene,
+    Sensor,
+    Truth,
+    composed,
+    render,
+    standard_layout,
+    standard_scene,
+)
+from cmpdesign.scene.surface import Deformation
 
 Image = NDArray[Any]
 Size = tuple[int, int]
+RGB = tuple[float, float, float]
+PATTERNS = ("honeycomb", "round", "elliptical")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +73,28 @@ class Frame:
     def seen(self, **changes: Any) -> Frame:
         """With other settings of the camera."""
         return self.having(camera=replace(self.scene.camera, **changes))
+
+    def lit(self, **light: Any) -> Frame:
+        """Under another light."""
+        return self.having(light=Light(**light))
+
+    def taken(self, **sensor: Any) -> Frame:
+        """By another sensor; noise 2 unless told."""
+        return self.having(sensor=Sensor(**{"noise": 2.0, **sensor}))
+
+    def blurred(self, blur_px: float) -> Frame:
+        return self.having(optics=Optics(blur_px))
+
+    def inked(self, **inks: RGB) -> Frame:
+        """With some inks of another color."""
+        return self.having(inks={**self.scene.inks, **inks})
+
+    def formed(self, *deformations: Deformation) -> Frame:
+        """On a deformed surface."""
+        return self.having(surface=composed(*deformations))
+
+    def damaged(self, **damage: Any) -> Frame:
+        return self.having(damage=Damage(**damage))
 
     def scaled(self, pitch_px: float) -> Frame:
         """Another pitch, in an image that grows with it."""

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_frames import Empty, Frame, Size, layout_of
-from benchmarks.stress_kinds import Kind
+from benchmarks.stress_suite.frames import Empty, Frame, Size, layout_of
+from benchmarks.stress_suite.kinds import Kind, grouped
 from cmpdesign.layout import BLACK, WHITE, Layout
 from cmpdesign.scene import Busy, Plain, Sensor, render, standard_scene
 
@@ -51,7 +51,7 @@ def checkerboard(rng: np.random.Generator, size: Size, pitch_px: float) -> Pixel
     u = np.floor((np.cos(turn) * x - np.sin(turn) * y) / pitch_px).astype(int)
     v = np.floor((np.sin(turn) * x + np.cos(turn) * y) / pitch_px).astype(int)
     color = rng.integers(0, 4, (512, 512))[u % 512, v % 512] + 1
-    palette = np.array([INK for INK in _inks()], dtype=np.float32)
+    palette = np.array(_inks(), dtype=np.float32)
     image = palette[np.where((u + v) % 2 == 0, color, 0)]
     return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8), dtype=np.float32)
 
@@ -112,14 +112,17 @@ def _drawn(
 
 REPEATS = 11  # for each of the three patterns; 31 steps: more than 1,000 images
 
-EMPTY = (
-    Kind("nothing: noise", "nothing", "grain px", (0, 1, 3, 8), _empty(noise), False, REPEATS),
-    Kind("nothing: one color", "nothing", "noise", (0, 2, 10), _empty(one_color), False, REPEATS),
-    Kind("nothing: clutter", "nothing", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=False), False, REPEATS),
-    Kind("nothing: triangles", "nothing", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=True), False, REPEATS),
-    Kind("nothing: smooth areas", "nothing", "levels", (2, 3, 4, 6), _empty(photo_like), False, REPEATS),
-    Kind("nothing: colored squares", "nothing", "px", (8, 14, 24), _empty(checkerboard), False, REPEATS),
-    Kind("nothing: shuffled colors", "nothing", "px", (10, 16, 24), _empty(recolored, recolor=shuffled), False, REPEATS),
-    Kind("nothing: one ink", "nothing", "px", (10, 16, 24), _empty(recolored, recolor=one_inked), False, REPEATS),
-    Kind("nothing: no white cell", "nothing", "px", (10, 16, 24), _empty(recolored, recolor=without_white), False, REPEATS),
-)  # fmt: skip
+EMPTY = grouped(
+    "nothing",
+    Kind("nothing: noise", "grain px", (0, 1, 3, 8), _empty(noise), False, REPEATS),
+    Kind("nothing: one color", "noise", (0, 2, 10), _empty(one_color), False, REPEATS),
+    Kind("nothing: clutter", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=False), False, REPEATS),
+    Kind("nothing: triangles", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=True), False, REPEATS),
+    Kind("nothing: smooth areas", "levels", (2, 3, 4, 6), _empty(photo_like), False, REPEATS),
+    Kind("nothing: colored squares", "px", (8, 14, 24), _empty(checkerboard), False, REPEATS),
+    Kind("nothing: shuffled colors", "px", (10, 16, 24), _empty(recolored, recolor=shuffled), False, REPEATS),
+    Kind("nothing: one ink", "px", (10, 16, 24), _empty(recolored, recolor=one_inked), False, REPEATS),
+    Kind(
+        "nothing: no white cell", "px", (10, 16, 24), _empty(recolored, recolor=without_white), False, REPEATS
+    ),
+)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stress_kinds import Kind
-from benchmarks.stress_result import Result
+from benchmarks.stress_suite.kinds import Kind
+from benchmarks.stress_suite.reading import Result
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
@@ -172,6 +171,17 @@ def _or_dash(value: float, width: int, digits: int) -> str:
     return f"{value:>{width}.{digits}f}" if math.isfinite(value) else f"{'-':>{width}}"
 
 
+def one_line(result: Result) -> str:
+    """One image."""
+    figures = result.score
+    return (
+        f"{result.case.name:<44} visible {figures.visible:>5} measured {figures.measured:>5} repaired "
+        f"{figures.repaired:>4} fitted {figures.fitted:>4} lost {figures.lost:>5} outside {figures.outside:>3} "
+        f"WRONG {figures.wrong:>4}  {'promised' if figures.promised else 'not promised'}  "
+        f"{result.ms:.0f} ms  {result.reason}"
+    )
+
+
 def summary(rows: list[Row]) -> str:
     """One line of totals and one of promises."""
     total = {
@@ -182,10 +192,12 @@ def summary(rows: list[Row]) -> str:
     promised = [row for row in rows if row.sure]
     held = sum(row.kept_share >= PROMISED_SHARE for row in promised)
     slow = sum(row.ratio > SLOWEST_RATIO for row in rows)
+    images = sum(row.images for row in empty)
     return (
-        f"{len(rows)} conditions, {total['images']} images, {total['visible']} visible markers, {total['reported']} reported: "
-        f"{total['wrong']} wrong ({sum(row.wrong for row in empty)} of them on {sum(row.images for row in empty)} images "
-        f"without a pattern)\npromise (99 % measured or repaired) held in {held} of {len(promised)} conditions, "
+        f"{len(rows)} conditions, {total['images']} images, {total['visible']} visible markers\n"
+        f"{total['wrong']} wrong of {total['reported']} reported, {sum(row.wrong for row in empty)} of them on "
+        f"{images} images without a pattern\n"
+        f"promise (99 % measured or repaired) held in {held} of {len(promised)} conditions, "
         f"{100 * total['kept'] / max(total['sure'], 1):.2f} % together; slower than {SLOWEST_RATIO} x plain: {slow}"
     )
 
@@ -195,7 +207,7 @@ def write_json(rows: list[Row], path: Path) -> None:
     columns = [{k: None if v != v else v for k, v in asdict(row).items()} for row in rows]
     beside = path.with_name(path.name + ".part")
     beside.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
-    os.replace(beside, path)
+    beside.replace(path)
 
 
 def plot(rows: list[Row], kinds: Sequence[Kind], path: Path) -> None:
@@ -224,7 +236,7 @@ def plot(rows: list[Row], kinds: Sequence[Kind], path: Path) -> None:
         metadata={"Software": None} if path.suffix == ".png" else None,
     )
     pyplot.close(figure)
-    os.replace(beside, path)
+    beside.replace(path)
 
 
 def _of(row: Row, kind: Kind) -> bool:

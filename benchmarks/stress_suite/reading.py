@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_frames import Shot, layout_of, plain
-from benchmarks.stress_kinds import Case, Kind, frame_of
-from benchmarks.stress_score import NOTHING, Score, score
-from cmpdesign.scene import STANDARD_SIZE
+from benchmarks.stress_suite.conditions import BY_NAME, LARGE_PX
+from benchmarks.stress_suite.frames import Shot, layout_of, plain
+from benchmarks.stress_suite.kinds import Case, frame_of
+from benchmarks.stress_suite.score import NOTHING, Score, score, shortest_edges, wrong_markers
+from cmpdesign.scene import STANDARD_SIZE, Truth
 from cmpdesign.writers.layout_file import layout_to_json
-from extractor import Extractor, Markers, parse_layout
+from extractor import Extractor, Markers, Status, parse_layout
 
-LARGE_PX = 3_000_000  # read once only, and left out of a quick run
 Image = NDArray[Any]
 
 
@@ -64,8 +64,9 @@ def layers_of(shot: Shot) -> int:
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
 
 
-def read(case: Case, kind: Kind, runs: int) -> tuple[Result, Shot, Markers | None]:
+def read(case: Case, runs: int) -> tuple[Result, Shot, Markers | None]:
     """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on."""
+    kind = BY_NAME[case.kind]
     shot = frame_of(case, kind).shoot()
     pixels = shot.image.shape[0] * shot.image.shape[1]
     try:
@@ -89,19 +90,45 @@ def warm_up() -> None:
     extractor_of("honeycomb", 11).extract(plain_image("honeycomb"))
 
 
+def wrong_lines(shot: Shot, markers: Markers | None) -> list[str]:
+    """Every wrong marker with its place and its error."""
+    if markers is None or shot.scene is None:
+        return []
+    wrong, truth = wrong_in(shot, markers)
+    edge_px = shortest_edges(shot.scene.layout, truth)
+    lines = []
+    for marker in np.flatnonzero(wrong):
+        x, y = truth.marker_xy_px[marker]
+        error = np.linalg.norm(markers.xy_px[marker] - truth.marker_xy_px[marker])
+        seen = "visible" if truth.visible[marker] else "not visible"
+        status = Status(markers.status[marker]).name.lower()
+        lines.append(
+            f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {seen}: off by {error:.1f} px, "
+            f"edge {edge_px[marker]:.1f} px"
+        )
+    return lines
+
+
+def wrong_in(shot: Shot, markers: Markers) -> tuple[NDArray[np.bool_], Truth]:
+    """(M,) bool, and the truth of the pattern in the image that fits best."""
+    assert shot.scene is not None
+    layout = shot.scene.layout
+    both = [(wrong_markers(markers, layout, truth), truth) for truth in shot.truths]
+    return min(both, key=lambda one: int(one[0].sum()))
+
+
 def overlay(shot: Shot, case: Case, markers: Markers) -> NDArray[np.uint8]:
     """The extractor's own overlay, with a red line from every wrong marker to its true place."""
     import cv2
 
-    from benchmarks.stress_score import wrong_markers
     from extractor.draw import draw_markers
 
     extractor = extractor_of(case.pattern, layers_of(shot))
     canvas = draw_markers(shot.image, extractor.layout, markers)
     if shot.scene is not None:
         scale = canvas.shape[0] / shot.image.shape[0]
-        truth = min(shot.truths, key=lambda t: wrong_markers(markers, shot.scene.layout, t).sum())  # type: ignore[union-attr]
-        for marker in np.flatnonzero(wrong_markers(markers, shot.scene.layout, truth)):
+        wrong, truth = wrong_in(shot, markers)
+        for marker in np.flatnonzero(wrong):
             ends = ((np.stack([markers.xy_px[marker], truth.marker_xy_px[marker]]) + 0.5) * scale).astype(int)
             cv2.line(canvas, tuple(ends[0].tolist()), tuple(ends[1].tolist()), (0, 0, 255), 2, cv2.LINE_AA)
             cv2.circle(canvas, tuple(ends[0].tolist()), 7, (0, 0, 255), 2, cv2.LINE_AA)

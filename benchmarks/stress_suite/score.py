@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_frames import Shot
+from benchmarks.stress_suite.frames import Shot
 from cmpdesign.layout import BLACK, WHITE, Layout
 from cmpdesign.scene import Scene, Truth
 from cmpdesign.scene.light import gain
@@ -63,7 +63,8 @@ def score(markers: Markers, shot: Shot, *, promised: bool) -> Score:
 def wrong_markers(markers: Markers, layout: Layout, truth: Truth) -> Bools:
     """(M,) bool."""
     error = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
-    return (markers.status != Status.LOST) & ~(error <= WRONG_SHARE * shortest_edges(layout, truth))
+    near = error <= WRONG_SHARE * shortest_edges(layout, truth)
+    return np.asarray((markers.status != Status.LOST) & ~near)
 
 
 def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from benchmarks.stress_frames import Empty, Frame, plain
+from benchmarks.stress_suite.frames import Empty, Frame, plain
 
 Change = Callable[[Frame, float], "Frame | Empty"]
 
@@ -15,21 +15,26 @@ class Kind:
     """One way to make reading harder, in graded steps.
 
     Attributes:
-        name, group: of the kind.
+        name: of the kind.
         unit: of its steps.
         steps: from mild to hard.
         change: from the plain frame and a step to the condition's frame.
         promised: False where a share of read markers can not be asked for (ambiguous, or no white cell).
         repeats: seeds for each pattern in a full run.
+        group: set by ``grouped``.
     """
 
     name: str
-    group: str
     unit: str
     steps: tuple[float, ...]
     change: Change
     promised: bool = True
     repeats: int = 1
+    group: str = ""
+
+
+def grouped(group: str, *kinds: Kind) -> tuple[Kind, ...]:
+    return tuple(replace(kind, group=group) for kind in kinds)
 
 
 @dataclass(frozen=True)
