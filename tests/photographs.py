@@ -46,7 +46,7 @@ class Photograph:
 
 
 def rasterise(svg: str, px_per_mm: float) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 BGR, drawn by resvg. Asked for a width in px, resvg rounds the scale; asked for dpi, it does not."""
+    """(H, W, 3) uint8 BGR, drawn by resvg. Given a width in px it would round the scale; given dpi it does not."""
     png = resvg_py.svg_to_bytes(svg_string=svg, dpi=25.4 * px_per_mm, skip_system_fonts=True)
     image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
     assert image is not None
