@@ -19,6 +19,7 @@ from .cells import Cells
 from .engine import compiled
 from .lattice import axial, layer_of, marker_id
 from .mesh import Mesh
+from .neighbourhood import neighbour_table
 from .reference import BLACK, WHITE, Reference
 from .sampling import sample_patch
 
@@ -28,6 +29,9 @@ WHITE_RATIO = 0.75
 SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
 MIN_LEAD = 2  # cells by which the best reference must explain more than the next
 MAX_WHITES = 8
+# A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
+MIN_EVIDENCE = 0.06
+MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 UNKNOWN = -(1 << 20)
 # From a cell's center to the middles of the three down-cells beside it, in axial steps, and their axial coordinates
@@ -48,6 +52,9 @@ class Lattice:
         corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
         ink: (U,) uint8, 1 red, 2 green, 3 blue.
         axial: (U, 2) int32, the cells' (q, r).
+        layer: (M,) int32, the markers' layers.
+        neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
+        present: (M,) bool, the markers that touch a colored or white cell.
     """
 
     layers: int
@@ -56,6 +63,9 @@ class Lattice:
     corner_ids: NDArray[np.int32]
     ink: NDArray[np.uint8]
     axial: NDArray[np.int32]
+    layer: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+    present: NDArray[np.bool_]
 
     @cached_property
     def center_mm(self) -> NDArray[np.float64]:
@@ -97,6 +107,9 @@ def lattice_of(reference: Reference) -> Lattice:
         corner_ids=marker_ids(coordinates[lower_left]),
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
+        layer=reference.layer,
+        neighbours=neighbour_table(coordinates, int(reference.layer.max())),
+        present=reference.present,
     )
 
 
@@ -305,6 +318,8 @@ def _with_white(
         moved[known] = _from_white(at[known], places[place])
         cell = cells_at(moved, lattice)
         inside = int((cell >= 0).sum())
+        if inside < MIN_EVIDENCE * len(lattice.ink) or len(known) - inside > MAX_OUTSIDE * len(known):
+            continue
         white = beside.reshape(-1, 2)[usable][place_of == place].mean(axis=0)
         score = inside - 3 * (len(known) - inside) - conflicts
         found.append((score, Numbering(cell, front < 0, white, conflicts)))

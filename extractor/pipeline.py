@@ -21,8 +21,9 @@ from .placing import place
 from .reference import Reference
 from .refine import refine
 from .regions import find_seeds, grow
+from .repair import repair
 from .triangles import fit_triangles
-from .types import Markers, Reason, Status
+from .types import Markers, Reason
 from .virtual import interpolate
 
 WORK_PIXELS = 1_400_000  # larger images are recognised at a reduced scale first
@@ -122,12 +123,17 @@ class Extractor:
         numbering = stages.done("attach", attach(cells, numbering, self._lattice))
         places = stages.done("place", place(cells, numbering, self._lattice))
         refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
-        status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
-        virtual, virtual_status = stages.done("virtual", interpolate(self.layout, refined.xy_px, status))
+        size = (bgr.shape[1], bgr.shape[0])
+        repaired = stages.done(
+            "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
+        )
+        virtual, virtual_status = stages.done(
+            "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
+        )
         return Markers(
-            xy_px=refined.xy_px,
-            cov_px2=refined.cov_px2,
-            status=status,
+            xy_px=repaired.xy_px,
+            cov_px2=repaired.cov_px2,
+            status=repaired.status,
             virtual_xy_px=virtual,
             virtual_status=virtual_status,
             mirrored=numbering.mirrored,
