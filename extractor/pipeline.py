@@ -121,9 +121,9 @@ class Extractor:
     def _measure(self, bgr: NDArray[np.uint8], cells: Cells, numbering: Numbering, stages: Stages) -> Markers:
         """Refinement and virtual markers of what has been numbered."""
         numbering = stages.done("attach", attach(cells, numbering, self._lattice))
-        places = stages.done("place", place(cells, numbering, self._lattice))
-        refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
         size = (bgr.shape[1], bgr.shape[0])
+        places = stages.done("place", place(cells, numbering, self._lattice, size))
+        refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
         repaired = stages.done(
             "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
         )

@@ -11,8 +11,12 @@ from .cells import Cells
 from .gradients import gradients
 from .numbering import Lattice, Numbering
 
-MAX_CORNER_MISFIT = 0.35  # between a triangle's corner and where the cell's neighbours put it, in edges
+MAX_CORNER_MISFIT = 0.25  # between a triangle's corner and where the cell's neighbours put it, in edges
 MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
+# Where most cells are sharp enough for triangles, one without is damaged and its edges are not the pattern's, unless
+# it is only cut off by the image's border.
+SHARP_SHARE = 0.6
+BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
 
 
@@ -31,11 +35,14 @@ class Places:
     cells: NDArray[np.int32]
 
 
-def place(cells: Cells, numbering: Numbering, lattice: Lattice) -> Places:
+def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int, int]) -> Places:
     """Merge the corners of each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
 
     A cell's corners are those of its triangle where that lies as its neighbours say, else where they say. A marker
     whose triangles lie apart has a wrong one among them and is lost.
+
+    Args:
+        size: width and height of the image.
     """
     slope = gradients(cells.center_px, numbering.cell, lattice)
     here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
@@ -50,6 +57,10 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice) -> Places:
     apart = np.linalg.norm(corner - xy[ids], axis=2) > MAX_SPREAD * around[ids]
     xy[ids[apart & fitted[:, None]]] = np.nan
     whole = np.isfinite(xy[ids, 0]).all(axis=1)
+    if fitted.mean() > SHARP_SHARE:
+        limit = np.array(size) - 1 - BORDER_PX
+        cut = ((predicted < BORDER_PX) | (predicted > limit)).any(axis=(1, 2))
+        whole &= fitted | cut
     return Places(xy_px=xy, edge_px=around, cells=ids[whole])
 
 

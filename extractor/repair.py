@@ -47,9 +47,11 @@ def repair(
     Args:
         xy_px, cov_px2: (M, 2), (M, 2, 2) as measured, NaN where lost.
         edge_px: (M,) the edges at each marker, NaN where unknown.
-        size: width and height of the image; nothing is repaired outside.
+        size: width and height of the image; nothing is reported outside.
     """
     xy, cov = xy_px.copy(), cov_px2.copy()
+    outside = ~_inside(xy, size)
+    xy[outside], cov[outside] = np.nan, np.nan
     _drop_outliers(xy, cov, edge_px, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     edge = _filled(edge_px, lattice)
@@ -58,12 +60,16 @@ def repair(
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
         (*_by_layer(measured, edge, lattice), Status.FITTED),
     ):
-        inside = (place >= 0).all(axis=1) & (place <= np.array(size) - 1).all(axis=1)
-        use = (status == Status.LOST) & inside & (sigma < MAX_SIGMA * edge) & lattice.present
+        use = (status == Status.LOST) & _inside(place, size) & (sigma < MAX_SIGMA * edge) & lattice.present
         xy[use] = place[use]
         cov[use] = np.eye(2) * (sigma[use] ** 2)[:, None, None]
         status[use] = kind
     return Repaired(xy, cov, status)
+
+
+def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Places within the image, NaN not."""
+    return np.asarray((xy >= 0).all(axis=1) & (xy <= np.array(size) - 1).all(axis=1))
 
 
 def _drop_outliers(
