@@ -17,8 +17,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_threads] = "1"  # before numpy and numba: times are of one core
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = (
+    "1"  # before numpy and numba: times are of one core
+)
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2

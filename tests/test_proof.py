@@ -26,7 +26,7 @@ PITCHES_PX = (12, 17, 26, 40)
 TILTS_DEG = (0, 30, 50)
 WRONG_SHARE = 0.3
 MEASURED_SHARE = 0.995
-RULER_PX = 0.12  # of the raster, a quarter of that in the photographs: resvg samples its edges 4 x 4 times
+RULER_PX = 0.2  # of the raster, 0.05 px in the photographs: resvg samples its edges 4 x 4 times
 
 
 @dataclass(frozen=True)
