@@ -189,16 +189,21 @@ def drawn() -> dict[str, bytes]:
 
 
 def test_every_picture_is_what_its_script_draws(drawn: dict[str, bytes]) -> None:
-    """SVG to the byte; PNG on average to a step of 256, as fonts and rounding differ between machines."""
+    """SVG to the byte; PNG once blurred, as sub-pixel shifts of thin lines and fonts do not make another picture."""
     assert set(drawn) == {path.name for path in IMAGES.iterdir()}, "run python -m docs.figures"
     for name, data in drawn.items():
         committed = (IMAGES / name).read_bytes()
         if name.endswith(".svg"):
             assert data == committed, f"{name}: run python -m docs.figures"
             continue
-        new, old = (cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in (data, committed))
+        new, old = blurred(data), blurred(committed)
         assert new.shape == old.shape, f"{name}: run python -m docs.figures"
-        assert np.abs(new.astype(int) - old).mean() < 1.0, f"{name}: run python -m docs.figures"
+        assert np.abs(new - old).mean() < 1.0, f"{name}: run python -m docs.figures"
+
+
+def blurred(png: bytes) -> np.ndarray[Any, np.dtype[np.float32]]:
+    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    return cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 3.0)
 
 
 def test_pictures_are_small() -> None:
