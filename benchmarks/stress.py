@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.stress_suite.conditions import BY_NAME, KINDS, cases, matching
 from benchmarks.stress_suite.kinds import Case
-from benchmarks.stress_suite.reading import Result, overlay, read, warm_up, wrong_lines
+from benchmarks.stress_suite.reading import Result, notable_lines, overlay, read, warm_up
 from benchmarks.stress_suite.report import failures, one_line, plot, rows_of, summary, table, write_json
 
 
@@ -30,7 +30,8 @@ def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
     """Results as they come, the large images first."""
     last = [case for case in chosen if BY_NAME[case.kind].group != "view"]
     first = [case for case in chosen if BY_NAME[case.kind].group == "view"]
-    jobs = [(case, runs) for case in [*first[::-1], *last]]
+    # Conditions of many images need no repeated timing.
+    jobs = [(case, 1 if BY_NAME[case.kind].group == "nothing" else runs) for case in [*first[::-1], *last]]
     with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
         yield from pool.imap_unordered(_job, jobs)
 
@@ -55,7 +56,7 @@ def one_by_one(chosen: list[Case], save: Path | None) -> list[Result]:
         result, shot, markers = read(case, 1)
         results.append(result)
         print(one_line(result))
-        for line in wrong_lines(shot, markers):
+        for line in notable_lines(shot, markers):
             print(f"    {line}")
         if save is not None:
             save.mkdir(parents=True, exist_ok=True)
@@ -89,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error(f"no case is named {asked.only!r}; the kinds are {', '.join(BY_NAME)}")
         results = one_by_one(chosen, asked.save)
     else:
-        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else 3)
+        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else 2)
     rows = rows_of(results, KINDS)
     if asked.table or not asked.quick:
         print(table(rows))

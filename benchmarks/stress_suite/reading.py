@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from benchmarks.stress_suite.conditions import BY_NAME, LARGE_PX
 from benchmarks.stress_suite.frames import Shot, layout_of, plain
 from benchmarks.stress_suite.kinds import Case, frame_of
-from benchmarks.stress_suite.score import NOTHING, Score, score, shortest_edges, wrong_markers
+from benchmarks.stress_suite.score import NOTHING, Score, score, shortest_edges, sure_markers, wrong_markers
 from cmpdesign.scene import STANDARD_SIZE, Truth
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 
+MOST_LOST_LINES = 8
 Image = NDArray[Any]
 
 
@@ -64,15 +65,20 @@ def layers_of(shot: Shot) -> int:
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
 
 
-def read(case: Case, runs: int) -> tuple[Result, Shot, Markers | None]:
-    """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on."""
+def read(case: Case, runs: int, *, timing: bool = True) -> tuple[Result, Shot, Markers | None]:
+    """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on.
+
+    Args:
+        runs: of which the best one's time counts.
+        timing: also read the plain frame, to state the ratio.
+    """
     kind = BY_NAME[case.kind]
     shot = frame_of(case, kind).shoot()
     pixels = shot.image.shape[0] * shot.image.shape[1]
     try:
         extractor = extractor_of(case.pattern, layers_of(shot))
-        standard, plain_ms = shot.image.shape[:2] == STANDARD_SIZE[::-1], math.nan
-        if standard:
+        plain_ms = math.nan
+        if timing and shot.image.shape[:2] == STANDARD_SIZE[::-1]:
             plain_ms = timed(extractor_of(case.pattern, 11), plain_image(case.pattern), runs)[1]
         markers, ms = timed(extractor, shot.image, 1 if pixels > LARGE_PX else runs)
     except Exception as error:
@@ -90,22 +96,23 @@ def warm_up() -> None:
     extractor_of("honeycomb", 11).extract(plain_image("honeycomb"))
 
 
-def wrong_lines(shot: Shot, markers: Markers | None) -> list[str]:
-    """Every wrong marker with its place and its error."""
+def notable_lines(shot: Shot, markers: Markers | None) -> list[str]:
+    """Every wrong marker with its place and error, and the first of those that should not be lost."""
     if markers is None or shot.scene is None:
         return []
     wrong, truth = wrong_in(shot, markers)
     edge_px = shortest_edges(shot.scene.layout, truth)
+    lost = sure_markers(shot.scene.layout, truth, shot.image.shape) & (markers.status == Status.LOST)
     lines = []
-    for marker in np.flatnonzero(wrong):
+    for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MOST_LOST_LINES]]:
         x, y = truth.marker_xy_px[marker]
-        error = np.linalg.norm(markers.xy_px[marker] - truth.marker_xy_px[marker])
-        seen = "visible" if truth.visible[marker] else "not visible"
         status = Status(markers.status[marker]).name.lower()
-        lines.append(
-            f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {seen}: off by {error:.1f} px, "
-            f"edge {edge_px[marker]:.1f} px"
-        )
+        seen = "visible" if truth.visible[marker] else "not visible"
+        line = f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {seen}, edge {edge_px[marker]:.1f} px"
+        if wrong[marker]:
+            error = np.linalg.norm(markers.xy_px[marker] - truth.marker_xy_px[marker])
+            line += f": WRONG by {error:.1f} px"
+        lines.append(line)
     return lines
 
 

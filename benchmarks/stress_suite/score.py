@@ -15,6 +15,8 @@ from extractor.types import Markers, Status
 
 WRONG_SHARE = 0.3  # of the shortest edge at a marker: farther off, it carries another's id or none's
 PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10
+RIM_PX = 2.0  # nearer to the image's rim a corner is not seen from all sides
+ROUNDING = 1e-6  # so that a pitch of 8 px is one
 Bools = NDArray[np.bool_]
 
 
@@ -27,7 +29,7 @@ class Score:
         reported: visible or not.
         wrong: reported and farther from its true place than 0.3 of the shortest edge there.
         outside: reported, its true place outside the image. hidden: inside, but not visible.
-        sure: visible and a corner of a cell that is visible itself; kept: measured or repaired of these.
+        sure: see ``sure_markers``; kept: measured or repaired of these.
         promised: at least 99 % of the sure ones must be kept.
         rms_px, repaired_rms_px: per axis, of the measured / repaired and fitted ones that are not wrong.
     """
@@ -77,6 +79,14 @@ def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
     return shortest
 
 
+def sure_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
+    """(M,) bool: visible, off the image's rim, and a corner of a colored or white cell that is visible itself."""
+    touching = np.zeros(len(truth.visible), dtype=np.bool_)
+    touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
+    from_rim = np.minimum(truth.marker_xy_px, np.array(shape[1::-1]) - 1 - truth.marker_xy_px).min(axis=1)
+    return touching & truth.visible & (from_rim >= RIM_PX)
+
+
 def _against(
     markers: Markers, truth: Truth, scene: Scene, shape: tuple[int, ...], *, promised: bool
 ) -> Score:
@@ -85,7 +95,7 @@ def _against(
     reported = status != Status.LOST
     true_px = truth.marker_xy_px
     inside = np.all((true_px >= -0.5) & (true_px < np.array(shape[1::-1]) - 0.5), axis=1)
-    sure = visible & _at_visible_cells(layout, truth)
+    sure = sure_markers(layout, truth, shape)
     seen = {name: int((status[visible] == name).sum()) for name in Status}
     return Score(
         visible=int(visible.sum()),
@@ -110,15 +120,9 @@ def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
     return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
-def _at_visible_cells(layout: Layout, truth: Truth) -> Bools:
-    touching = np.zeros(len(truth.visible), dtype=np.bool_)
-    touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
-    return touching
-
-
 def _keeps_conditions(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]) -> bool:
     """The white cell in view, edges of 8 px, blur to a fifth of the edge, noise to a tenth of the contrast."""
-    edge_px = float(shortest_edges(scene.layout, truth)[sure].min())
+    edge_px = float(shortest_edges(scene.layout, truth)[sure].min()) * (1 + ROUNDING)
     noise = scene.sensor.noise if scene.sensor else 0.0
     return (
         bool(truth.cell_visible[scene.layout.reference_cell])
