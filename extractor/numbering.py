@@ -34,10 +34,13 @@ MIN_EVIDENCE = 0.06
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 UNKNOWN = -(1 << 20)
-# From a cell's center to the middles of the three down-cells beside it, in axial steps, and their axial coordinates
-# less the cell's.
-BESIDE = np.array([[-2 / 3, 1 / 3], [1 / 3, 1 / 3], [1 / 3, -2 / 3]])
-BESIDE_STEP = np.array([[0, 0], [1, 0], [1, -1]], np.int32)
+# The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
+STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
+# From a cell's center to theirs, in axial steps, and in edges of an equilateral lattice.
+OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
+DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
+# How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
+WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
 SIX = np.array([[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32)
 
 
@@ -114,22 +117,20 @@ def lattice_of(reference: Reference) -> Lattice:
 
 
 @compiled
-def _brightness(image, point, radius, out):  # type: ignore[no-untyped-def]
-    """Write the sum of the channels around each point, NaN outside the image."""
+def _colors_at(image, point, radius, out):  # type: ignore[no-untyped-def]
+    """Write the mean color around each point, NaN outside the image."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    color = np.zeros(3)
     for i in range(point.shape[0]):
-        out[i] = np.nan
-        if sample_patch(flat, height, width, point[i, 0], point[i, 1], radius[i], color):
-            out[i] = color[0] + color[1] + color[2]
+        if not sample_patch(flat, height, width, point[i, 0], point[i, 1], radius[i], out[i]):
+            out[i] = np.nan
 
 
-def brightness(
+def colors_at(
     image: NDArray[np.uint8], point: NDArray[np.float64], radius: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(N,) the sum of the channels around each of (N, 2) points, NaN outside the image or where a point is NaN."""
-    out = np.empty(len(point))
-    _brightness(image, np.ascontiguousarray(point), radius, out)
+    """(N, 3) the mean B, G, R around each of (N, 2) points; NaN outside the image or where a point is NaN."""
+    out = np.empty((len(point), 3))
+    _colors_at(image, np.ascontiguousarray(point), radius, out)
     return out
 
 
@@ -267,7 +268,7 @@ def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
     corner = cells.center_px[mesh.faces[faces]]
     middle = corner.mean(axis=1)
     radius = 0.12 * np.linalg.norm(corner - middle[:, None], axis=2).min(axis=1)
-    ratio = brightness(image, middle, radius)
+    ratio = colors_at(image, middle, radius).sum(axis=1)
     plus, minus = (ratio[(mesh.turn[faces] == turn) & np.isfinite(ratio)] for turn in (1, -1))
     if len(plus) < 4 or len(minus) < 4:
         return [1, -1]
@@ -300,18 +301,16 @@ def _with_white(
     """Every way to put the origin at a bright cell, with the number of cells that it explains."""
     known = np.flatnonzero(at[:, 0] != UNKNOWN)
     basis = _bases(cells.center_px, at, 2 * lattice.layers + 2)[known]
-    center, radius = cells.center_px[known], 0.1 * np.sqrt(cells.area_px[known])
-    beside = center[:, None] + np.einsum("nij,kj->nki", basis, BESIDE)
-    level = brightness(image, beside.reshape(-1, 2), np.repeat(radius, 3)).reshape(-1, 3)
-    ratio = level / np.maximum(brightness(image, center, radius), 1.0)[:, None]
-    places, inverse = np.unique((at[known, None] + BESIDE_STEP).reshape(-1, 2), axis=0, return_inverse=True)
-    usable = np.isfinite(ratio).reshape(-1)
-    place_of = inverse.reshape(-1)[usable]
-    votes = np.bincount(place_of, minlength=len(places))
-    mean = np.bincount(place_of, weights=ratio.reshape(-1)[usable], minlength=len(places)) / np.maximum(
-        votes, 1
-    )
-    bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
+    known = known[np.isfinite(basis[:, 0, 0])]
+    basis = basis[np.isfinite(basis[:, 0, 0])]
+    if len(known) == 0:
+        return []
+    for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
+        steps = (low < DISTANCES) & (high >= DISTANCES)
+        places, where, mean = _whiteness(image, cells, at, known, basis, steps)
+        bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
+        if len(bright):
+            break
     found = []
     for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
         moved = np.full_like(at, UNKNOWN)
@@ -320,10 +319,46 @@ def _with_white(
         inside = int((cell >= 0).sum())
         if inside < MIN_EVIDENCE * len(lattice.ink) or len(known) - inside > MAX_OUTSIDE * len(known):
             continue
-        white = beside.reshape(-1, 2)[usable][place_of == place].mean(axis=0)
         score = inside - 3 * (len(known) - inside) - conflicts
-        found.append((score, Numbering(cell, front < 0, white, conflicts)))
+        found.append((score, Numbering(cell, front < 0, where[place], conflicts)))
     return found
+
+
+def _whiteness(
+    image: NDArray[np.uint8],
+    cells: Cells,
+    at: NDArray[np.int32],
+    known: NDArray[np.intp],
+    basis: NDArray[np.float64],
+    steps: NDArray[np.bool_],
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, and brightness against the inks.
+
+    Far from the next cell a prediction may hit a colored cell. So there all three channels must be as strong as in
+    the ink that has most of each: white is, in light of any color, and no ink is.
+    """
+    center, radius = cells.center_px[known], 0.1 * np.sqrt(cells.area_px[known])
+    around = center[:, None] + np.einsum("nij,kj->nki", basis, OFFSETS[steps])
+    places, inverse = np.unique((at[known, None] + STEPS[steps]).reshape(-1, 2), axis=0, return_inverse=True)
+    color = colors_at(image, around.reshape(-1, 2), np.repeat(radius, around.shape[1]))
+    own = colors_at(image, center, radius)
+    if DISTANCES[steps].min() < WHITE_REACHES[0]:
+        ratio = color.sum(axis=1) / np.repeat(np.maximum(own.sum(axis=1), 1.0), around.shape[1])
+    else:
+        inks = [
+            np.median(own[cells.ink[known] == ink], axis=0)
+            for ink in (1, 2, 3)
+            if (cells.ink[known] == ink).any()
+        ]
+        ratio = (color / np.maximum(np.max(inks, axis=0), 1.0)).min(axis=1)
+    usable = np.isfinite(ratio)
+    place_of = inverse.reshape(-1)[usable]
+    count = np.maximum(np.bincount(place_of, minlength=len(places)), 1)
+    sums = [
+        np.bincount(place_of, weights=v[usable], minlength=len(places)) / count
+        for v in (around[..., 0].reshape(-1), around[..., 1].reshape(-1), ratio)
+    ]
+    return places.astype(np.int32), np.stack(sums[:2], axis=1), sums[2]
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:

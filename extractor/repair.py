@@ -17,8 +17,9 @@ from .numbering import Lattice
 from .types import Status
 
 ROUNDS = 4
-MAX_DEVIATION = 0.2  # of a marker from where its neighbours put it, in edges
-SIGMAS = 6.0  # a marker may also deviate by this many standard deviations of the prediction
+MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
+MAX_TOLERANCE = 0.25  # in edges, where the surface is so bent that
+SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 MAX_LEVERAGE = 1.2
@@ -83,7 +84,8 @@ def _drop_outliers(
         sigma = np.sqrt(variance * (1 + leverage))
         deviation = np.linalg.norm(xy - place, axis=1)
         with np.errstate(invalid="ignore"):
-            excess = deviation / np.maximum(MAX_DEVIATION * edge, SIGMAS * np.where(support > 9, sigma, 0.0))
+            allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
+            excess = deviation / (edge * np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE))
         excess[~np.isfinite(excess)] = 0.0
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
         bad = (excess > 1.0) & (excess >= around)
