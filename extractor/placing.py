@@ -11,7 +11,7 @@ from .cells import Cells
 from .gradients import gradients
 from .numbering import Lattice, Numbering
 
-MAX_CORNER_MISFIT = 0.25  # between a triangle's corner and where the cell's neighbours put it, in edges
+MAX_CORNER_MISFIT = 0.2  # between a triangle's corner and where the cell's neighbours put it, in edges
 MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
 # Where most cells are sharp enough for triangles, one without is damaged and its edges are not the pattern's, unless
 # it is only cut off by the image's border.

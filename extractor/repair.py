@@ -18,7 +18,7 @@ from .types import Status
 
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
-MAX_TOLERANCE = 0.25  # in edges, where the surface is so bent that
+MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
