@@ -26,11 +26,15 @@ from .sampling import sample_patch
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
 WHITE_RATIO = 0.75
+# Between the inks it must be darker than they are, even in haze: in pictures of anything else it is not.
+BLACK_RATIO = 0.95
+BLACK_SHARE = 0.8  # of the places between inks; the white cell and glare are among them
 SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
 MIN_LEAD = 2  # cells by which the best reference must explain more than the next
 MAX_WHITES = 8
 # A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
 MIN_EVIDENCE = 0.06
+MIN_CELLS = 9  # or all, in a layout that has fewer
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 UNKNOWN = -(1 << 20)
@@ -308,16 +312,19 @@ def _with_white(
     for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
         steps = (low < DISTANCES) & (high >= DISTANCES)
         places, where, mean = _whiteness(image, cells, at, known, basis, steps)
+        if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
+            return []
         bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
         if len(bright):
             break
+    least = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
     found = []
     for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
         moved = np.full_like(at, UNKNOWN)
         moved[known] = _from_white(at[known], places[place])
         cell = cells_at(moved, lattice)
         inside = int((cell >= 0).sum())
-        if inside < MIN_EVIDENCE * len(lattice.ink) or len(known) - inside > MAX_OUTSIDE * len(known):
+        if inside < least or len(known) - inside > MAX_OUTSIDE * len(known):
             continue
         score = inside - 3 * (len(known) - inside) - conflicts
         found.append((score, Numbering(cell, front < 0, where[place], conflicts)))
