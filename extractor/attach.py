@@ -27,6 +27,8 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     """
     from scipy.spatial import cKDTree
 
+    if (numbering.cell >= 0).all():
+        return numbering
     members = [np.flatnonzero(lattice.ink == ink) for ink in (1, 2, 3)]
     trees = [cKDTree(lattice.center_mm[mine]) for mine in members]
     cell = numbering.cell.copy()
