@@ -204,7 +204,7 @@ def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) ->
     if not of_chroma.any():
         return None
     strong = int(np.searchsorted(np.cumsum(of_chroma), STRONG_SHARE * of_chroma.sum()))
-    floor = max(MIN_CHROMA, strong // 4)
+    floor = max(MIN_CHROMA, strong // 8)
     weight = histogram[:, floor:] @ np.arange(floor, 256, dtype=np.float64)
     shift, found = _centers(weight, nominal_deg)
     return (nominal_deg + shift) % 360 if found else None
