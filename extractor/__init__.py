@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .errors import ExtractorError, ImageError, LayoutError
-from .types import Markers, Reason, Status, VirtualStatus
+from .types import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
     from .pipeline import Extractor
@@ -21,6 +21,7 @@ __all__ = [
     "ImageError",
     "LayoutError",
     "Markers",
+    "Origin",
     "Reason",
     "Reference",
     "Status",

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
-from .numbering import Lattice, Numbering
+from .numbering import Numbering
+from .tables import Lattice
 
 ROUNDS = 12
 WITNESSES = 20  # numbered cells through which a quadratic map to the layout is laid

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .lattice import layer_of, marker_id
-from .numbering import SIX, Lattice
+from .numbering import SIX
+from .tables import Lattice
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing
 

@@ -45,3 +45,13 @@ def axial(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int3
     step_q = np.array([1, 1, 0, -1, -1, 0])[side] * along
     step_r = np.array([0, -1, -1, 0, 1, 1])[side] * along
     return np.stack([corner_q + step_q, corner_r + step_r], axis=1).astype(np.int32)
+
+
+def turned(at: NDArray[np.int32], turn: int) -> NDArray[np.int32]:
+    """Axial coordinates of cells turned by 0, 120 or 240 degrees; inks are carried onto themselves when shifted
+    so that their (q - r) mod 3 agrees.
+
+    It is the turn that brings the three cells around the down-cell (turn, 0) to those around (0, 0).
+    """
+    q, r = (at - np.array([turn, 0])).T
+    return np.stack(((q, r), (-q - r - 1, q + 1), (r - 1, -q - r))[turn], axis=1).astype(np.int32)

@@ -10,18 +10,18 @@ and one blue cell, and these have their places.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .lattice import axial, layer_of, marker_id
+from .lattice import turned
 from .mesh import Mesh
-from .neighbourhood import neighbour_table
-from .reference import BLACK, WHITE, Reference
+from .outline import settle
 from .sampling import sample_patch
+from .tables import UNKNOWN, Lattice, cells_at
+from .types import Origin
 
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
@@ -38,7 +38,6 @@ MIN_EVIDENCE = 0.06
 MIN_CELLS = 9  # or all, in a layout that has fewer
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
-UNKNOWN = -(1 << 20)
 WITNESSES = 150  # faces that say which turn is that of the markers
 KEY = 1 << 16  # q KEY + r is one number for an axial place
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
@@ -52,47 +51,16 @@ SIX = np.array([[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32)
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
-    """What numbering needs of the layout.
-
-    Attributes:
-        layers: the layout's layers.
-        marker_mm: (M, 2) float64.
-        cell_of: (M,) int32, the colored cell whose axial (q, r) is this marker's ("up-cell"), or -1.
-        corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
-        ink: (U,) uint8, 1 red, 2 green, 3 blue.
-        axial: (U, 2) int32, the cells' (q, r).
-        layer: (M,) int32, the markers' layers.
-        neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
-        present: (M,) bool, the markers that touch a colored or white cell.
-    """
-
-    layers: int
-    marker_mm: NDArray[np.float64]
-    cell_of: NDArray[np.int32]
-    corner_ids: NDArray[np.int32]
-    ink: NDArray[np.uint8]
-    axial: NDArray[np.int32]
-    layer: NDArray[np.int32]
-    neighbours: NDArray[np.int32]
-    present: NDArray[np.bool_]
-
-    @cached_property
-    def center_mm(self) -> NDArray[np.float64]:
-        """(U, 2) the centers of the colored cells."""
-        return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
-
-
-@dataclass(frozen=True, eq=False)
 class Numbering:
     """Stage 7.
 
     Attributes:
         cell: (N,) int32, the lattice's colored cell that each cell of the image is, or -1.
         mirrored: the pattern is seen from its back.
-        white_px: (2,) the middle of the white cell.
+        white_px: (2,) the middle of the white cell; of all cells where the outline told.
         conflicts: cells left out because their neighbours disagreed about them.
         ambiguous: two white cells could be the reference and nothing tells them apart.
+        origin: what told where the lattice begins.
     """
 
     cell: NDArray[np.int32]
@@ -100,27 +68,7 @@ class Numbering:
     white_px: NDArray[np.float64]
     conflicts: int
     ambiguous: bool = False
-
-
-def lattice_of(reference: Reference) -> Lattice:
-    """The tables of a triangular layout."""
-    coordinates = axial(reference.layer, reference.index)
-    inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
-    corners = reference.cell_corners[inked]
-    lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
-    cell_of = np.full(len(coordinates), -1, np.int32)
-    cell_of[lower_left] = np.arange(len(inked))
-    return Lattice(
-        layers=int(reference.layer.max()),
-        marker_mm=reference.xy_mm,
-        cell_of=cell_of,
-        corner_ids=marker_ids(coordinates[lower_left]),
-        ink=(reference.cell_color[inked] + 1).astype(np.uint8),
-        axial=coordinates[lower_left],
-        layer=reference.layer,
-        neighbours=neighbour_table(coordinates, int(reference.layer.max())),
-        present=reference.present,
-    )
+    origin: Origin = Origin.WHITE
 
 
 @compiled
@@ -249,7 +197,7 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
 
 
 def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice) -> Numbering | None:
-    """Stage 7: number the largest part of the mesh that holds a white cell; None without one.
+    """Stage 7: number the largest part of the mesh that holds a white cell or shows the whole outline; else None.
 
     Where several cells are as bright as white, the one that puts the most cells inside the layout and the fewest
     outside is the reference, unless two do so equally well: then nothing is reported.
@@ -260,6 +208,8 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
         for part in parts:
             at, conflicts = _number_part(mesh, part, front, 2 * lattice.layers + 2, len(cells.ink))
             found += _with_white(image, cells, lattice, at, front, conflicts)
+            if not found:
+                found += _with_outline(cells, lattice, at, front, conflicts)
     if not found:
         return None
     found.sort(key=lambda pair: -pair[0])
@@ -267,6 +217,20 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     reach = 0.5 * cells.edge_px
     rivals = [other for other, way in found if np.hypot(*(way.white_px - best.white_px)) > reach]
     return replace(best, ambiguous=bool(rivals) and score - max(rivals) < MIN_LEAD)
+
+
+def _with_outline(
+    cells: Cells, lattice: Lattice, at: NDArray[np.int32], front: int, conflicts: int
+) -> list[tuple[int, Numbering]]:
+    """The way that the outline leaves, if it leaves only one."""
+    known = np.flatnonzero(at[:, 0] != UNKNOWN)
+    settled = settle(at[known], lattice)
+    if settled is None:
+        return []
+    cell = np.full(len(at), -1, np.int32)
+    cell[known] = settled
+    middle = cells.center_px[known].mean(axis=0)
+    return [(int((settled >= 0).sum()), Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE))]
 
 
 def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
@@ -399,39 +363,5 @@ def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.i
     The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
     the right, to the left or above, and a turn by 0, 120 or 240 degrees brings it to the right.
     """
-    q, r = (at - white).T
     turn = int(white[0] - white[1]) % 3
-    turned = ((q, r), (-q - r - 1, q + 1), (r - 1, -q - r))[turn]
-    return np.stack(turned, axis=1).astype(np.int32)
-
-
-@compiled
-def _cells_at(at, cell_of, layers, out):  # type: ignore[no-untyped-def]
-    """Write the layout's cell at each axial place, or -1."""
-    for i in range(at.shape[0]):
-        q, r = at[i, 0], at[i, 1]
-        out[i] = -1
-        if q != UNKNOWN and layer_of(q, r) <= layers:
-            out[i] = cell_of[marker_id(q, r)]
-
-
-def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
-    """(N,) int32, the layout's cell at each axial (q, r), or -1."""
-    out = np.empty(len(at), np.int32)
-    _cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_of, lattice.layers, out)
-    return out
-
-
-@compiled
-def _marker_ids(at, out):  # type: ignore[no-untyped-def]
-    """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
-    for i in range(at.shape[0]):
-        q, r = at[i, 0], at[i, 1]
-        out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
-
-
-def marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1) at the corners of the cells (q, r)."""
-    out = np.empty((len(at), 3), np.int32)
-    _marker_ids(np.ascontiguousarray(at, dtype=np.int32), out)
-    return out
+    return turned((at - white + np.array([turn, 0])).astype(np.int32), turn)

@@ -16,12 +16,13 @@ from .color import find_target, nominal_hues_deg, segment, to_colors
 from .errors import LayoutError
 from .image import estimate_noise, prepare
 from .mesh import build_mesh
-from .numbering import Numbering, lattice_of, number
+from .numbering import Numbering, number
 from .placing import place
 from .reference import Reference
 from .refine import refine
 from .regions import find_seeds, grow
 from .repair import repair
+from .tables import lattice_of
 from .triangles import fit_triangles
 from .types import Markers, Reason
 from .virtual import interpolate
@@ -137,6 +138,7 @@ class Extractor:
             virtual_xy_px=virtual,
             virtual_status=virtual_status,
             mirrored=numbering.mirrored,
+            origin=numbering.origin,
             reason=None,
             timings_ms=MappingProxyType(stages.timings_ms),
             stages=MappingProxyType(stages.results),

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .gradients import gradients
-from .numbering import Lattice, Numbering
+from .numbering import Numbering
+from .tables import Lattice
 
 MAX_CORNER_MISFIT = 0.2  # between a triangle's corner and where the cell's neighbours put it, in edges
 MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges

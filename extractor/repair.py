@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .neighbourhood import predict
-from .numbering import Lattice
+from .tables import Lattice
 from .types import Status
 
 ROUNDS = 4

@@ -28,6 +28,13 @@ class VirtualStatus(IntEnum):
     INTERPOLATED = 2
 
 
+class Origin(StrEnum):
+    """What told where the numbering begins."""
+
+    WHITE = "white"  # the white cell
+    OUTLINE = "outline"  # it is hidden, and the pattern's rim leaves one way only
+
+
 class Reason(StrEnum):
     """Why nothing, or little, was found in an image."""
 
@@ -51,6 +58,7 @@ class Markers:
         reason: why nothing or little was found; None when all went well.
         timings_ms: stage name -> milliseconds.
         stages: stage name -> that stage's result, for debugging and drawing.
+        origin: what told where the numbering begins; None when nothing was found.
     """
 
     xy_px: NDArray[np.float64]
@@ -62,3 +70,4 @@ class Markers:
     reason: Reason | None
     timings_ms: Mapping[str, float]
     stages: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    origin: Origin | None = None

@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -175,26 +174,13 @@ def test_full_disk_changes_nothing(call: str, tmp_path: Path, monkeypatch: pytes
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def process(*arguments: str) -> tuple[float, subprocess.CompletedProcess[str]]:
-    """The faster of two runs as a whole process, in seconds, and the last one's result."""
-    seconds = []
-    for _ in range(2):
-        start = time.perf_counter()
-        command = [sys.executable, "-c", "from cmpdesign.cli import main; main()", *arguments]
-        result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-        seconds.append(time.perf_counter() - start)
-    return min(seconds), result
-
-
-def test_answers_quickly(tmp_path: Path) -> None:
-    """0.3 s and 0.8 s on an idle machine; the limits here leave room for a busy one."""
-    seconds, result = process("--help")
-    assert result.returncode == 0 and seconds < 0.9
-    seconds, result = process("build", "honeycomb", "--only", "svg,layout", "-o", str(tmp_path))
-    assert result.returncode == 0 and seconds < 2.4
+def process(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The result of a whole process."""
+    command = [sys.executable, "-c", "from cmpdesign.cli import main; main()", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
 def test_no_traceback_from_a_real_process(tmp_path: Path) -> None:
-    _, result = process("verify", str(tmp_path / "none.json"), "image.png")
+    result = process("verify", str(tmp_path / "none.json"), "image.png")
     assert result.returncode == 2
     assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1

@@ -29,7 +29,8 @@ from cmpdesign.scene import (
 from extractor import Markers, Status, parse_layout
 from extractor.cells import Cells
 from extractor.mesh import build_mesh
-from extractor.numbering import lattice_of, number
+from extractor.numbering import number
+from extractor.tables import lattice_of
 
 TRIANGULAR = ("honeycomb", "round", "elliptical")
 

@@ -6,7 +6,6 @@ import errno
 import hashlib
 import json
 import os
-import time
 from pathlib import Path
 
 import numpy as np
@@ -63,13 +62,6 @@ def test_the_text_is_deterministic_and_one_column_a_line() -> None:
     assert text.endswith("}\n")
     assert sum('"x": [' in line and line.rstrip(",").endswith("]") for line in text.splitlines()) == 1
     assert text.count("\n") < 50
-
-
-def test_200_layers_are_written_fast() -> None:
-    built = layout("honeycomb", 200)
-    started = time.perf_counter()
-    layout_to_json(built)
-    assert time.perf_counter() - started < 3
 
 
 def test_a_folder_is_made_and_nothing_else_is_left(tmp_path: Path) -> None:

@@ -1,0 +1,101 @@
+"""What the stages need of a layout, in tables, made once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .engine import compiled
+from .lattice import axial, layer_of, marker_id
+from .neighbourhood import neighbour_table
+from .reference import BLACK, WHITE, Reference
+
+UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """What numbering needs of the layout.
+
+    Attributes:
+        layers: the layout's layers.
+        marker_mm: (M, 2) float64.
+        cell_of: (M,) int32, the colored cell whose axial (q, r) is this marker's ("up-cell"), or -1.
+        corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
+        ink: (U,) uint8, 1 red, 2 green, 3 blue.
+        axial: (U, 2) int32, the cells' (q, r).
+        layer: (M,) int32, the markers' layers.
+        neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
+        present: (M,) bool, the markers that touch a colored or white cell.
+    """
+
+    layers: int
+    marker_mm: NDArray[np.float64]
+    cell_of: NDArray[np.int32]
+    corner_ids: NDArray[np.int32]
+    ink: NDArray[np.uint8]
+    axial: NDArray[np.int32]
+    layer: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+    present: NDArray[np.bool_]
+
+    @cached_property
+    def center_mm(self) -> NDArray[np.float64]:
+        """(U, 2) the centers of the colored cells."""
+        return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
+
+
+def lattice_of(reference: Reference) -> Lattice:
+    """The tables of a triangular layout."""
+    coordinates = axial(reference.layer, reference.index)
+    inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
+    corners = reference.cell_corners[inked]
+    lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
+    cell_of = np.full(len(coordinates), -1, np.int32)
+    cell_of[lower_left] = np.arange(len(inked))
+    return Lattice(
+        layers=int(reference.layer.max()),
+        marker_mm=reference.xy_mm,
+        cell_of=cell_of,
+        corner_ids=marker_ids(coordinates[lower_left]),
+        ink=(reference.cell_color[inked] + 1).astype(np.uint8),
+        axial=coordinates[lower_left],
+        layer=reference.layer,
+        neighbours=neighbour_table(coordinates, int(reference.layer.max())),
+        present=reference.present,
+    )
+
+
+@compiled
+def _cells_at(at, cell_of, layers, out):  # type: ignore[no-untyped-def]
+    """Write the layout's cell at each axial place, or -1."""
+    for i in range(at.shape[0]):
+        q, r = at[i, 0], at[i, 1]
+        out[i] = -1
+        if q != UNKNOWN and layer_of(q, r) <= layers:
+            out[i] = cell_of[marker_id(q, r)]
+
+
+def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
+    """(N,) int32, the layout's cell at each axial (q, r), or -1."""
+    out = np.empty(len(at), np.int32)
+    _cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_of, lattice.layers, out)
+    return out
+
+
+@compiled
+def _marker_ids(at, out):  # type: ignore[no-untyped-def]
+    """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
+    for i in range(at.shape[0]):
+        q, r = at[i, 0], at[i, 1]
+        out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
+
+
+def marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1) at the corners of the cells (q, r)."""
+    out = np.empty((len(at), 3), np.int32)
+    _marker_ids(np.ascontiguousarray(at, dtype=np.int32), out)
+    return out
