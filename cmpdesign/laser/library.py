@@ -49,7 +49,8 @@ class Machine(_Closed):
 
 
 class Settings(_Closed):
-    """How one machine carves one material. Kerf: full width at the front, of cuts that run in y (x) and in x (y)."""
+    """How one machine carves one material. Kerf: full width at the front, of cuts that run in y (x) and in
+    x (y)."""
 
     kerf_x_mm: Sourced[Length]
     kerf_y_mm: Sourced[Length]
