@@ -17,11 +17,15 @@ def drawing_to_dxf(drawing: Drawing) -> str:
     """The walls of the passes, and the fiducials as circles on the layer T1, which is not plotted."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
+    from ezdxf.sections.classes import REQUIRED_CLASSES
 
     # No date and no random identifier: the same bytes for the same job.
     fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
     try:
         document = new("R2010")
+        # The library adds them in the order of a set, which differs from process to process.
+        for name in sorted(REQUIRED_CLASSES[document.dxfversion]):
+            document.classes.add_class(name)
         _header(document, drawing)
         space = document.modelspace()
         for one in drawing.passes:
