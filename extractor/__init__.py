@@ -29,7 +29,12 @@ __all__ = [
     "parse_layout",
 ]
 
-_HOMES = {"Extractor": "pipeline", "Reference": "reference", "load_layout": "reference", "parse_layout": "reference"}
+_HOMES = {
+    "Extractor": "pipeline",
+    "Reference": "reference",
+    "load_layout": "reference",
+    "parse_layout": "reference",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -14,6 +14,7 @@ HUES = 180  # OpenCV's 8-bit hue counts in steps of 2 degrees
 HUE_REACH_DEG = 50.0  # a hue farther than this from its nominal one is not that ink: 60 would be ambiguous
 LEVEL_SHARE = 0.4  # a pixel shows an ink when its chroma exceeds this share of that ink's local level
 TILE_PX = 32
+SHRINK = 8  # pixels per side of a tile of the target area
 MIN_CHROMA = 12  # below this, 8-bit hue is noise
 OPENCV_HUE_DEG = 2.0
 
@@ -51,80 +52,119 @@ def nominal_hues_deg(palette: dict[str, str]) -> NDArray[np.float64]:
 
 
 @compiled
-def _survey(hsv, step):  # type: ignore[no-untyped-def]
+def _chroma(hsv):  # type: ignore[no-untyped-def]
+    """(H, W) uint8: max - min of B, G, R, which is S V / 255."""
+    height, width = hsv.shape[:2]
+    flat = hsv.reshape(-1)
+    out = np.empty(height * width, np.uint8)
+    for i in range(height * width):
+        out[i] = (
+            np.int32(flat[3 * i + 1]) * np.int32(flat[3 * i + 2]) * np.int32(257) + np.int32(32768)
+        ) >> 16
+    return out.reshape(height, width)
+
+
+@compiled
+def _survey(hsv, chroma, step):  # type: ignore[no-untyped-def]
     """Histogram (180 hues, 256 chromas) over every ``step``-th pixel of every ``step``-th row."""
     histogram = np.zeros((HUES, 256), np.int64)
     for y in range(0, hsv.shape[0], step):
         for x in range(0, hsv.shape[1], step):
-            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
-            histogram[hsv[y, x, 0], chroma] += 1
+            if chroma[y, x] >= MIN_CHROMA:
+                histogram[hsv[y, x, 0], chroma[y, x]] += 1
     return histogram
 
 
 @compiled
-def _tile_levels(hsv, ink_of_hue, tile, step):  # type: ignore[no-untyped-def]
+def _tile_levels(hsv, chroma, ink_of_hue, tile, step):  # type: ignore[no-untyped-def]
     """(3, rows, columns) the largest chroma of each ink in every tile."""
     rows = (hsv.shape[0] + tile - 1) // tile
     columns = (hsv.shape[1] + tile - 1) // tile
     level = np.zeros((3, rows, columns), np.float32)
     for y in range(0, hsv.shape[0], step):
-        for x in range(0, hsv.shape[1], step):
-            ink = ink_of_hue[hsv[y, x, 0]]
-            if ink > 0:
-                chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
-                if chroma > level[ink - 1, y // tile, x // tile]:
-                    level[ink - 1, y // tile, x // tile] = chroma
+        for column in range(columns):
+            strongest = np.zeros(4, np.uint8)
+            for x in range(column * tile, min((column + 1) * tile, hsv.shape[1]), step):
+                if chroma[y, x] >= MIN_CHROMA:
+                    ink = ink_of_hue[hsv[y, x, 0]]
+                    strongest[ink] = max(strongest[ink], chroma[y, x])
+            for ink in range(3):
+                level[ink, y // tile, column] = max(
+                    level[ink, y // tile, column], np.float32(strongest[ink + 1])
+                )
     return level
 
 
 @compiled
-def _label(hsv, ink_of_hue, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
+def _label(hsv, chroma, ink_of_hue, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
     """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
-    height, width = hsv.shape[:2]
+    height, width = chroma.shape
     label = np.zeros((height, width), np.uint8)
+    limit = np.empty((4, width), np.uint8)
     for y in range(height):
+        if y % tile == 0 or y % shrink == 0:
+            for x in range(width):
+                limit[0, x] = 255
+                for ink in range(3):
+                    inside = target[y // shrink, x // shrink] != 0
+                    limit[ink + 1, x] = threshold[ink, y // tile, x // tile] if inside else 255
+        row, colors, out = chroma[y], hsv[y], label[y]
         for x in range(width):
-            ink = ink_of_hue[hsv[y, x, 0]]
-            if ink == 0 or target[y // shrink, x // shrink] == 0:
-                continue
-            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
-            if chroma > threshold[ink - 1, y // tile, x // tile]:
-                label[y, x] = ink
+            if row[x] >= MIN_CHROMA:
+                ink = ink_of_hue[colors[x, 0]]
+                if row[x] > limit[ink, x]:
+                    out[x] = ink
     return label
 
 
 @compiled
-def _tile_chroma(hsv, shrink, step):  # type: ignore[no-untyped-def]
+def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
     """The largest chroma in every tile of ``shrink`` pixels."""
-    rows = (hsv.shape[0] + shrink - 1) // shrink
-    columns = (hsv.shape[1] + shrink - 1) // shrink
+    height, width = chroma.shape
+    rows, columns = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
     largest = np.zeros((rows, columns), np.uint8)
-    for y in range(0, hsv.shape[0], step):
-        for x in range(0, hsv.shape[1], step):
-            chroma = (int(hsv[y, x, 1]) * int(hsv[y, x, 2]) + 127) // 255
-            if chroma > largest[y // shrink, x // shrink]:
-                largest[y // shrink, x // shrink] = chroma
+    strongest = np.empty(width, np.uint8)
+    for row in range(rows):
+        strongest[:] = 0
+        for y in range(row * shrink, min((row + 1) * shrink, height)):
+            for x in range(width):
+                strongest[x] = max(strongest[x], chroma[y, x])
+        for x in range(width):
+            largest[row, x // shrink] = max(largest[row, x // shrink], strongest[x])
     return largest
 
 
-def to_hsv(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 HSV (OpenCV's scale) of an 8-bit BGR image."""
-    return cv2.cvtColor(image, cv2.COLOR_BGR2HSV)  # type: ignore[return-value]
+@dataclass(frozen=True, eq=False)
+class Colors:
+    """The image as the stages see it.
+
+    Attributes:
+        hsv: (H, W, 3) uint8, OpenCV's scale: H 0..179 (2 degrees a step), S and V 0..255.
+        chroma: (H, W) uint8, max - min of B, G, R: 0 for black, grey and white in any light.
+    """
+
+    hsv: NDArray[np.uint8]
+    chroma: NDArray[np.uint8]
 
 
-def find_target(hsv: NDArray[np.uint8]) -> Target:
+def to_colors(image: NDArray[np.uint8]) -> Colors:
+    """HSV and chroma of an 8-bit BGR image."""
+    hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
+    return Colors(hsv=hsv, chroma=_chroma(hsv))  # type: ignore[arg-type]
+
+
+def find_target(colors: Colors) -> Target:
     """Stage 1: flood the image from outside; what the flood cannot reach may be pattern.
 
     Tiles without color are water; closing seals the gaps between cells first, so that the flood stops at the
     pattern's rim while its black cells stay dry.
     """
-    shrink = 8
-    chroma = _tile_chroma(hsv, shrink, 2)
+    chroma = _tile_chroma(colors.chroma, SHRINK)
     threshold = max(MIN_CHROMA, 0.15 * float(np.percentile(chroma, 95)))
     dry = cv2.morphologyEx((chroma > threshold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     water = cv2.copyMakeBorder(dry, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cv2.floodFill(water, None, (0, 0), 2)
-    return Target(mask=(water[1:-1, 1:-1] != 2).astype(np.uint8), shrink=shrink)
+    return Target(mask=(water[1:-1, 1:-1] != 2).astype(np.uint8), shrink=SHRINK)
 
 
 def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -156,22 +196,22 @@ def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) ->
     return centers % 360
 
 
-def segment(hsv: NDArray[np.uint8], target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
+def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
     """Stage 2: label every pixel of the target area with its ink; None when one of the three inks is absent."""
-    step = 2 if hsv.shape[0] * hsv.shape[1] > 100_000 else 1
-    histogram = _survey(hsv, step)
-    hues = find_hues(histogram, nominal_deg)
+    hsv, chroma = colors.hsv, colors.chroma
+    step = 2 if chroma.size > 100_000 else 1
+    hues = find_hues(_survey(hsv, chroma, step), nominal_deg)
     if hues is None:
         return None
     away = np.abs((np.arange(HUES)[:, None] * OPENCV_HUE_DEG - hues + 180) % 360 - 180)
     ink_of_hue = np.where(away.min(axis=1) < 60, away.argmin(axis=1) + 1, 0).astype(np.uint8)
-    tile = max(TILE_PX, min(hsv.shape[:2]) // 12)
-    level = _tile_levels(hsv, ink_of_hue, tile, step)
+    tile = max(TILE_PX, min(chroma.shape) // 12 // SHRINK * SHRINK)
+    level = _tile_levels(hsv, chroma, ink_of_hue, tile, step)
     typical = np.array([np.percentile(v[v > 0], 75) if np.any(v > 0) else 0.0 for v in level])
     threshold = np.empty(level.shape, np.uint8)
     for ink in range(3):
         spread = cv2.blur(cv2.dilate(level[ink], np.ones((3, 3), np.uint8)), (3, 3))
         local = LEVEL_SHARE * np.maximum(spread, 0.15 * typical[ink])
         threshold[ink] = np.clip(local, MIN_CHROMA, 255)
-    label = _label(hsv, ink_of_hue, threshold, tile, target.mask, target.shrink)
+    label = _label(hsv, chroma, ink_of_hue, threshold, tile, target.mask, target.shrink)
     return Segmentation(hsv=hsv, label=label, hues_deg=hues, chroma=typical)

@@ -37,7 +37,7 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     """
     base = _base(image)
     scale = _scale(base)
-    canvas = _enlarged(base, scale, 0.55)
+    canvas = _enlarged(base, scale, 0.7)
     points = _at(markers.xy_px, scale)
     _draw_edges(canvas, reference, points)
     _draw_reference(canvas, reference, points)
@@ -68,8 +68,8 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
         pictures["grow"] = _draw_regions(base, scale, results["grow"])
     if "triangles" in results:
         pictures["triangles"] = _draw_triangles(base, scale, results["triangles"])
-    if "connect" in results:
-        pictures["connect"] = _draw_graph(base, scale, results["connect"])
+    if results.get("mesh") is not None:
+        pictures["mesh"] = _draw_mesh(base, scale, results["cells"], results["mesh"])
     if "place" in results:
         pictures["number"] = _draw_spiral(base, scale, reference, results["place"].xy_px)
         pictures["markers"] = draw_markers(image, reference, markers)
@@ -78,14 +78,14 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
 
 def _base(image: NDArray[Any]) -> Picture:
     bgr = prepare(image)
-    if bgr is None:
-        gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
-        bgr = cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[assignment]
-    return bgr
+    if bgr is not None:
+        return bgr
+    gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
+    return cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[return-value]
 
 
 def _scale(base: Picture) -> int:
-    return max(1, round(SHORT_SIDE_PX / min(base.shape[:2])))
+    return max(1, round(SHORT_SIDE_PX / int(min(base.shape[:2]))))
 
 
 def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
@@ -105,12 +105,18 @@ def _at(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
     return (xy_px + 0.5) * scale - 0.5
 
 
-def _dot(canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1) -> None:
+def _dot(
+    canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1
+) -> None:
     one = 1 << SHIFT
-    cv2.circle(canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT)
+    cv2.circle(
+        canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT
+    )
 
 
-def _lines(canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1) -> None:
+def _lines(
+    canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1
+) -> None:
     """Closed polygons or open two-point lines: (N, K, 2)."""
     fixed = np.round(lines * (1 << SHIFT)).astype(np.int32)
     cv2.polylines(canvas, list(fixed), lines.shape[1] > 2, color, thickness, cv2.LINE_AA, SHIFT)
@@ -125,7 +131,8 @@ def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.fl
     corners = points[reference.cell_corners[reference.reference_cell]]
     if np.isfinite(corners).all():
         _lines(canvas, corners[None], WHITE_BGR, 2)
-        _dot(canvas, *points[reference.reference_marker], 9.0, WHITE_BGR, 2)
+        x, y = points[reference.reference_marker]
+        _dot(canvas, x, y, 9.0, WHITE_BGR, 2)
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
@@ -182,24 +189,32 @@ def _draw_regions(base: Picture, scale: int, regions: Any) -> Picture:
 
 def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
     """Pixels of the picture for one pixel of the scale at which regions were grown."""
-    return scale * round(base.shape[1] / work.shape[1])
+    return float(scale * round(base.shape[1] / work.shape[1]))
+
+
+def _bright(ink: int) -> tuple[int, int, int]:
+    blue, green, red = (min(int(level) + 60, 255) for level in INK_BGR[ink])
+    return blue, green, red
 
 
 def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
     canvas = _enlarged(base, scale, 0.4)
     for ink in (1, 2, 3):
-        color = tuple(int(c) for c in np.minimum(INK_BGR[ink].astype(int) + 60, 255))
-        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), color, 2)  # type: ignore[arg-type]
+        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), _bright(ink), 2)
     return canvas
 
 
-def _draw_graph(base: Picture, scale: int, graph: Any) -> Picture:
-    """Nodes by the number of triangles that meet: three are yellow, two orange, one grey."""
+def _draw_mesh(base: Picture, scale: int, cells: Any, mesh: Any) -> Picture:
+    """Markers and black cells as triangles between three centers: those that turn clockwise are yellow."""
     canvas = _enlarged(base, scale, 0.4)
-    members = (graph.corner_of_node >= 0).sum(axis=1)
-    for count, color in ((1, (160, 160, 160)), (2, (0, 160, 255)), (3, (80, 255, 255))):
-        for x, y in _at(graph.xy_px[members == count], scale):
-            _dot(canvas, x, y, 3.0 + count, color)
+    centers = _at(cells.center_px, scale)
+    for turn, color in ((-1, (150, 150, 150)), (1, (80, 255, 255))):
+        corners = centers[mesh.faces[mesh.turn == turn]]
+        middle = corners.mean(axis=1, keepdims=True)
+        _lines(canvas, middle + 0.8 * (corners - middle), color)
+    for ink in (1, 2, 3):
+        for x, y in centers[cells.ink == ink]:
+            _dot(canvas, x, y, 4.0, _bright(ink))
     return canvas
 
 
@@ -208,7 +223,9 @@ def _draw_spiral(base: Picture, scale: int, reference: Reference, xy_px: NDArray
     canvas = _enlarged(base, scale, 0.4)
     points = _at(xy_px, scale)
     found = np.flatnonzero(np.isfinite(points[:, 0]))
-    shades = cv2.applyColorMap(np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO)
+    shades = cv2.applyColorMap(
+        np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO
+    )
     for start, end, shade in zip(found[:-1], found[1:], shades[:, 0], strict=False):
         if end == start + 1:
             _lines(canvas, points[[start, end]][None], tuple(int(c) for c in shade), 2)  # type: ignore[arg-type]

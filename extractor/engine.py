@@ -6,13 +6,18 @@ same source runs uncompiled, which is the twin that the tests compare against.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+log = logging.getLogger("extractor")
+
+numba: Any
 try:
-    import numba
+    numba = import_module("numba")
 except ImportError:  # slow, but right
     numba = None
 
@@ -21,4 +26,31 @@ def compiled(function: Function) -> Function:
     """Compile ``function`` with numba on its first call; the result is cached beside its source file."""
     if numba is None:
         return function
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    kernel: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return kernel
+
+
+def _announce_compilation() -> None:
+    """Say it once when code of this package has to be compiled: the first use takes seconds, later ones do not."""
+
+    event = import_module("numba.core.event")
+
+    class Announcer(event.Listener):  # type: ignore[misc, name-defined]
+        said = False
+
+        def on_start(self, happening: Any) -> None:
+            dispatcher = happening.data["dispatcher"]
+            if not self.said and dispatcher.py_func.__module__.startswith("extractor."):
+                self.said = True
+                log.warning(
+                    "compiling for this machine; the first use takes about 15 s, later ones are cached"
+                )
+
+        def on_end(self, happening: Any) -> None:
+            pass
+
+    event.register("numba:compile", Announcer())
+
+
+if numba is not None:
+    _announce_compilation()

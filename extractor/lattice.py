@@ -29,9 +29,7 @@ def marker_id(q, r):  # type: ignore[no-untyped-def]
         i = k + q
     elif q == k and r > -k:
         i = 2 * k - r
-    elif r == -k and q > 0:
-        i = 4 * k - q
-    elif q + r == -k and q > -k:
+    elif (r == -k and q > 0) or (q + r == -k and q > -k):
         i = 4 * k - q
     else:
         i = 5 * k + r

@@ -17,14 +17,14 @@ from .engine import compiled
 from .placing import Places
 from .sampling import clamp, sample_dot, sample_patch
 
-STATIONS = 12  # at most, along an edge
 SAMPLES = 7  # at most, on each side of it
 REACH_SIGMA = 2.5  # how far a profile reaches, in units of the blur
 CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
+LEVEL_REACH = 0.15  # of the cell's height, how far around its middle the ink is averaged
 MAX_STEPS = 60  # of the conjugate gradient
-ROUNDS = 2
+ROUNDS = (4, 24)  # stations along an edge at most, in each round
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 
@@ -45,28 +45,49 @@ class Refined:
 
 
 @compiled
-def _edge_frame(flat, height, width, a, b, c, ink, beyond):  # type: ignore[no-untyped-def]
-    """Length, outward normal and squared contrast of the edge a-b of the cell a, b, c; a length of 0 is unusable."""
+def _levels(image, xy, cells):  # type: ignore[no-untyped-def]
+    """(3 C, 5) per edge: what turns a color into its share of the ink, 1 in the cell and 0 beyond the edge.
+
+    Columns: three channel weights, the offset to subtract, and the squared contrast; 0 where nothing can be measured.
+    Ink and black are taken from the middle of the cell and of the cell beyond.
+    """
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    ink, beyond = np.zeros(3), np.zeros(3)
+    out = np.zeros((cells.shape[0] * 3, 5))
+    for i in range(cells.shape[0]):
+        a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
+        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
+        area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+        longest = max(np.hypot(b[0] - a[0], b[1] - a[1]), np.hypot(c[0] - a[0], c[1] - a[1]))
+        longest = max(longest, np.hypot(c[0] - b[0], c[1] - b[1]))
+        radius = LEVEL_REACH * area / max(longest, 1e-9)
+        if area < 2.0 or not sample_patch(flat, height, width, cx, cy, radius, ink):
+            continue
+        for k in range(3):
+            a, b = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]]
+            if not sample_patch(flat, height, width, a[0] + b[0] - cx, a[1] + b[1] - cy, radius, beyond):
+                continue
+            contrast = (ink[0] - beyond[0]) ** 2 + (ink[1] - beyond[1]) ** 2 + (ink[2] - beyond[2]) ** 2
+            if contrast < MIN_CONTRAST**2:
+                continue
+            e = 3 * i + k
+            for channel in range(3):
+                out[e, channel] = (ink[channel] - beyond[channel]) / contrast
+                out[e, 3] += out[e, channel] * beyond[channel]
+            out[e, 4] = contrast
+    return out
+
+
+@compiled
+def _outward(a, b, c):  # type: ignore[no-untyped-def]
+    """Length of the edge a-b, its unit normal away from c, and the height of c over it."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = np.hypot(dx, dy)
-    if not length > 1.0:
-        return 0.0, 0.0, 0.0, 0.0
     nx, ny = dy / length, -dx / length
     depth = (c[0] - a[0]) * nx + (c[1] - a[1]) * ny
     if depth > 0.0:
-        nx, ny, depth = -nx, -ny, -depth
-    cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-    radius = -0.15 * depth
-    if not sample_patch(flat, height, width, cx, cy, radius, ink):
-        return 0.0, 0.0, 0.0, 0.0
-    if not sample_patch(flat, height, width, a[0] + b[0] - cx, a[1] + b[1] - cy, radius, beyond):
-        return 0.0, 0.0, 0.0, 0.0
-    contrast = 0.0
-    for k in range(3):
-        contrast += (ink[k] - beyond[k]) ** 2
-    if contrast < MIN_CONTRAST**2 or -depth < 1.0:
-        return 0.0, 0.0, 0.0, 0.0
-    return length, nx, ny, contrast
+        return length, -nx, -ny, depth
+    return length, nx, ny, -depth
 
 
 @compiled
@@ -79,39 +100,32 @@ def _sine(a, b, c):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _share(flat, height, width, x, y, ink, beyond, contrast):  # type: ignore[no-untyped-def]
-    """How much of the ink a point shows: 1 in the cell, 0 beyond the edge, NaN outside the image."""
-    u0, u1, u2 = (ink[0] - beyond[0]) / contrast, (ink[1] - beyond[1]) / contrast, (ink[2] - beyond[2]) / contrast
-    return sample_dot(flat, height, width, x, y, u0, u1, u2) - (beyond[0] * u0 + beyond[1] * u1 + beyond[2] * u2)
-
-
-@compiled
-def _edge_blurs(image, xy, cells, every):  # type: ignore[no-untyped-def]
+def _edge_blurs(image, xy, cells, levels, every):  # type: ignore[no-untyped-def]
     """The blur seen across the middle of every n-th edge: the integral of f (1 - f) is sigma / sqrt(pi)."""
     out = np.full(cells.shape[0] * 3 // every + 1, np.nan)
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, beyond = np.zeros(3), np.zeros(3)
     for e in range(0, cells.shape[0] * 3, every):
+        if levels[e, 4] == 0.0:
+            continue
         i, k = e // 3, e % 3
         a, b, c = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]], xy[cells[i, (k + 2) % 3]]
-        length, nx, ny, contrast = _edge_frame(flat, height, width, a, b, c, ink, beyond)
-        if length == 0.0:
-            continue
-        reach = MAX_REACH * abs((c[0] - a[0]) * nx + (c[1] - a[1]) * ny)
+        u0, u1, u2, zero = levels[e, :4]
+        _, nx, ny, depth = _outward(a, b, c)
+        reach = MAX_REACH * depth
         step = reach / 8
         total = 0.0
         for t in range(3):
             w = 0.4 + 0.1 * t
             x, y = a[0] + w * (b[0] - a[0]), a[1] + w * (b[1] - a[1])
             for m in range(-8, 9):
-                f = _share(flat, height, width, x + m * step * nx, y + m * step * ny, ink, beyond, contrast)
+                f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
                 total += f * (1.0 - f) * step / 3.0
         out[e // every] = total * np.sqrt(np.pi)
     return out
 
 
 @compiled
-def _measure(image, xy, cells, sigma, noise):  # type: ignore[no-untyped-def]
+def _measure(image, xy, cells, levels, sigma, noise, most):  # type: ignore[no-untyped-def]
     """Per edge: its normal, and the sums of the weighted offsets of its stations.
 
     At each station the matched filter of a blurred step tells how far the edge lies from where it is thought to be.
@@ -120,20 +134,20 @@ def _measure(image, xy, cells, sigma, noise):  # type: ignore[no-untyped-def]
     """
     rows = np.zeros((cells.shape[0] * 3, 7))
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, beyond = np.zeros(3), np.zeros(3)
     kernel, step_profile = np.zeros(2 * SAMPLES + 1), np.zeros(2 * SAMPLES + 1)
     for e in range(cells.shape[0] * 3):
+        if levels[e, 4] == 0.0:
+            continue
         i, k = e // 3, e % 3
         a, b, c = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]], xy[cells[i, (k + 2) % 3]]
-        length, nx, ny, contrast = _edge_frame(flat, height, width, a, b, c, ink, beyond)
-        if length == 0.0:
-            continue
+        u0, u1, u2, zero, contrast = levels[e]
+        length, nx, ny, depth = _outward(a, b, c)
         rows[e, 0], rows[e, 1] = nx, ny
         # the sharper a corner, the longer the edge runs close to its neighbour
         start = min(max(CLEAR_SIGMA * sigma / (length * _sine(a, b, c)), 0.15), 0.4)
         end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * _sine(b, a, c)), 0.15), 0.4)
-        stations = min(max(int(length * (end - start)), 3), STATIONS)
-        reach = min(REACH_SIGMA * sigma, MAX_REACH * abs((c[0] - a[0]) * nx + (c[1] - a[1]) * ny))
+        stations = min(max(int(length * (end - start)), 3), most)
+        reach = min(REACH_SIGMA * sigma, MAX_REACH * depth)
         samples = min(max(int(np.ceil(reach)), 2), SAMPLES)
         step = reach / samples
         norm = 0.0
@@ -142,13 +156,15 @@ def _measure(image, xy, cells, sigma, noise):  # type: ignore[no-untyped-def]
             kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
             step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
             norm += kernel[m + samples] ** 2
-        information = contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
+        information = (
+            contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
+        )
         for j in range(stations):
             t = start + (end - start) * (j + 0.5) / stations
             x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
             product = 0.0
             for m in range(-samples, samples + 1):
-                f = _share(flat, height, width, x + m * step * nx, y + m * step * ny, ink, beyond, contrast)
+                f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
                 product += kernel[m + samples] * (clamp(f, -0.3, 1.3) - step_profile[m + samples])
             offset = product / norm
             if not abs(offset) < max(1.0, 0.15 * length):
@@ -278,13 +294,14 @@ def refine(image: NDArray[np.uint8], places: Places, noise: float) -> Refined:
     A marker that its edges would move by more than ``MAX_SHIFT`` of an edge is lost.
     """
     cells, xy = places.cells, places.xy_px
-    blurs = _edge_blurs(image, xy, cells, max(1, 3 * len(cells) // 200))
+    levels = _levels(image, xy, cells)
+    blurs = _edge_blurs(image, xy, cells, levels, max(1, 3 * len(cells) // 200))
     sigma = max(float(np.nanmedian(blurs)) if np.isfinite(blurs).any() else 1.0, 0.4)
     ends = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
     rows = np.zeros((len(ends), 7))
     block = np.zeros((len(xy), 3))
-    for _ in range(ROUNDS):
-        rows = _measure(image, xy, cells, sigma, max(noise, MIN_NOISE))
+    for stations in ROUNDS:
+        rows = _measure(image, xy, cells, levels, sigma, max(noise, MIN_NOISE), stations)
         block = _blocks(rows, ends, len(xy))
         xy = xy + _solve(rows, ends, len(xy), block)
     cov = _covariances(rows, ends, block)

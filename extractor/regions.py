@@ -17,9 +17,17 @@ MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Stage 3. ``xy`` (N, 2) int32 pixels, ``ink`` (N,) uint8 1..3, ``area_px`` (N,) of the domains they stand for."""
+    """Stage 3: one seed per domain.
+
+    Attributes:
+        xy: (N, 2) int32, the pixel to grow from.
+        center: (N, 2) float64, the domain's geometric center.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        area_px: (N,) int64, the domain's area.
+    """
 
     xy: NDArray[np.int32]
+    center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
 
@@ -44,62 +52,73 @@ class Regions:
 
 
 @compiled
+def _count_runs(label):  # type: ignore[no-untyped-def]
+    """How many horizontal runs of one ink there are."""
+    count = 0
+    for y in range(label.shape[0]):
+        row = label[y]
+        before = 0
+        for ink in row:
+            count += (ink != before) & (ink != 0)
+            before = ink
+    return count
+
+
+@compiled
+def _root(parent, i):  # type: ignore[no-untyped-def]
+    """The first run of the domain that run i belongs to; the path to it is halved on the way."""
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@compiled
 def _runs(label):  # type: ignore[no-untyped-def]
     """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
 
     Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 with the first run of each run's domain.
     """
     height, width = label.shape
-    runs = np.empty((max(16, height * width // 8), 4), np.int32)
-    parent = np.empty(runs.shape[0], np.int32)
+    runs = np.empty((_count_runs(label) + 1, 4), np.int32)
     count = 0
-    above, above_end = 0, 0
     for y in range(height):
-        first = count
-        x = 0
-        cursor = above
-        while x < width:
-            ink = label[y, x]
-            if ink == 0:
-                x += 1
-                continue
-            start = x
-            while x < width and label[y, x] == ink:
-                x += 1
-            if count == runs.shape[0]:
-                runs = np.concatenate((runs, np.empty_like(runs)))
-                parent = np.concatenate((parent, np.empty_like(parent)))
-            runs[count, 0] = y
-            runs[count, 1] = start
-            runs[count, 2] = x - 1
-            runs[count, 3] = ink
-            parent[count] = count
-            while cursor < above_end and runs[cursor, 2] < start:
-                cursor += 1
-            other = cursor
-            while other < above_end and runs[other, 1] < x:
-                if runs[other, 3] == ink:
-                    a, b = count, other
-                    while parent[a] != a:
-                        a = parent[a]
-                    while parent[b] != b:
-                        parent[b] = parent[parent[b]]
-                        b = parent[b]
-                    if a < b:
-                        parent[b] = a
-                    else:
-                        parent[a] = b
-                other += 1
+        row = label[y]
+        before = np.uint8(0)
+        for x in range(width):
+            ink = row[x]
+            if ink != before:
+                if before != 0:
+                    runs[count, 2] = x - 1
+                    count += 1
+                if ink != 0:
+                    runs[count, 0] = y
+                    runs[count, 1] = x
+                    runs[count, 3] = ink
+                before = ink
+        if before != 0:
+            runs[count, 2] = width - 1
             count += 1
-        above, above_end = first, count
+    parent = np.arange(count).astype(np.int32)
+    above = 0
+    for i in range(count):
+        y, start, end, ink = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
+        while runs[above, 0] < y - 1 or (runs[above, 0] == y - 1 and runs[above, 2] < start):
+            above += 1
+        other = above
+        while runs[other, 0] == y - 1 and runs[other, 1] <= end:
+            if runs[other, 3] == ink:
+                a, b = _root(parent, i), _root(parent, other)
+                parent[max(a, b)] = min(a, b)
+            other += 1
     for i in range(count):
         parent[i] = parent[parent[i]]
-    return runs[:count], parent[:count]
+    return runs[:count], parent
 
 
 @compiled
 def _seeds(runs, root):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, its ink and its area."""
+    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
     number = np.full(runs.shape[0], -1, np.int32)
     domains = 0
     for i in range(runs.shape[0]):
@@ -121,13 +140,15 @@ def _seeds(runs, root):  # type: ignore[no-untyped-def]
     for i in range(runs.shape[0]):
         d = number[root[i]]
         cx = sums[d, 0] / area[d]
-        x = min(max(int(round(cx)), runs[i, 1]), runs[i, 2])
+        x = min(max(round(cx), runs[i, 1]), runs[i, 2])
         distance = (x - cx) ** 2 + (runs[i, 0] - sums[d, 1] / area[d]) ** 2
         if distance < best[d]:
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    return xy, ink, area
+    for d in range(domains):
+        sums[d] /= area[d]
+    return xy, sums, ink, area
 
 
 def find_seeds(segmentation: Segmentation) -> Seeds:
@@ -135,9 +156,9 @@ def find_seeds(segmentation: Segmentation) -> Seeds:
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
     """
-    xy, ink, area = _seeds(*_runs(segmentation.label))
+    xy, center, ink, area = _seeds(*_runs(segmentation.label))
     keep = area >= MIN_DOMAIN_PX
-    return Seeds(xy=xy[keep], ink=ink[keep], area_px=area[keep])
+    return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
 
 
 @compiled
@@ -212,5 +233,7 @@ def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
     ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
     """
     limit_px = segmentation.label.size // 6
-    owner, moments = _grow(segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD)
+    owner, moments = _grow(
+        segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
+    )
     return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)

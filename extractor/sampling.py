@@ -10,7 +10,15 @@ import numpy as np
 from .engine import compiled
 
 HEXAGON = np.array(
-    [[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5], [-0.5, 0.75**0.5], [-1.0, 0.0], [-0.5, -(0.75**0.5)], [0.5, -(0.75**0.5)]]
+    [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [0.5, 0.75**0.5],
+        [-0.5, 0.75**0.5],
+        [-1.0, 0.0],
+        [-0.5, -(0.75**0.5)],
+        [0.5, -(0.75**0.5)],
+    ]
 )
 
 
@@ -36,16 +44,20 @@ def sample_dot(flat, height, width, x, y, red, green, blue):  # type: ignore[no-
 @compiled
 def sample_patch(flat, height, width, x, y, radius, out):  # type: ignore[no-untyped-def]
     """Write the mean of seven samples, the center and a hexagon of ``radius`` around it; False outside the image."""
-    for c in range(3):
-        total = 0.0
-        for k in range(7):
-            total += sample_dot(
-                flat, height, width, x + radius * HEXAGON[k, 0], y + radius * HEXAGON[k, 1],
-                1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0,
-            )  # fmt: skip
-        if not total >= 0.0:
-            return False
-        out[c] = total / 7.0
+    if not (x >= radius and y >= radius and x <= width - 1.0 - radius and y <= height - 1.0 - radius):
+        return False
+    out[0], out[1], out[2] = 0.0, 0.0, 0.0
+    for k in range(7):
+        px, py = x + radius * HEXAGON[k, 0], y + radius * HEXAGON[k, 1]
+        ix, iy = min(int(px), width - 2), min(int(py), height - 2)
+        fx, fy = px - ix, py - iy
+        a = np.uint64((iy * width + ix) * 3)
+        b = np.uint64(a + np.uint64(width * 3))
+        for c in range(3):
+            at, below, right = np.uint64(a + np.uint64(c)), np.uint64(b + np.uint64(c)), np.uint64(3)
+            top = flat[at] * (1.0 - fx) + flat[at + right] * fx
+            bottom = flat[below] * (1.0 - fx) + flat[below + right] * fx
+            out[c] += (top + fy * (bottom - top)) / 7.0
     return True
 
 

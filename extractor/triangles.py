@@ -21,7 +21,8 @@ MIN_AREA_PX = 4
 MAX_GROWTH = 3.0  # of a domain's area over its region's
 STATIONS = 5
 HALF_PROFILE = 6  # samples on each side of an edge
-WINDOW = 1.2  # reach of a profile in units of the distance from the cell's center to the edge
+WINDOW = 0.8  # reach of a profile in units of the way from the cell's center to the middle of the edge
+FINE_REACH_PX = 8.0  # profiles that reach farther are followed by narrower ones
 MIN_CONTRAST = 12.0  # of an ink against what lies beyond its edge, over the three channels, 8-bit
 MIN_SINE = 0.05  # two edges that meet at less than 3 degrees have no corner
 MAX_CORNER_SHIFT = 1.0  # in units of the corner's distance from the center
@@ -97,95 +98,92 @@ def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
-    """Move every triangle's edges to where its ink has fallen halfway to the color beyond; in place.
+def _edge_line(flat, height, width, a, b, center, ink, share, line):  # type: ignore[no-untyped-def]
+    """Write the line n . p = d of the edge a-b, where its ink has fallen halfway to the color beyond; False without.
 
     The ink's profile across the edge, 1 inside and 0 outside, is integrated: its area is the edge's position
-    whatever the blur, so no blur has to be known. A line through the stations' positions is the edge.
+    whatever the blur, so no blur has to be known. A line through the stations' positions is the edge. Profiles run
+    along the median, not the normal: so they stay clear of the other edges in any triangle.
+    """
+    beyond = np.zeros(3)
+    offset, along = np.zeros(STATIONS), np.zeros(STATIONS)
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    length = np.hypot(dx, dy)
+    nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
+    depth = (a[0] - center[0]) * nx + (a[1] - center[1]) * ny
+    mx, my = a[0] + 0.5 * dx, a[1] + 0.5 * dy
+    ux, uy = mx - center[0], my - center[1]
+    if not depth > 0.3 or not sample_patch(flat, height, width, mx + ux, my + uy, 0.4 * depth, beyond):
+        return False
+    u0, u1, u2 = ink[0] - beyond[0], ink[1] - beyond[1], ink[2] - beyond[2]
+    contrast = u0 * u0 + u1 * u1 + u2 * u2
+    if contrast < MIN_CONTRAST**2:
+        return False
+    u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
+    zero = u0 * beyond[0] + u1 * beyond[1] + u2 * beyond[2]
+    step = share / HALF_PROFILE
+    used = 0
+    for j in range(STATIONS):
+        t = 0.25 + 0.5 * j / (STATIONS - 1)
+        x, y = a[0] + t * dx, a[1] + t * dy
+        area = 0.0
+        for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
+            f = sample_dot(flat, height, width, x + m * step * ux, y + m * step * uy, u0, u1, u2) - zero
+            area += (0.5 if abs(m) == HALF_PROFILE else 1.0) * clamp(f, -0.2, 1.2)
+        if area == area:  # a profile that leaves the image is NaN
+            offset[used] = (ux * nx + uy * ny) * (area * step - share)
+            along[used] = t - 0.5
+            used += 1
+    if used < 4:
+        return False
+    middle, level = along[:used].mean(), offset[:used].mean()
+    slope = ((along[:used] - middle) * (offset[:used] - level)).sum() / ((along[:used] - middle) ** 2).sum()
+    ax, ay = a[0] + (level - slope * (0.5 + middle)) * nx, a[1] + (level - slope * (0.5 + middle)) * ny
+    bx, by = b[0] + (level + slope * (0.5 - middle)) * nx, b[1] + (level + slope * (0.5 - middle)) * ny
+    norm = np.hypot(bx - ax, by - ay)
+    line[0], line[1] = (by - ay) / norm, -(bx - ax) / norm
+    line[2] = line[0] * ax + line[1] * ay
+    return norm > 0.0
+
+
+@compiled
+def _fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
+    """Move every triangle's corners to where the lines of its edges meet; in place.
+
+    The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, beyond, unit = np.zeros(3), np.zeros(3), np.zeros(3)
-    offset, along = np.zeros(STATIONS), np.zeros(STATIONS)
-    lines = np.zeros((3, 3))
+    ink, center, lines = np.zeros(3), np.zeros(2), np.zeros((3, 3))
+    moved = np.zeros((3, 2))
     for i in range(corners.shape[0]):
         if not good[i]:
             continue
-        good[i] = False
-        cx, cy = corners[i, :, 0].mean(), corners[i, :, 1].mean()
-        if not sample_patch(flat, height, width, cx, cy, 0.2 * np.hypot(corners[i, 0, 0] - cx, corners[i, 0, 1] - cy), ink):
-            continue
-        complete = True
-        for k in range(3):
-            x0, y0 = corners[i, k, 0], corners[i, k, 1]
-            dx, dy = corners[i, (k + 1) % 3, 0] - x0, corners[i, (k + 1) % 3, 1] - y0
-            length = np.hypot(dx, dy)
-            nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
-            depth = (x0 - cx) * nx + (y0 - cy) * ny
-            mx, my = x0 + 0.5 * dx, y0 + 0.5 * dy
-            # profiles run along the median, not the normal: so they stay clear of the other edges in any triangle
-            reach = WINDOW * np.hypot(mx - cx, my - cy)
-            ux, uy = WINDOW * (mx - cx) / reach, WINDOW * (my - cy) / reach
-            if depth < 0.3 or not sample_patch(flat, height, width, 2 * mx - cx, 2 * my - cy, 0.4 * depth, beyond):
-                complete = False
+        share, passes = WINDOW, 0
+        while good[i]:
+            center[0], center[1] = corners[i, :, 0].mean(), corners[i, :, 1].mean()
+            size = np.hypot(corners[i, 0, 0] - center[0], corners[i, 0, 1] - center[1])
+            good[i] = sample_patch(flat, height, width, center[0], center[1], 0.2 * size, ink)
+            for k in range(3):
+                good[i] = good[i] and _edge_line(
+                    flat, height, width, corners[i, k], corners[i, (k + 1) % 3], center, ink, share, lines[k]
+                )
+            for k in range(3):
+                before, after = lines[(k + 2) % 3], lines[k]
+                sine = before[0] * after[1] - before[1] * after[0]
+                if not good[i] or abs(sine) < MIN_SINE:
+                    good[i] = False
+                    break
+                moved[k, 0] = (before[2] * after[1] - before[1] * after[2]) / sine
+                moved[k, 1] = (before[0] * after[2] - before[2] * after[0]) / sine
+                shift = np.hypot(moved[k, 0] - corners[i, k, 0], moved[k, 1] - corners[i, k, 1])
+                good[i] = shift < MAX_CORNER_SHIFT * size
+            if not good[i]:
                 break
-            contrast = 0.0
-            for c in range(3):
-                contrast += (ink[c] - beyond[c]) ** 2
-            if contrast < MIN_CONTRAST**2:
-                complete = False
+            corners[i] = moved
+            passes += 1
+            if passes == 3 or share * size < 2 * FINE_REACH_PX:
                 break
-            zero = 0.0
-            for c in range(3):
-                unit[c] = (ink[c] - beyond[c]) / contrast
-                zero += unit[c] * beyond[c]
-            slant = ux * nx + uy * ny
-            step = reach / HALF_PROFILE
-            used = 0
-            for j in range(STATIONS):
-                t = 0.25 + 0.5 * j / (STATIONS - 1)
-                sx, sy = x0 + t * dx, y0 + t * dy
-                area = 0.0
-                for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
-                    share = sample_dot(
-                        flat, height, width, sx + m * step * ux, sy + m * step * uy, unit[0], unit[1], unit[2]
-                    )
-                    weight = 0.5 if abs(m) == HALF_PROFILE else 1.0
-                    area += weight * clamp(share - zero, -0.2, 1.2)
-                if area == area:
-                    offset[used] = slant * (area * step - reach)
-                    along[used] = t - 0.5
-                    used += 1
-            if used < 4:
-                complete = False
-                break
-            mean_offset, mean_along = offset[:used].mean(), along[:used].mean()
-            spread = ((along[:used] - mean_along) ** 2).sum()
-            slope = ((along[:used] - mean_along) * (offset[:used] - mean_offset)).sum() / spread
-            # the line n . p = distance through the two ends, moved along the normal
-            shift0 = mean_offset + slope * (-0.5 - mean_along)
-            shift1 = mean_offset + slope * (0.5 - mean_along)
-            ax, ay = x0 + shift0 * nx, y0 + shift0 * ny
-            bx, by = x0 + dx + shift1 * nx, y0 + dy + shift1 * ny
-            norm = np.hypot(bx - ax, by - ay)
-            lines[k, 0] = (by - ay) / norm
-            lines[k, 1] = -(bx - ax) / norm
-            lines[k, 2] = lines[k, 0] * ax + lines[k, 1] * ay
-        if not complete:
-            continue
-        longest = 0.0
-        for k in range(3):
-            a, b = lines[(k + 2) % 3], lines[k]
-            cross = a[0] * b[1] - a[1] * b[0]
-            if abs(cross) < MIN_SINE:
-                complete = False
-                break
-            x = (a[2] * b[1] - a[1] * b[2]) / cross
-            y = (a[0] * b[2] - a[2] * b[0]) / cross
-            size = np.hypot(corners[i, k, 0] - cx, corners[i, k, 1] - cy)
-            longest = max(longest, np.hypot(x - corners[i, k, 0], y - corners[i, k, 1]) / size)
-            corners[i, k, 0] = x
-            corners[i, k, 1] = y
-        good[i] = complete and longest < MAX_CORNER_SHIFT
+            share = max(0.25 * share, 2 * FINE_REACH_PX / size)
 
 
 def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:
@@ -199,4 +197,6 @@ def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) ->
     corners, good = _fit(regions.moments, regions.seed, regions.domain_px, float(MIN_AREA_PX))
     corners = (corners + 0.5) * scale - 0.5
     _fit_edges(image, corners, good)
-    return Triangles(corner_px=corners[good], ink=regions.ink[good], region=np.flatnonzero(good).astype(np.int32))
+    return Triangles(
+        corner_px=corners[good], ink=regions.ink[good], region=np.flatnonzero(good).astype(np.int32)
+    )

@@ -1,11 +1,12 @@
 """Scenes: what a camera sees of a pattern, with the exact truth. They make test images and evaluate designs.
 
-    layout + surface + camera + light + optics + sensor + damage -> image + truth
+layout + surface + camera + light + optics + sensor + damage -> image + truth
 """
 
 from __future__ import annotations
 
 from cmpdesign.scene.background import Busy, Gradient, Paper, Picture, Plain
+from cmpdesign.scene.bound import cramer_rao
 from cmpdesign.scene.camera import Camera
 from cmpdesign.scene.damage import Blob, Damage, Glare, Scratch
 from cmpdesign.scene.errors import SceneError
@@ -44,6 +45,7 @@ __all__ = [
     "Twist",
     "colored_leds",
     "composed",
+    "cramer_rao",
     "load_truth",
     "render",
     "save_truth",

@@ -62,11 +62,15 @@ class Paper:
 
         width, height = size
         fine = cv2.GaussianBlur(rng.standard_normal((height, width), dtype=np.float32), (0, 0), 0.8)
-        fibres = cv2.GaussianBlur(rng.standard_normal((height, width), dtype=np.float32), (0, 0), 6.0, sigmaY=1.2)
+        fibres = cv2.GaussianBlur(
+            rng.standard_normal((height, width), dtype=np.float32), (0, 0), 6.0, sigmaY=1.2
+        )
         coarse = rng.standard_normal((max(height // 64, 2), max(width // 64, 2)), dtype=np.float32)
         shade = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
         texture = self.grain * (fine / fine.std() + 0.5 * fibres / fibres.std() + 0.7 * shade)
-        return np.asarray(np.asarray(self.rgb[::-1], dtype=np.float32)[:, None, None] + texture, dtype=np.float32)
+        return np.asarray(
+            np.asarray(self.rgb[::-1], dtype=np.float32)[:, None, None] + texture, dtype=np.float32
+        )
 
 
 @dataclass(frozen=True)
@@ -113,9 +117,15 @@ class Picture:
     image: NDArray[np.uint8]
 
     def __post_init__(self) -> None:
-        if self.image.dtype != np.uint8 or self.image.ndim != 3 or self.image.shape[2] != 3 or not self.image.size:
+        if (
+            self.image.dtype != np.uint8
+            or self.image.ndim != 3
+            or self.image.shape[2] != 3
+            or not self.image.size
+        ):
             raise SceneError(
-                f"the background picture is {self.image.dtype} of shape {self.image.shape}; give uint8 BGR of shape (H, W, 3)"
+                f"the background picture is {self.image.dtype} of shape {self.image.shape}; "
+                "give uint8 BGR of shape (H, W, 3)"
             )
 
     def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:

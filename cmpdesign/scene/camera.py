@@ -16,11 +16,11 @@ class Camera:
     """A pinhole that looks at the layout's plane.
 
     Attributes:
-        pitch_px: one pitch of the layout at marker 0, in pixels (before the tilt foreshortens it).
+        pitch_px: one pitch of the layout at the pattern's middle, before the tilt foreshortens it.
         rotation_deg: turn of the pattern in the image, counter-clockwise as seen.
         tilt_deg: angle between the optical axis and the pattern's normal, -85 to 85.
-        tilt_axis_deg: direction of the line in the image about which it tilts, counter-clockwise from the right.
-        centre_px: where marker 0 lies; None: the image's centre.
+        tilt_axis_deg: direction of the line about which it tilts, counter-clockwise from the right.
+        centre_px: where the middle of the pattern's outline lies; None: the image's centre.
         focal_px: focal length and distance in one; small means strong perspective. None: 1.5 times the
             image's longer side.
         mirrored: looks at the pattern's back; None: as the layout was designed.
@@ -68,19 +68,24 @@ def homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> NDArray
     cos, sin = np.cos(turn), np.sin(turn)
     # The image's y points down, so a turn that looks counter-clockwise is clockwise in its numbers.
     planar = scale * np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0])
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    from_middle = np.column_stack([np.eye(2), np.round(-0.5 * (low + high), 9)])
 
     axis = np.radians(camera.tilt_axis_deg)
-    tilted = _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))[:, :2] @ planar
-    pose = np.column_stack([tilted, [0.0, 0.0, focal]])
+    tilted = (
+        _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))[:, :2] @ planar
+    )
+    pose = tilted @ from_middle + np.outer([0.0, 0.0, focal], [0.0, 0.0, 1.0])
     intrinsics = np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
-    return np.asarray(intrinsics @ pose / focal, dtype=np.float64)
+    h = intrinsics @ pose
+    return np.asarray(h / h[2, 2], dtype=np.float64)
 
 
 def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """Rotation matrix about a unit axis (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))
 
 
 def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -93,8 +98,9 @@ def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float
     depth = h[2, 0] * x + h[2, 1] * y + h[2, 2]
     if not np.all(depth > 1e-3):
         raise SceneError(
-            "a part of the pattern lies behind the camera; take a smaller tilt_deg, a smaller pitch_px or a larger focal_px"
+            "a part of the pattern lies behind the camera; "
+            "take a smaller tilt_deg, a smaller pitch_px or a larger focal_px"
         )
     u = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
     v = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
-    return np.stack([u, v], axis=-1)
+    return np.asarray(np.stack([u, v], axis=-1), dtype=np.float64)

@@ -2,14 +2,15 @@
 
 The coverage that a spline at (i, j) sees is, by Green's theorem, a sum over the polygon's edges:
 
-    integral over the polygon of B(u - i) B(v - j)  =  contour integral of [integral of B from -inf to u - i] B(v - j) dv
+    integral over the polygon of B(u - i) B(v - j) du dv  =  contour integral of C(u - i) B(v - j) dv,
 
-Font rasterisers do this with boxes (signed-area accumulation). As there, differences along the row are accumulated,
-which touch only the few samples around the edge, and one cumulative sum restores the coverage. Along an edge's piece
-inside one sample cell the integrand is a polynomial of degree 2 * degree + 1, which Gauss-Legendre quadrature with
-degree + 1 points integrates exactly. Nothing is approximated but for rounding (about 1e-6).
+C the integral of B from -infinity. Font rasterisers do this with boxes (signed-area accumulation). As
+there, differences along the row are accumulated, which touch only the few samples around the edge, and one
+cumulative sum restores the coverage. Along an edge's piece inside one sample cell the integrand is a
+polynomial of degree 2 * degree + 1, which Gauss-Legendre quadrature with degree + 1 points integrates
+exactly. Nothing is approximated but for rounding (about 1e-6).
 
-This module holds the preparation and the engine in plain numpy; ``coverage_compiled`` holds the same steps as loops.
+This module holds the preparation and the engine in plain numpy; ``coverage_compiled`` the same as loops.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ class Task:
     """What an engine needs.
 
     Attributes:
-        segments: (N, 4) float64 u0, v0, u1, v1 in samples; sample (0, 0) is the first one that any pixel uses and
-            splines have their knots at integers.
+        segments: (N, 4) float64 u0, v0, u1, v1 in samples; sample (0, 0) is the first that any pixel uses,
+            and the splines' knots are the integers.
         owner: (N,) int64.
-        values: (polygons, planes) float64, what a fully covered sample shows, signed by the polygon's orientation.
+        values: (polygons, planes) float64, what a fully covered sample shows, signed by orientation.
         columns, rows: samples that the image uses.
         spread: the point spread.
         width: pixels in a row.
@@ -94,7 +95,6 @@ def _engine(engine: Engine) -> Band:
 
 
 def _task(paths: Segments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread) -> Task:
-    width, height = size
     fine = spread.oversampling
     columns, rows = (fine * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
     xy = paths.xy_px
@@ -104,7 +104,7 @@ def _task(paths: Segments, values: NDArray[np.float64], size: tuple[int, int], s
     cut, owner = _cut(fine * xy + shift, paths.owner, columns, rows)
     nodes, weights = np.polynomial.legendre.leggauss(spread.degree + 1)
     quadrature = np.stack([(nodes + 1) / 2, weights / 2])
-    return Task(cut, owner, values * -np.sign(area)[:, None], columns, rows, spread, width, quadrature)
+    return Task(cut, owner, values * -np.sign(area)[:, None], columns, rows, spread, size[0], quadrature)
 
 
 def _cut(
@@ -112,7 +112,7 @@ def _cut(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Drop what lies above, below or right of the samples; push what lies left of them onto their margin.
 
-    An edge left of all samples counts fully in every one of them, wherever it is; one to the right counts in none.
+    An edge left of all samples counts fully in every one of them; one to the right counts in none.
     """
     margin = 4.0
     low, high = -margin, columns + margin
@@ -125,8 +125,12 @@ def _cut(
     start, step = uv[:, :2], uv[:, 2:] - uv[:, :2]
     with np.errstate(divide="ignore", invalid="ignore"):
         crossings = np.stack(
-            [(low - start[:, 0]) / step[:, 0], (high - start[:, 0]) / step[:, 0]]
-            + [(-margin - start[:, 1]) / step[:, 1], (rows + margin - start[:, 1]) / step[:, 1]]
+            [
+                (low - start[:, 0]) / step[:, 0],
+                (high - start[:, 0]) / step[:, 0],
+                (-margin - start[:, 1]) / step[:, 1],
+                (rows + margin - start[:, 1]) / step[:, 1],
+            ]
         )
     crossings = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
     t = np.concatenate([np.zeros((1, len(uv))), np.sort(crossings, axis=0), np.ones((1, len(uv)))])
@@ -151,7 +155,9 @@ def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
 def _filtered(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
     """The point spread's weights along the last axis, one result a pixel."""
     windows = np.lib.stride_tricks.sliding_window_view(samples, len(spread.weights), axis=-1)
-    return np.asarray(windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64))
+    return np.asarray(
+        windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64)
+    )
 
 
 def _accumulate(task: Task, top: int, rows: int, degree: int) -> NDArray[np.float64]:
@@ -198,7 +204,7 @@ def _split(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _basis(t: NDArray[np.float64], degree: int) -> list[NDArray[np.float64]]:
-    """Values of the degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
+    """The degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
     values = [np.ones_like(t)]
     for d in range(1, degree + 1):
         below = [np.zeros_like(t), *values, np.zeros_like(t)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 import numpy as np
@@ -16,8 +16,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def _compiled(function: Function) -> Function:
-    compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
-    return compiled
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+    return cast(Function, numba.njit(**options)(function))
 
 
 def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
@@ -32,14 +32,25 @@ def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
 
 
 @_compiled
-def _basis(t: float, degree: int, values: NDArray[np.float64]) -> None:
-    """Values of the degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
-    values[0] = 1.0
-    for d in range(1, degree + 1):
-        values[d] = t * values[d - 1] / d
-        for r in range(d - 1, 0, -1):
-            values[r] = ((t + d - r) * values[r - 1] + (1.0 - t + r) * values[r]) / d
-        values[0] = (1.0 - t) * values[0] / d
+def _cubic(t: float) -> tuple[float, float, float, float]:
+    """The four cubic B-splines that reach a knot interval, at the fraction t, leftmost first."""
+    s = 1.0 - t
+    tt, ss = t * t, s * s
+    return ss * s / 6, (4 - 6 * tt + 3 * tt * t) / 6, (4 - 6 * ss + 3 * ss * s) / 6, tt * t / 6
+
+
+@_compiled
+def _quartic(t: float) -> tuple[float, float, float, float, float]:
+    """The five quartic B-splines that reach a knot interval, by one more step of the recursion."""
+    a, b, c, d = _cubic(t)
+    s = 1.0 - t
+    return (
+        s * a / 4,
+        ((3 + t) * a + (1 + s) * b) / 4,
+        ((2 + t) * b + (2 + s) * c) / 4,
+        ((1 + t) * c + (3 + s) * d) / 4,
+        t * d / 4,
+    )
 
 
 @_compiled
@@ -55,7 +66,6 @@ def _accumulate(
     """Add every segment's differences along the rows to the band that starts at sample row ``top``."""
     planes, rows, columns = differences.shape
     half = degree // 2
-    across, along = np.empty(degree + 2), np.empty(degree + 1)
     patch = np.empty((degree + 1, degree + 2))
     for s in range(len(segments)):
         u0, v0, u1, v1 = segments[s]
@@ -84,10 +94,14 @@ def _accumulate(
                 for k in range(quadrature.shape[1]):
                     at = t + quadrature[0, k] * (end - t)
                     share = quadrature[1, k] * (end - t) * dv
-                    _basis(u0 + at * du - cell_u, degree + 1, across)
-                    _basis(v0 + at * dv - cell_v, degree, along)
-                    for j in range(degree + 1):
-                        for i in range(degree + 2):
+                    u, v = u0 + at * du - cell_u, v0 + at * dv - cell_v
+                    if degree == 0:
+                        patch[0, 0] += share * (1.0 - u)
+                        patch[0, 1] += share * u
+                        continue
+                    across, along = _quartic(u), _cubic(v)
+                    for j in range(4):
+                        for i in range(5):
                             patch[j, i] += share * along[j] * across[i]
                 for plane in range(planes):
                     value = values[owner[s], plane]

@@ -63,12 +63,14 @@ class Scratch:
         offset = xy_mm - start
         length = offset @ along
         aside = np.abs(offset @ np.array([-along[1], along[0]]))
-        return np.asarray((length >= 0) & (length <= np.linalg.norm(end - start)) & (aside <= 0.5 * self.width_mm))
+        return np.asarray(
+            (length >= 0) & (length <= np.linalg.norm(end - start)) & (aside <= 0.5 * self.width_mm)
+        )
 
 
 @dataclass(frozen=True)
 class Glare:
-    """A reflection fixed to the camera: adds ``strength`` (8-bit units) at its centre, falling as a Gaussian."""
+    """A reflection fixed to the camera: a Gaussian spot adding ``strength`` (8-bit units) at its centre."""
 
     centre_px: tuple[float, float]
     sigma_px: float
@@ -96,7 +98,7 @@ class Damage:
 
     Attributes:
         missing_cells: numbers of cells drawn in black.
-        missing_share: share (0 to 1) of the other colored cells that fell out at random; the reference cell stays.
+        missing_share: share (0 to 1) of the other colored cells that fell out; the reference cell stays.
         blobs, scratches, glare: see there.
         bleed_mm: every ink's side runs outward, by a random distance from 0 to this.
     """
@@ -133,7 +135,7 @@ def missing(damage: Damage, layout: Layout, rng: np.random.Generator) -> NDArray
 
 
 def bled(polygons_mm: Points, bleed_mm: float, rng: np.random.Generator) -> Points:
-    """Polygons (K, n, 2), counter-clockwise, whose every side moved outward by a random distance up to ``bleed_mm``."""
+    """Counter-clockwise polygons (K, n, 2), every side moved outward by a random distance to ``bleed_mm``."""
     along = np.roll(polygons_mm, -1, axis=1) - polygons_mm
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     outward = np.stack([along[..., 1], -along[..., 0]], axis=-1)

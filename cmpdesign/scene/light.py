@@ -33,7 +33,7 @@ class Light:
 
     Attributes:
         rgb: the ambient light's gain for each channel; (1, 1, 1) shows the inks as they are.
-        gradient: relative change of the ambient light from the image's centre to its right and to its upper side.
+        gradient: relative change of the ambient light from the centre to the right and to the upper side.
         vignetting: relative loss in the image's corners, falling with the square of the distance; 0 to 1.
         leds: further lights at the rim.
     """

@@ -1,4 +1,4 @@
-"""Closed polygons of the layout as straight segments in the image, fine enough where the surface curves them."""
+"""Closed polygons of the layout as straight segments in the image, finer where the surface curves them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def join(parts: list[Segments]) -> Segments:
 def segments(polygons_mm: Points, image_from_layout: Callable[[Points], Points], curved: bool) -> Segments:
     """Map polygons (K, n, 2) mm to the image; ``curved``: straight sides do not stay straight there.
 
-    A curved side is cut into equal pieces in the layout until every chord lies within ``CHORD_PX`` of the curve.
+    A curved side is cut into pieces, equal in the layout, until chords are within ``CHORD_PX`` of the curve.
     """
     start = polygons_mm.reshape(-1, 2)
     end = np.roll(polygons_mm, -1, axis=1).reshape(-1, 2)
@@ -72,7 +72,9 @@ def _pieces(start: Points, end: Points, image_from_layout: Callable[[Points], Po
         more = np.ceil(pieces[open_sides] * np.sqrt(np.minimum(error / CHORD_PX, 64.0)) * 1.05)
         pieces[open_sides] = more.astype(np.int64)
         if pieces.max(initial=0) > MAX_PIECES:
-            raise SceneError("the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map")
+            raise SceneError(
+                "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
+            )
     return pieces
 
 

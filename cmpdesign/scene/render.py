@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cmpdesign.layout import BLACK
 from cmpdesign.scene.camera import homography, is_mirrored, pitch_mm, project
 from cmpdesign.scene.coverage import Engine, coverage
-from cmpdesign.scene.damage import Damage, bled, missing
+from cmpdesign.scene.damage import Blob, Damage, Scratch, bled, missing
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import gain
 from cmpdesign.scene.optics import point_spread
@@ -54,7 +54,7 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     if min(size) < 1:
         raise SceneError(f"size is {size[0]} x {size[1]}; it must be at least 1 x 1 px")
     view = look(scene, size)
-    gone = _gone(scene)
+    gone = missing_cells(scene)
     planes = _pattern(scene, view, gone, size, engine)
     if scene.damage and (scene.damage.blobs or scene.damage.scratches):
         planes = _with_dirt(planes, scene.damage, scene.blur_px, view, size, engine)
@@ -64,6 +64,11 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
         planes = planes + glare.plane(size)
     image = expose(scene.sensor or Sensor(), planes, _rng(scene, NOISE))
     return Rendered(image, _truth(scene, view, gone, size))
+
+
+def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
+    """The truth of ``render`` without its image."""
+    return _truth(scene, look(scene, size), missing_cells(scene), size)
 
 
 def look(scene: Scene, size: tuple[int, int]) -> View:
@@ -85,13 +90,16 @@ def _rng(scene: Scene, stream: int) -> np.random.Generator:
     return np.random.default_rng([scene.seed, stream])
 
 
-def _gone(scene: Scene) -> NDArray[np.bool_]:
+def missing_cells(scene: Scene) -> NDArray[np.bool_]:
+    """(C,) bool: the cells that fell out of this scene's pattern."""
     if scene.damage is None:
         return np.zeros(len(scene.layout.cell_color), dtype=np.bool_)
     return missing(scene.damage, scene.layout, _rng(scene, MISSING))
 
 
-def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, int], engine: Engine) -> Planes:
+def _pattern(
+    scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, int], engine: Engine
+) -> Planes:
     """Ground over background, inks over ground: (3, H, W), B, G, R, blurred."""
     layout = scene.layout
     drawn = np.flatnonzero((layout.cell_color != BLACK) & ~gone)
@@ -104,7 +112,9 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int,
 
     # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
     black = _bgr(scene.ink(BLACK))
-    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(-1, 3)
+    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
+        -1, 3
+    )
     values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
     values[0, 3] = 1.0
     values[1:, :3] = over_black
@@ -137,7 +147,7 @@ def _with_dirt(
     planes: Planes, damage: Damage, blur_px: float, view: View, size: tuple[int, int], engine: Engine
 ) -> Planes:
     """Blobs and scratches over the pattern; where they overlap, they mix."""
-    spots = [*damage.blobs, *damage.scratches]
+    spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
     outlines: list[Segments] = [
         segments(spot.polygon()[None], view.image_from_layout, view.curved) for spot in spots
     ]
@@ -171,7 +181,7 @@ def _truth(scene: Scene, view: View, gone: NDArray[np.bool_], size: tuple[int, i
 
 
 def _cell_samples(scene: Scene) -> Points:
-    """(C, samples, 2) mm: points spread over every cell, halfway from its centre to corners and sides, and the centre."""
+    """(C, samples, 2) mm: every cell's centre, and points towards its corners and sides."""
     corners = scene.layout.marker_xy_mm[scene.layout.cell_corners]
     centre = corners.mean(axis=1, keepdims=True)
     rim = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
@@ -183,7 +193,8 @@ def _covered(scene: Scene, view: View, xy_mm: Points) -> NDArray[np.bool_]:
     covered = np.zeros(xy_mm.shape[:2], dtype=np.bool_)
     if scene.damage is None:
         return covered
-    for spot in (*scene.damage.blobs, *scene.damage.scratches):
+    spots: list[Blob | Scratch] = [*scene.damage.blobs, *scene.damage.scratches]
+    for spot in spots:
         covered |= spot.covers(xy_mm)
     if scene.damage.glare:
         xy_px = view.image_from_layout(xy_mm.reshape(-1, 2)).reshape(xy_mm.shape)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.scene.errors import SceneError
+
+Depth = TypeVar("Depth", np.uint8, np.uint16)
 
 
 @dataclass(frozen=True)
@@ -34,26 +37,30 @@ class Sensor:
         if self.bits not in (8, 16):
             raise SceneError(f"bits is {self.bits}; it must be 8 or 16")
         if self.jpeg_quality is not None and not (1 <= self.jpeg_quality <= 100 and self.bits == 8):
-            raise SceneError(f"jpeg_quality is {self.jpeg_quality} at {self.bits} bits; it must be 1 to 100, at 8 bits")
+            raise SceneError(
+                f"jpeg_quality is {self.jpeg_quality} at {self.bits} bits; it must be 1 to 100, at 8 bits"
+            )
 
 
 def expose(
     sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Planes (3, H, W) in 8-bit units, B, G, R -> the image (H, W, 3)."""
-    image = np.ascontiguousarray(planes.transpose(1, 2, 0))
+    light = planes
     if sensor.noise:
-        grain = rng.standard_normal(image.shape, dtype=np.float32)
-        grain *= np.float32(sensor.noise)
-        image += grain
+        light = rng.standard_normal(planes.shape, dtype=np.float32)
+        light *= np.float32(sensor.noise)
+        light += planes
     if sensor.gamma != 1.0:
-        image = 255 * np.power(np.maximum(image, 0) / 255, np.float32(sensor.gamma), dtype=np.float32)
+        light = 255 * np.power(np.maximum(light, 0) / 255, np.float32(sensor.gamma), dtype=np.float32)
     if sensor.bits == 16:
-        return np.asarray(np.clip(np.rint(image * 257), 0, 65535), dtype=np.uint16)
-    np.rint(image, out=image)
-    np.clip(image, 0, 255, out=image)
-    eight = image.astype(np.uint8)
+        return _interleaved(np.clip(np.rint(light * 257), 0, 65535).astype(np.uint16))
+    eight = _interleaved(np.clip(np.rint(light), 0, 255).astype(np.uint8))
     return eight if sensor.jpeg_quality is None else _jpeg(eight, sensor.jpeg_quality)
+
+
+def _interleaved(planes: NDArray[Depth]) -> NDArray[Depth]:
+    return np.ascontiguousarray(planes.transpose(1, 2, 0))
 
 
 def _jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:

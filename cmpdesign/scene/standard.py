@@ -24,9 +24,9 @@ STANDARD_LAYERS = 11
 def standard_layout(pattern: str = "honeycomb", layers: int = STANDARD_LAYERS) -> Layout:
     """The pattern of the standard scene."""
     from cmpdesign.build import build_layout
-    from cmpdesign.design import Design
+    from cmpdesign.design import load_design
 
-    return build_layout(Design(pattern=pattern, layers=layers, pitch_mm=1.0))
+    return build_layout(load_design(pattern, {"layers": str(layers), "pitch_mm": "1.0"}))
 
 
 def standard_scene(layout: Layout | None = None, *, seed: int = 0) -> Scene:

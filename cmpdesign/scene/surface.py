@@ -48,7 +48,7 @@ class Press:
 
     def __call__(self, xy_mm: Points, /) -> Points:
         offset, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
-        return xy_mm + self.depth_mm * np.exp(0.5) * bell * offset
+        return np.asarray(xy_mm + self.depth_mm * np.exp(0.5) * bell * offset)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Shear:
 
     def __call__(self, xy_mm: Points, /) -> Points:
         _, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
-        return xy_mm + bell * np.asarray(self.shift_mm)
+        return np.asarray(xy_mm + bell * np.asarray(self.shift_mm))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -48,7 +47,7 @@ def save_truth(truth: Truth, path: str | Path) -> Path:
     try:
         with beside.open("wb") as file:
             np.savez_compressed(file, **{name: value for name, value in columns.items() if value is not None})
-        os.replace(beside, path)
+        beside.replace(path)
     except OSError as error:
         beside.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror or error}; choose another place") from error
