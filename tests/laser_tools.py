@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,10 +43,12 @@ class Burn:
     """What a program did.
 
     burnt: (x0, y0, x1, y1, S) of every straight move with the beam on; dark: the same of every other move.
+    starts: how many moves had been burnt at each dark one. pauses: the same at each M0.
     """
 
     burnt: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     dark: list[tuple[float, float, float, float]] = field(default_factory=list)
+    starts: list[int] = field(default_factory=list)
     feeds: set[float] = field(default_factory=set)
     pauses: list[int] = field(default_factory=list)
     ended_dark: bool = False
@@ -102,6 +105,7 @@ def run_gcode(text: str, s_max: float = 1000.0) -> Burn:
                 burn.burnt.append((x, y, *new, modes["S"]))
             else:
                 burn.dark.append((x, y, *new))
+                burn.starts.append(len(burn.burnt))
             x, y = new
     return burn
 
@@ -137,15 +141,10 @@ def filled(covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def groups_of(burn: Burn) -> list[Points]:
-    """Burnt segments of each uninterrupted stroke."""
-    strokes: list[list[tuple[float, ...]]] = []
-    last: tuple[float, float] | None = None
-    for x0, y0, x1, y1, _ in burn.burnt:
-        if last != (x0, y0):
-            strokes.append([])
-        strokes[-1].append((x0, y0, x1, y1))
-        last = x1, y1
-    return [np.array(stroke) for stroke in strokes]
+    """Burnt segments between two dark moves."""
+    bounds = [*burn.starts, len(burn.burnt)]
+    parts = [burn.segments[start:end] for start, end in pairwise(bounds)]
+    return [part for part in parts if len(part)]
 
 
 def coupon_photo(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import OrderedDict
 from typing import Any
 
 from cmpdesign import __version__
@@ -17,15 +18,15 @@ def drawing_to_dxf(drawing: Drawing) -> str:
     """The walls of the passes, and the fiducials as circles on the layer T1, which is not plotted."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
-    from ezdxf.sections.classes import REQUIRED_CLASSES
 
     # No date and no random identifier: the same bytes for the same job.
     fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True
     try:
         document = new("R2010")
         # The library adds them in the order of a set, which differs from process to process.
-        for name in sorted(REQUIRED_CLASSES[document.dxfversion]):
-            document.classes.add_class(name)
+        classes = document.classes
+        classes.add_required_classes(document.dxfversion)
+        classes.classes = OrderedDict(sorted(classes.classes.items()))
         _header(document, drawing)
         space = document.modelspace()
         for one in drawing.passes:

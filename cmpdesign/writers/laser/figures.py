@@ -48,9 +48,10 @@ def timing(job: Job, one: Pass) -> Timing:
         begun, ended = begin_times_s(strokes, one.speed_mm_s, travel_speed, accel)
         back = np.hypot(*(strokes.xy_mm[0] - strokes.xy_mm[-1]))
         times = one.repeats / different
-        time_s += times * (ended + float(move_times_s(np.array([back]), travel_speed, accel)[0]))
+        returns = times - (repeat == 0)
+        time_s += times * ended + returns * float(move_times_s(np.array([back]), travel_speed, accel)[0])
         burn_mm += times * float(stroke_lengths_mm(strokes).sum())
-        travel_mm += times * float(travel_lengths_mm(strokes).sum()) + times * float(back)
+        travel_mm += times * float(travel_lengths_mm(strokes).sum()) + returns * float(back)
         if one.cavities is not None and repeat == 0:
             firsts = np.searchsorted(strokes.owner, np.arange(len(one.cavities.cell)))
             centres = one.cavities.nominal_mm.mean(axis=1)

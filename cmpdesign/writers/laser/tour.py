@@ -2,7 +2,7 @@
 
 A tour is found in three steps, which repeat until nothing gets shorter:
 
-1. nearest neighbours from the first cell, then 2-opt and Or-opt moves over each cell's nearest neighbours
+1. from nearest neighbours, from rows and from the given order: 2-opt and Or-opt moves over each cell's nearest neighbours
    (Bentley 1992), between the points where the cells are entered now;
 2. the best entry point of every cell for this order, all at once (dynamic programming along the tour);
 3. each cell is taken out and put where it lengthens the way least, at its best entry point.
@@ -44,11 +44,23 @@ def short_tour(entries_mm: Points) -> tuple[Ints, Ints]:
     count = len(entries_mm)
     if count < 3:
         return np.arange(count), best_entries(entries_mm, np.arange(count))
-    near = _neighbours(entries_mm.mean(axis=1))
-    order = _nearest_first(entries_mm.mean(axis=1))
-    _improve(order, entries_mm.mean(axis=1), near)
+    centre_mm = entries_mm.mean(axis=1)
+    near = _neighbours(centre_mm)
+    starts = (_nearest_first(centre_mm), np.arange(count), np.lexsort(centre_mm.T))
+    tours = [_shortened(start.astype(np.int64), entries_mm, near) for start in starts]
+    return min(tours, key=lambda tour: length_mm(entries_mm, *tour))
+
+
+def _shortened(order: Ints, entries_mm: Points, near: Ints) -> tuple[Ints, Ints]:
+    """A tour from a first order: never longer than that order at its best entry points."""
+    count = len(order)
     entry = best_entries(entries_mm, order)
     best = length_mm(entries_mm, order, entry)
+    trial = order.copy()
+    _improve(trial, entries_mm.mean(axis=1), near)
+    trial_entry = best_entries(entries_mm, trial)
+    if length_mm(entries_mm, trial, trial_entry) < best:
+        order, entry, best = trial, trial_entry, length_mm(entries_mm, trial, trial_entry)
     for _ in range(ROUNDS):
         trial = order.copy()
         points = np.empty((count, 2))
