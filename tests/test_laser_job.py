@@ -168,7 +168,7 @@ def test_orders() -> None:
         steps = np.arange(len(order), dtype=float)
         found[name] = length_mm(one.cavities.entries_mm, order, entry), shortest_pause(order, centres, steps)
     assert found["travel"][0] <= found["given"][0] < 0.5 * found["heat"][0]
-    assert found["heat"][1] >= 5 > found["travel"][1]
+    assert found["heat"][1] >= 4 > found["travel"][1] == 1
     assert order.tolist() == list(range(len(order)))
 
 

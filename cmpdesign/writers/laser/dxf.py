@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections import OrderedDict
+from itertools import pairwise
 from typing import Any
 
 from cmpdesign import __version__
@@ -11,6 +12,7 @@ from cmpdesign.writers.laser.drawing import Drawing
 from cmpdesign.writers.laser.palette import TOOL, Layer
 
 MILLIMETRES, METRIC = 4, 1
+_ENTITIES = "  0\nSECTION\n  2\nENTITIES\n"
 FIDUCIALS = "T1"
 
 
@@ -31,17 +33,35 @@ def drawing_to_dxf(drawing: Drawing) -> str:
         space = document.modelspace()
         for one in drawing.passes:
             _layer(document, one.name, drawing.layers[one.name])
-            attributes = {"layer": one.name}
-            for path in one.walls:
-                space.add_lwpolyline(path.tolist(), format="xy", close=True, dxfattribs=attributes)
         _layer(document, FIDUCIALS, TOOL).dxf.plot = 0
         for x, y in drawing.fiducials_mm.tolist():
             space.add_circle((x, y), drawing.fiducial_diameter_mm / 2, dxfattribs={"layer": FIDUCIALS})
+        polylines = _polylines(document, drawing)
         text = io.StringIO()
         document.write(text)
     finally:
         options.write_fixed_meta_data_for_testing = fixed
-    return text.getvalue()
+    before, entities, after = text.getvalue().partition(_ENTITIES)
+    return before + entities + polylines + after
+
+
+def _polylines(document: Any, drawing: Drawing) -> str:
+    """The walls as text for the section ENTITIES, with handles that the document leaves to them.
+
+    The library takes a tenth of a millisecond for every polyline and twice that to write it; a job has each cell
+    in two files.
+    """
+    handles, owner = document.entitydb.handles, document.modelspace().layout_key
+    number_of = int(str(handles), 16)
+    parts: list[str] = []
+    for one in drawing.passes:
+        points = [f" 10\n{x!r}\n 20\n{y!r}\n" for x, y in one.walls.xy_mm.tolist()]
+        for start, end in pairwise(one.walls.first.tolist()):
+            head = f"  0\nLWPOLYLINE\n  5\n{number_of:X}\n330\n{owner}\n100\nAcDbEntity\n  8\n{one.name}\n"
+            parts += [head, f"100\nAcDbPolyline\n 90\n{end - start}\n 70\n1\n", *points[start:end]]
+            number_of += 1
+    handles.reset(f"{number_of:X}")
+    return "".join(parts)
 
 
 def _header(document: Any, drawing: Drawing) -> None:
