@@ -28,7 +28,6 @@ from cmpdesign.writers.laser.order import ordered
 from cmpdesign.writers.laser.product import product
 from cmpdesign.writers.laser.strokes import loops
 from cmpdesign.writers.laser.svg import drawing_to_svg
-from cmpdesign.writers.laser.tour import length_mm
 
 VPYPE_HOME = Path(sys.prefix) / "vpype"
 PX_IN_MM = 96 / 25.4
@@ -76,11 +75,19 @@ def vpype_mm(job: Job, *options: str) -> tuple[float, float]:
     program = VPYPE_HOME / "bin" / "vpype"
     if not program.exists():
         venv.create(VPYPE_HOME, with_pip=True)
-        pip = [str(VPYPE_HOME / "bin" / "pip"), "install", "--quiet", "--disable-pip-version-check", "vpype==1.15.0"]
+        pip = [
+            str(VPYPE_HOME / "bin" / "pip"),
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "vpype==1.15.0",
+        ]
         subprocess.run(pip, check=True, capture_output=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cells.svg"
-        path.write_text(drawing_to_svg(replace(job_drawing(job), passes=tuple(map(as_in_layout, job.cell_passes)))))
+        path.write_text(
+            drawing_to_svg(replace(job_drawing(job), passes=tuple(map(as_in_layout, job.cell_passes))))
+        )
         started = time.perf_counter()
         command = [str(program), "read", str(path), "linesort", *options, "stat"]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -119,7 +126,12 @@ def formats() -> None:
         from cmpdesign.laser.library import machines
 
         text = machines()["co2-40w"].read_text()
-        machine.write_text(text.replace("value = 300.0", "value = 900.0").replace("value = 200.0, source = \"assumed: the common small", "value = 600.0, source = \"assumed: the common small"))
+        machine.write_text(
+            text.replace("value = 300.0", "value = 900.0").replace(
+                'value = 200.0, source = "assumed: the common small',
+                'value = 600.0, source = "assumed: the common small',
+            )
+        )
         for layers, limit in ((26, 3.0), (82, 30.0)):
             made = design(layers, laser__machine=str(machine), fiducials__count="3")
             layout = build_layout(made)
@@ -136,13 +148,23 @@ def formats() -> None:
 def areas() -> None:
     """Area against the nominal cell of 1.5 mm, what a corner loses, what is burnt beside."""
     print("\nas made at the front, honeycomb of 1.5 mm")
-    print(f"{'kerf mm':>9}{'corner':>10}{'area %':>10}{'corner lost um':>16}{'beside um':>11}{'web um':>9}{'web to filled um':>18}")
+    print(
+        f"{'kerf mm':>9}{'corner':>10}{'area %':>10}{'corner lost um':>16}{'beside um':>11}{'web um':>9}"
+        f"{'web to filled um':>18}"
+    )
     for kerf in (0.03, 0.05, 0.1, 0.16, 0.25):
         for corner in ("plain", "overcut"):
             job = job_of(design(4, laser__corner=corner, laser__kerf_mm=str(kerf), laser__taper_deg="0"))
             front = as_made(job)[1].front
-            lengths = [front.corner_loss_mm, front.burnt_beside_mm, front.web_mm or 0, front.web_to_filled_mm or 0]
-            row = "".join(f"{1000 * value:{width}.1f}" for value, width in zip(lengths, (16, 11, 9, 18), strict=True))
+            lengths = [
+                front.corner_loss_mm,
+                front.burnt_beside_mm,
+                front.web_mm or 0,
+                front.web_to_filled_mm or 0,
+            ]
+            row = "".join(
+                f"{1000 * value:{width}.1f}" for value, width in zip(lengths, (16, 11, 9, 18), strict=True)
+            )
             print(f"{kerf:9.2f}{corner:>10}{front.area_error_percent:+10.3f}{row}")
             assert abs(front.area_error_percent) < 0.6 or (corner == "plain" and kerf > 0.1)
 

@@ -21,12 +21,14 @@ PAGE = Path(__file__).parent.parent / "docs" / "laser.md"
 
 def test_the_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    commands = re.findall(r"^    cmpdesign (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    commands = re.findall(r"^(?:    |\$ )cmpdesign (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     assert len(commands) == 3
     for command in commands:
         if command.startswith("kerf"):
             piece = load_coupon("out/laser/coupon.json")
-            cv2.imwrite("scan.png", coupon_photo(piece, {patch.name: (0.15, 0.14) for patch in piece.patches}))
+            cv2.imwrite(
+                "scan.png", coupon_photo(piece, {patch.name: (0.15, 0.14) for patch in piece.patches})
+            )
         result = CliRunner().invoke(app, shlex.split(command))
         assert result.exit_code == 0, f"{command}: {result.output}"
     assert (tmp_path / "out" / "laser" / "5-outline.gcode").is_file()

@@ -25,7 +25,11 @@ from cmpdesign.writers.laser.lightburn import drawing_to_lightburn
 from cmpdesign.writers.laser.svg import drawing_to_svg
 
 WITH_OUTLINE = {"laser__outline": "true", "laser__passes": "2"}
-CASES = [("honeycomb", WITH_OUTLINE), ("square", {}), ("round", {"laser__corner": "plain", "laser__order": "heat"})]
+CASES = [
+    ("honeycomb", WITH_OUTLINE),
+    ("square", {}),
+    ("round", {"laser__corner": "plain", "laser__order": "heat"}),
+]
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -138,7 +142,9 @@ def test_lightburn(case: int) -> None:
 
 
 def test_lightburn_fills_a_hatched_pocket() -> None:
-    job = made_job(laser__mode="pocket", laser__hatch_mm="0.04", laser__hatch_deg="15", laser__hatch_turn_deg="60")
+    job = made_job(
+        laser__mode="pocket", laser__hatch_mm="0.04", laser__hatch_deg="15", laser__hatch_turn_deg="60"
+    )
     root = ElementTree.fromstring(drawing_to_lightburn(job_drawing(job)))
     settings = {item.find("name").get("Value"): item for item in root.iterfind("CutSetting")}  # type: ignore[union-attr]
     assert settings["1-red"].get("type") == "Scan+Cut" and settings["0-holes"].get("type") == "Cut"
@@ -181,7 +187,11 @@ def test_gcode_of_a_pocket_turns_its_lines() -> None:
     job = made_job(laser__mode="pocket", laser__passes="3", laser__hatch_turn_deg="60", layers="2")
     burn = run_gcode(drawing_to_gcode(job_drawing(job).only(job.passes[1])))
     lines = [stroke for stroke in groups_of(burn) if len(stroke) == 1]
-    angles = {round(np.degrees(np.arctan2(y1 - y0, x1 - x0)) % 180) % 180 for ((x0, y0, x1, y1),) in lines if np.hypot(x1 - x0, y1 - y0) > 0.2}
+    angles = {
+        round(np.degrees(np.arctan2(y1 - y0, x1 - x0)) % 180) % 180
+        for ((x0, y0, x1, y1),) in lines
+        if np.hypot(x1 - x0, y1 - y0) > 0.2
+    }
     assert angles == {0, 60, 120}
 
 

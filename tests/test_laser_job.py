@@ -40,7 +40,18 @@ def run(*arguments: object) -> Result:
 
 
 def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
-    result = run("build", "honeycomb", "-o", tmp_path, "--only", "laser", "--set", "layers=3", "--set", "laser.outline=true")
+    result = run(
+        "build",
+        "honeycomb",
+        "-o",
+        tmp_path,
+        "--only",
+        "laser",
+        "--set",
+        "layers=3",
+        "--set",
+        "laser.outline=true",
+    )
     assert result.exit_code == 0, result.output
     names = {path.name for path in (tmp_path / "laser").iterdir()}
     jobs = ["0-holes", "1-red", "2-green", "3-blue", "4-white", "5-outline", "job", "coupon"]
@@ -54,7 +65,14 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
     assert red["front"]["area_error_percent"] == pytest.approx(0, abs=1e-3)
     assert red["front"]["web_mm"] > 1 and red["back"]["web_mm"] > red["front"]["web_mm"]
     sheet = (tmp_path / "laser" / "job-sheet.html").read_text()
-    for text in ("Fill.", "Cure.", "2-green", f"{red['front']['corner_loss_mm']:.3f}", "T1", "CO2 tube, 40 W"):
+    for text in (
+        "Fill.",
+        "Cure.",
+        "2-green",
+        f"{red['front']['corner_loss_mm']:.3f}",
+        "T1",
+        "CO2 tube, 40 W",
+    ):
         assert text in sheet
     assert "<script" not in sheet and "http" not in sheet
 
@@ -63,7 +81,10 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
     ("settings_", "expected"),
     [
         (["laser.kerf_mm=1.2mm"], "that the kerf leaves nothing of: "),
-        (["laser.minimum_web_mm=2mm"], "smallest web of 1-red at the front: 1.35 mm, limit 2 mm; make pitch_mm larger"),
+        (
+            ["laser.minimum_web_mm=2mm"],
+            "smallest web of 1-red at the front: 1.35 mm, limit 2 mm; make pitch_mm larger",
+        ),
         (["layers=80", "pitch_mm=3"], "width of the job, on the bed: "),
         (["laser.x_mm=290"], "edge of the job beyond the bed's width: "),
         (["print_ids=true"], "a laser burns outlines only; leave print_ids out"),
@@ -71,11 +92,17 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
         (["laser.depth_mm=2mm"], "depth of the cavities in this material: 2 mm, limit 1 mm"),
         (["laser.speed_mm_s=900"], "speed: 900 mm/s, limit 400 mm/s"),
         (["laser.mode=pocket", "laser.hatch_mm=0.2"], "ridges stay between the lines"),
-        (["fiducials.gap_mm=0", "fiducials.diameter_mm=0.5"], "fiducial hole and the pattern: 0.104 mm, limit 0.3 mm"),
+        (
+            ["fiducials.gap_mm=0", "fiducials.diameter_mm=0.5"],
+            "fiducial hole and the pattern: 0.104 mm, limit 0.3 mm",
+        ),
         (["laser.face=back", "laser.taper_deg=4"], "into cured cells"),
         (["laser.machine=co2-40"], "no such machine (did you mean co2-40w?)"),
         (["laser.material=silicon-black"], "did you mean silicone-black?"),
-        (["laser.machine=diode-blue-10w", "laser.material=pdms"], "has no settings for it, only for co2-40w, uv-5w"),
+        (
+            ["laser.machine=diode-blue-10w", "laser.material=pdms"],
+            "has no settings for it, only for co2-40w, uv-5w",
+        ),
         (["laser.kerf_mm=0.1", "laser.kerf_x_mm=0.1"], "fix the kerf twice"),
         (["laser.corner=round"], "laser.corner = 'round' must be 'plain' or 'overcut'"),
         (["laser.cornr=plain"], "laser.cornr is unknown (did you mean corner?)"),
@@ -133,7 +160,9 @@ def test_own_machine_and_material_files(tmp_path: Path) -> None:
     material.write_text(materials()["pdms"].read_text().replace("taper_deg", "tapr_deg"))
     machine.write_text(machines()["co2-40w"].read_text())
     result = run("build", "tac3d", "-o", tmp_path, "--only", "laser", *flags)
-    assert result.exit_code == 2 and ("taper_deg is missing" in result.stderr or "did you mean taper_deg" in result.stderr)
+    assert result.exit_code == 2 and (
+        "taper_deg is missing" in result.stderr or "did you mean taper_deg" in result.stderr
+    )
 
 
 @settings(max_examples=25, deadline=None)
@@ -153,7 +182,11 @@ def test_a_small_tour_is_the_shortest() -> None:
     for _ in range(5):
         entries = rng.uniform(0, 10, (6, 1, 2)) + rng.uniform(-0.5, 0.5, (6, 2, 2))
         order, entry = short_tour(entries)
-        ways = [length_mm(entries, np.array(p), np.array(q)) for p in permutations(range(6)) for q in product(range(2), repeat=6)]
+        ways = [
+            length_mm(entries, np.array(p), np.array(q))
+            for p in permutations(range(6))
+            for q in product(range(2), repeat=6)
+        ]
         assert length_mm(entries, order, entry) <= 1.12 * min(ways)
 
 
@@ -205,21 +238,30 @@ def drawn_from_gcode(job: Job) -> str:
             rim = shapely.buffer(line, 1.0, quad_segs=16).exterior
             shapes.append(path(shapely.get_coordinates(rim) * radii, inks[COLORS[one.color]]))
     width, height = high - low
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">'
+    size = f'width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
     return head + "".join(shapes) + "</svg>"
 
 
 def seen(svg: str, job: Job) -> tuple[Points, Points, int]:
     """Extracted and true marker places in px of a rendered drawing, and how many ids are wrong."""
-    png = resvg_py.svg_to_bytes(svg_string=svg, dpi=int(25.4 * PX_PER_MM), skip_system_fonts=True, background="#808080")
+    png = resvg_py.svg_to_bytes(
+        svg_string=svg, dpi=int(25.4 * PX_PER_MM), skip_system_fonts=True, background="#808080"
+    )
     image = cv2.imdecode(np.frombuffer(bytes(png), np.uint8), cv2.IMREAD_COLOR)
     pad = 40
-    image = cv2.GaussianBlur(cv2.copyMakeBorder(image, *[pad] * 4, cv2.BORDER_CONSTANT, value=(128, 128, 128)), (0, 0), 1.0)
+    image = cv2.GaussianBlur(
+        cv2.copyMakeBorder(image, *[pad] * 4, cv2.BORDER_CONSTANT, value=(128, 128, 128)), (0, 0), 1.0
+    )
     layout = job.layout
     markers = Extractor(parse_layout(layout_to_json(layout))).extract(image)
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     scale = int(25.4 * PX_PER_MM) / 25.4
-    true = np.column_stack([layout.marker_xy_mm[:, 0] - low[0], high[1] - layout.marker_xy_mm[:, 1]]) * scale + pad - 0.5
+    true = (
+        np.column_stack([layout.marker_xy_mm[:, 0] - low[0], high[1] - layout.marker_xy_mm[:, 1]]) * scale
+        + pad
+        - 0.5
+    )
     measured = np.isfinite(markers.xy_px).all(axis=1)
     assert measured[layout.present].mean() > 0.99
     away = np.hypot(*(markers.xy_px - true)[measured].T)

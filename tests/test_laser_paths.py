@@ -87,7 +87,10 @@ def test_three_corners_lose_what_the_formula_says() -> None:
         assert lost[0] == pytest.approx(2.0546 * radius**2, rel=1e-3)
 
 
-@pytest.mark.parametrize(("corner", "kerf_mm"), [("plain", 0.03), ("plain", 0.1), ("overcut", 0.03), ("overcut", 0.1), ("overcut", 0.25)])
+@pytest.mark.parametrize(
+    ("corner", "kerf_mm"),
+    [("plain", 0.03), ("plain", 0.1), ("overcut", 0.03), ("overcut", 0.1), ("overcut", 0.25)],
+)
 @pytest.mark.parametrize("name", ["honeycomb", "round"])
 def test_areas_are_nominal(name: str, corner: str, kerf_mm: float) -> None:
     """Within 0.6 % of the nominal cells of 1.5 mm: plain up to 0.1 mm, overcut up to 0.25 mm of kerf."""
@@ -96,12 +99,17 @@ def test_areas_are_nominal(name: str, corner: str, kerf_mm: float) -> None:
         assert abs(one.front.area_error_percent) < 0.6
     if name == "honeycomb" and corner == "plain":
         wider = made_job(name, laser__corner=corner, laser__kerf_mm="0.25", laser__depth_mm="0.2mm")
-        assert as_made(wider)[0].front.area_error_percent == pytest.approx(-100 * 2.0546 * 0.125**2 / 0.97428, rel=1e-3)
+        assert as_made(wider)[0].front.area_error_percent == pytest.approx(
+            -100 * 2.0546 * 0.125**2 / 0.97428, rel=1e-3
+        )
 
 
 def test_corner_losses_are_as_stated() -> None:
     """Up to half a kerf of a 60 degree corner by plain paths, about two thirds of that with spurs."""
-    plain, spurred = (as_made(made_job(laser__corner=c, laser__kerf_mm="0.2", laser__depth_mm="0.1"))[0].front for c in ("plain", "overcut"))
+    plain, spurred = (
+        as_made(made_job(laser__corner=c, laser__kerf_mm="0.2", laser__depth_mm="0.1"))[0].front
+        for c in ("plain", "overcut")
+    )
     assert plain.corner_loss_mm == pytest.approx(0.1, abs=1e-6)
     assert spurred.corner_loss_mm == pytest.approx(0.1 * (1 - 0.34858), abs=1e-5)
     assert plain.burnt_beside_mm == 0
@@ -113,7 +121,9 @@ def test_corner_losses_are_as_stated() -> None:
     [((0.03, 0.03), "plain"), ((0.16, 0.12), "plain"), ((0.1, 0.13), "overcut"), ((0.25, 0.25), "overcut")],
     ids=str,
 )
-def test_predictions_agree_with_a_raster_sweep_of_the_gcode(kerf_mm: tuple[float, float], corner: str) -> None:
+def test_predictions_agree_with_a_raster_sweep_of_the_gcode(
+    kerf_mm: tuple[float, float], corner: str
+) -> None:
     """Area within 0.5 % and webs within 3 micrometres, at both faces, of pixels of 2 micrometres."""
     kerf = {"laser__kerf_x_mm": str(kerf_mm[0]), "laser__kerf_y_mm": str(kerf_mm[1])}
     job = made_job(laser__corner=corner, layers="2", laser__depth_mm="0.2", laser__taper_deg="1", **kerf)
@@ -172,7 +182,10 @@ def test_hatches_clear_the_pocket_and_stay_inside(angle_deg: float) -> None:
         assert burnt.area * beam.area_factor == pytest.approx(burnt_areas_mm2(made, beam)[cell], rel=1e-3)
         # No ridge stays, and lines run to and fro.
         assert not burnt.interiors
-        directions = np.array([line[1] - line[0] for line in segments]) @ [np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))]
+        directions = np.array([line[1] - line[0] for line in segments]) @ [
+            np.cos(np.radians(angle_deg)),
+            np.sin(np.radians(angle_deg)),
+        ]
         assert (directions[:-1] * directions[1:] < 0).all()
 
 
@@ -191,7 +204,12 @@ def test_rings_clear_the_pocket_from_the_inside_out() -> None:
 
 def test_an_outline_is_cut_from_outside() -> None:
     beam = Beam.of_kerf(0.2, 0.1)
-    star = np.array([(np.cos(a) * r, np.sin(a) * r) for a, r in zip(np.linspace(0, 2 * np.pi, 10, endpoint=False), [5, 3] * 5, strict=True)])
+    star = np.array(
+        [
+            (np.cos(a) * r, np.sin(a) * r)
+            for a, r in zip(np.linspace(0, 2 * np.pi, 10, endpoint=False), [5, 3] * 5, strict=True)
+        ]
+    )
     (path,) = outset_outline(star, beam)
     burnt = shapely.buffer(shapely.LinearRing(beam.units(path)), 1.0, quad_segs=64)
     pad = shapely.Polygon(beam.millimetres(shapely.get_coordinates(burnt.interiors[0])))

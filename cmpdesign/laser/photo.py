@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,7 +197,8 @@ def _tried(
     rest = [i for i in range(len(alike)) if i not in four]
     if not rest or not np.isfinite(rims).all() or min(wide.min(), high.min()) <= 1:
         return None
-    away = np.hypot(*(alike[rest, :2] - _projected(image_from_coupon, marks[4:])).T)
+    fifth = _projected(image_from_coupon, marks[4:])
+    away = np.linalg.norm(np.subtract(alike[rest, :2], fifth), axis=1)
     five = alike[[*four, rest[int(away.argmin())]]]
     measured = np.sqrt(4 * five[:, 2] / np.pi)
     stretch = max(np.abs(np.log(measured / np.sqrt(wide * high)))) + max(np.abs(np.log(wide / high)))
@@ -206,7 +208,7 @@ def _tried(
     return float(place + stretch), five[:, :2]
 
 
-def _projected(homography: Values, points: Values) -> Values:
+def _projected(homography: NDArray[Any], points: Values) -> Values:
     lifted = np.column_stack([points, np.ones(len(points))]) @ homography.T
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(lifted[:, :2] / lifted[:, 2:])
@@ -238,7 +240,7 @@ def _centroid(gray: NDArray[np.float32], centre: Values, radius: float) -> Value
     away = np.hypot(columns - centre[0], rows - centre[1])
     ground = float(np.median(part[(away > 1.25 * radius) & (away < 1.5 * radius)]))
     weight = np.where(away < 1.25 * radius, part - ground, 0)
-    return np.array([(weight * columns).sum(), (weight * rows).sum()]) / weight.sum()
+    return np.asarray(np.array([(weight * columns).sum(), (weight * rows).sum()]) / weight.sum())
 
 
 def _inside(coupon: Coupon, gray: NDArray[np.float32], to_image: Map) -> Map:

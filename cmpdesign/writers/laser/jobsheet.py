@@ -17,7 +17,8 @@ body { font: 10.5pt/1.4 system-ui, sans-serif; color: #1c1a18; max-width: 182mm;
 h1 { font-size: 18pt; margin: 0 } h2 { font-size: 12.5pt; margin: 7mm 0 2mm; border-bottom: .3mm solid #1c1a18 }
 p { margin: 1.5mm 0 } table { border-collapse: collapse; width: 100% } .facts td:first-child { width: 42mm }
 td, th { text-align: left; padding: .9mm 2mm; border-bottom: .15mm solid #bbb; vertical-align: top }
-th { font-weight: 600 } td.n, th.n, td b { white-space: nowrap } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums }
+th { font-weight: 600 } td.n, th.n, td b { white-space: nowrap }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums }
 .passes { display: grid; grid-template-columns: 1fr 1fr; gap: 6mm } .pass { break-inside: avoid }
 .pass h3 { margin: 0 0 1mm; font-size: 11pt } .pass svg { width: 100%; max-height: 78mm; background: #f4f2ee }
 .warn { border: .5mm solid #b3261e; padding: 2mm 3mm; margin: 3mm 0 } .box { font-size: 12pt }
@@ -188,8 +189,8 @@ def _made(figures: tuple[PassFigures, ...]) -> str:
         faces = [("front", one.front)] + ([("back", one.back)] if one.back else [])
         rows += [_made_row(one.name if name == "front" else "", name, face) for name, face in faces]
     return (
-        f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to filled "
-        "cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
+        f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to "
+        "filled cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
     )
 
 
@@ -203,7 +204,8 @@ def _made_row(name: str, where: str, face: FaceFigures) -> str:
 
 def _registration(job: Job) -> str:
     if not len(job.fiducials_mm):
-        return '<div class="warn">This design has no fiducials (fiducials.count = 0): do not move the pad between passes.</div>'
+        text = "This design has no fiducials (fiducials.count = 0): do not move the pad between passes."
+        return f'<div class="warn">{text}</div>'
     diameter = f"{job.layout.fiducial_diameter_mm:g} mm"
     rows = "".join(
         f"<tr><td>{number}</td><td class=n>{x:.3f}</td><td class=n>{y:.3f}</td></tr>"

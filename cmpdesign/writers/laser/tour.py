@@ -2,8 +2,8 @@
 
 A tour is found in three steps, which repeat until nothing gets shorter:
 
-1. from nearest neighbours, from rows and from the given order: 2-opt and Or-opt moves over each cell's nearest neighbours
-   (Bentley 1992), between the points where the cells are entered now;
+1. from nearest neighbours, from rows and from the given order: 2-opt and Or-opt moves over each cell's nearest
+   neighbours (Bentley 1992), between the points where the cells are entered now;
 2. the best entry point of every cell for this order, all at once (dynamic programming along the tour);
 3. each cell is taken out and put where it lengthens the way least, at its best entry point.
 
