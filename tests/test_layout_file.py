@@ -60,7 +60,8 @@ def test_the_text_is_deterministic_and_one_column_a_line() -> None:
     text = layout_to_json(layout())
     assert text == layout_to_json(layout())
     assert text.endswith("}\n")
-    assert sum('"x": [' in line and line.rstrip(",").endswith("]") for line in text.splitlines()) == 1
+    # The markers' and the fiducials'.
+    assert sum('"x": [' in line and line.rstrip(",").endswith("]") for line in text.splitlines()) == 2
     assert text.count("\n") < 50
 
 
@@ -102,6 +103,19 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
     with pytest.raises(OutputError, match="No space left"):
         write_folder(tmp_path, {"a": "new", "b": b"new"})
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "1", "b": "2"}
+
+
+def test_a_folder_takes_sub_folders(tmp_path: Path) -> None:
+    paths = write_folder(
+        tmp_path / "made", {"job/1.svg": "first", "2.svg": "second", "other/1.svg": b"third"}
+    )
+    assert [path.relative_to(tmp_path / "made").as_posix() for path in paths] == [
+        "job/1.svg",
+        "2.svg",
+        "other/1.svg",
+    ]
+    assert [path.read_text() for path in paths] == ["first", "second", "third"]
+    assert {path.name for path in (tmp_path / "made").iterdir()} == {"job", "other", "2.svg"}
 
 
 def test_what_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:

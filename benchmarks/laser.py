@@ -1,0 +1,181 @@
+"""Laser jobs: travel against vpype, time to write all formats, areas over kerf. One run prints every figure.
+
+vpype pins old packages, so it gets an environment of its own, made on the first run.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+import venv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cmpdesign.build import build_layout
+from cmpdesign.design import Design, load_design
+from cmpdesign.laser.setup import complete
+from cmpdesign.writers.laser.asmade import as_made
+from cmpdesign.writers.laser.beam import Points
+from cmpdesign.writers.laser.drawing import job_drawing
+from cmpdesign.writers.laser.job import Job, Pass, make_job
+from cmpdesign.writers.laser.order import ordered
+from cmpdesign.writers.laser.product import product
+from cmpdesign.writers.laser.strokes import loops
+from cmpdesign.writers.laser.svg import drawing_to_svg
+
+VPYPE_HOME = Path(sys.prefix) / "vpype"
+PX_IN_MM = 96 / 25.4
+
+
+def design(layers: int, **options: str) -> Design:
+    """A honeycomb of 1.5 mm, on a bed that is large enough; 3 n^2 + 1 cells are carved of n layers."""
+    given = {"layers": str(layers), "pitch_mm": "1.5", "laser.machine": "co2-40w", "fiducials.count": "0"}
+    return load_design("honeycomb", given | {key.replace("__", "."): value for key, value in options.items()})
+
+
+def job_of(made: Design) -> Job:
+    return make_job(made.name, build_layout(made), complete(made.laser))
+
+
+def travel_mm(job: Job) -> float:
+    """Dark way between the cells of every pass, as they are burnt."""
+    total = 0.0
+    for one in job.cell_passes:
+        starts = one.walls.xy_mm[one.walls.first[:-1]]
+        total += float(np.hypot(*np.diff(starts, axis=0).T).sum())
+    return total
+
+
+def nearest_bound_mm(entries_mm: Points) -> float:
+    """No order can be shorter: every cell but one has to be reached from a cell, at best from its nearest."""
+    if len(entries_mm) < 2:
+        return 0.0
+    points, owner = entries_mm.reshape(-1, 2), np.repeat(np.arange(len(entries_mm)), entries_mm.shape[1])
+    distance, near = cKDTree(points).query(points, k=min(12, len(points)))
+    distance = np.where(owner[near] == owner[:, None], np.inf, distance).min(axis=1)
+    nearest = distance.reshape(len(entries_mm), -1).min(axis=1)
+    return float(nearest.sum() - nearest.max())
+
+
+def as_in_layout(one: Pass) -> Pass:
+    """The pass with its closed paths in the layout's order, each from its first corner on."""
+    assert one.cavities is not None
+    cells = one.cavities.selected(np.argsort(one.cavities.cell))
+    return replace(one, walls=loops(cells.loops_mm, np.arange(len(cells.cell))))
+
+
+def vpype_mm(job: Job, *options: str) -> tuple[float, float]:
+    """Dark way in mm and seconds of vpype's linesort on the same paths, given cell by cell as in the layout."""
+    program = VPYPE_HOME / "bin" / "vpype"
+    if not program.exists():
+        venv.create(VPYPE_HOME, with_pip=True)
+        pip = [
+            str(VPYPE_HOME / "bin" / "pip"),
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "vpype==1.15.0",
+        ]
+        subprocess.run(pip, check=True, capture_output=True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cells.svg"
+        path.write_text(
+            drawing_to_svg(replace(job_drawing(job), passes=tuple(map(as_in_layout, job.cell_passes))))
+        )
+        started = time.perf_counter()
+        command = [str(program), "read", str(path), "linesort", *options, "stat"]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        seconds = time.perf_counter() - started
+    total = [line for line in text.splitlines() if line.strip().startswith("Pen-up length:")][-1]
+    return float(total.split(":")[1]) / PX_IN_MM, seconds
+
+
+def travel() -> None:
+    """2,000 cells in three colors (and one white), paths as the job burns them."""
+    job = job_of(design(26, laser__corner="plain", laser__holes="false"))
+    entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
+    started = time.perf_counter()
+    for cells in entries:
+        ordered(cells, "travel")
+    seconds = time.perf_counter() - started
+    bound = sum(nearest_bound_mm(cells) for cells in entries)
+    plain, plain_s = vpype_mm(job)
+    best, best_s = vpype_mm(job, "--two-opt")
+    ours = travel_mm(job)
+    print(f"\ntravel on {sum(map(len, entries))} cells in {len(entries)} passes")
+    print(f"{'':34}{'m':>8}{'against two-opt':>18}{'s':>8}")
+    rows = [("vpype linesort", plain, plain_s), ("vpype linesort --two-opt", best, best_s)]
+    rows += [("cmpdesign", ours, seconds), ("lower bound (nearest neighbours)", bound, 0.0)]
+    for name, way, took in rows:
+        print(f"{name:34}{way / 1000:8.3f}{100 * (way / best - 1):+17.1f} %{took:8.2f}")
+    assert ours < 0.88 * best, "at least 12 % below"
+
+
+def formats() -> None:
+    """Layout in hand; everything in the folder laser/, in memory. CPU time is what an idle core takes."""
+    print("\ntime to everything in laser/ (figures, 4 formats, sheet, coupon), corners overcut")
+    print(f"{'cells':>8}{'files':>8}{'MB':>8}{'CPU s':>8}{'wall s':>8}{'limit s':>9}")
+    with tempfile.TemporaryDirectory() as folder:
+        machine = Path(folder) / "co2-40w.toml"
+        from cmpdesign.laser.library import machines
+
+        text = machines()["co2-40w"].read_text()
+        machine.write_text(
+            text.replace("value = 300.0", "value = 900.0").replace(
+                'value = 200.0, source = "assumed: the common small',
+                'value = 600.0, source = "assumed: the common small',
+            )
+        )
+        for layers, limit in ((26, 3.0), (82, 30.0)):
+            made = design(layers, laser__machine=str(machine), fiducials__count="3")
+            layout = build_layout(made)
+            started, begun = time.perf_counter(), time.process_time()
+            files = product(made, layout).files
+            wall, seconds = time.perf_counter() - started, time.process_time() - begun
+            size = sum(len(content) for content in files.values()) / 1e6
+            cells = sum(len(one.walls) for one in make_job("", layout, complete(made.laser)).cell_passes)
+            print(f"{cells:8d}{len(files):8d}{size:8.1f}{seconds:8.2f}{wall:8.2f}{limit:9.0f}")
+            assert seconds < limit
+            assert files == product(made, layout).files, "the same bytes twice"
+
+
+def areas() -> None:
+    """Area against the nominal cell of 1.5 mm, what a corner loses, what is burnt beside."""
+    print("\nas made at the front, honeycomb of 1.5 mm")
+    print(
+        f"{'kerf mm':>9}{'corner':>10}{'area %':>10}{'corner lost um':>16}{'beside um':>11}{'web um':>9}"
+        f"{'web to filled um':>18}"
+    )
+    for kerf in (0.03, 0.05, 0.1, 0.16, 0.25):
+        for corner in ("plain", "overcut"):
+            job = job_of(design(4, laser__corner=corner, laser__kerf_mm=str(kerf), laser__taper_deg="0"))
+            front = as_made(job)[1].front
+            lengths = [
+                front.corner_loss_mm,
+                front.burnt_beside_mm,
+                front.web_mm or 0,
+                front.web_to_filled_mm or 0,
+            ]
+            row = "".join(
+                f"{1000 * value:{width}.1f}" for value, width in zip(lengths, (16, 11, 9, 18), strict=True)
+            )
+            print(f"{kerf:9.2f}{corner:>10}{front.area_error_percent:+10.3f}{row}")
+            assert abs(front.area_error_percent) < 0.6 or (corner == "plain" and kerf > 0.1)
+
+
+def main() -> None:
+    print(json.dumps({"python": sys.version.split()[0]}))
+    product(design(3), build_layout(design(3)))  # compiles what is compiled on first use
+    areas()
+    travel()
+    formats()
+
+
+if __name__ == "__main__":
+    main()
