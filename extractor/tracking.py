@@ -80,6 +80,7 @@ class _Memory:
     mirrored: bool
     expected: int  # markers of the last cold start, or more
     age: int  # frames since
+    gap: bool = False  # the frame after was lost
 
 
 class Tracker:
@@ -152,7 +153,7 @@ class Tracker:
         markers = self._extractor.extract(image)
         if markers.reason is not None:
             if self._memory is not None:  # positions are worth another try, velocities are not
-                self._memory = replace(self._memory, before_px=None)
+                self._memory = replace(self._memory, before_px=None, gap=True)
             return markers, None
         bgr = prepare(image)
         if self._tables is not None and bgr is not None:
@@ -216,7 +217,8 @@ class Tracker:
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _remember(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:
-        before = self._memory.xy_px if self._memory is not None and age > 0 else None
+        last = self._memory
+        before = last.xy_px if last is not None and not last.gap else None
         self._memory = _Memory(markers.xy_px, before, look, bool(markers.mirrored), expected, age)
 
     def _booked(
