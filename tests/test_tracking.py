@@ -61,7 +61,7 @@ def test_a_warm_start_measures_as_well_as_a_cold_one() -> None:
 @pytest.mark.parametrize("direction", range(6))
 @pytest.mark.parametrize("steps", [(1, 1), (3, 0), (2, -1)])
 def test_a_jump_onto_the_same_colors_is_noticed(direction: int, steps: tuple[int, int]) -> None:
-    """After a jump by a lattice vector that keeps the inks, the image differs only around the white cell and the rim."""
+    """A lattice vector that keeps the inks changes the image around the white cell and the rim only."""
     away = PITCH_PX * np.array([steps[0] + steps[1] / 2, -steps[1] * 0.75**0.5])
     turn = np.radians(7.3 + 60 * direction)
     x, y = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) @ away
@@ -79,7 +79,11 @@ def test_a_jump_onto_the_same_colors_is_noticed(direction: int, steps: tuple[int
 
 @settings(max_examples=40, deadline=None)
 @given(
-    st.tuples(*[st.floats(-60, 60)] * 2), st.floats(-180, 180), st.floats(0.8, 1.25), st.booleans(), st.integers(0, 99)
+    st.tuples(*[st.floats(-60, 60)] * 2),
+    st.floats(-180, 180),
+    st.floats(0.8, 1.25),
+    st.booleans(),
+    st.integers(0, 99),
 )
 def test_no_jump_gives_a_wrong_id(
     away_px: tuple[float, float], turn_deg: float, zoom: float, hidden: bool, seed: int
@@ -172,7 +176,10 @@ def test_no_frame_vanishes() -> None:
     assert [frame.time_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     names = ["UNREADABLE", "LOST", "TRACKED", "LOST", "OTHER_SIZE", "UNREADABLE", "TRACKED"]
     assert [frame.status.name for frame in frames] == names
-    assert frames[0].reason == "the cable came loose" and frames[4].reason == "80 x 100 px instead of 320 x 240 px"
+    assert (
+        frames[0].reason == "the cable came loose"
+        and frames[4].reason == "80 x 100 px instead of 320 x 240 px"
+    )
     assert "float32" in frames[5].reason and frames[1].reason and not frames[2].reason
     assert frames[6].start is StartKind.WARM
     for frame in frames:

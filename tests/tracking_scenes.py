@@ -11,7 +11,19 @@ import numpy as np
 from conftest import small_layout, small_text
 from numpy.typing import NDArray
 
-from cmpdesign.scene import Camera, Optics, Plain, Press, Rendered, Scene, Sensor, Shear, Twist, composed, render
+from cmpdesign.scene import (
+    Camera,
+    Optics,
+    Plain,
+    Press,
+    Rendered,
+    Scene,
+    Sensor,
+    Shear,
+    Twist,
+    composed,
+    render,
+)
 from cmpdesign.scene.standard import BLACK_RGB, INKS
 from extractor import Reference, parse_layout
 
@@ -51,13 +63,17 @@ def moving(count: int, pattern: str = "honeycomb", speed: float = 1.0) -> Iterat
         turn = 2 * np.pi * speed * index / 60
         push = 0.5 - 0.5 * np.cos(turn)
         surface = composed(
-            Press(4.0, 0.6 * push), Twist(5.0, 14 * np.sin(turn)), Shear(5.0, (0.5 * np.sin(2 * turn), 0.3 * push))
+            Press(4.0, 0.6 * push),
+            Twist(5.0, 14 * np.sin(turn)),
+            Shear(5.0, (0.5 * np.sin(2 * turn), 0.3 * push)),
         )
         centre = (
             (SIZE[0] - 1) / 2 + 12 * np.sin(0.7 * turn),
             (SIZE[1] - 1) / 2 + 8 * (1 - np.cos(1.3 * turn)) / 2,
         )
-        yield shot(pattern, surface=surface, centre_px=centre, rotation_deg=7.3 + 6 * np.sin(turn), seed=index)
+        yield shot(
+            pattern, surface=surface, centre_px=centre, rotation_deg=7.3 + 6 * np.sin(turn), seed=index
+        )
 
 
 def errors(xy_px: NDArray[np.float64], rendered: Rendered) -> NDArray[np.float64]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cmpdesign.cli.terminal import console, print_warning, printable
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import Run
@@ -72,9 +72,12 @@ def track(
     run = _prepared(reference, source, output, rest, mm_per_px, fps, overlay, cold)
     run.limit = frames
     try:
-        _gone(run, source)
-    finally:
-        _report(run, reference, source, output, quiver)
+        _gone(run)
+    except OutputError:  # no reason to keep from the user what could be tracked
+        with suppress(OutputError):
+            _report(run, reference, source, output, quiver)
+        raise
+    _report(run, reference, source, output, quiver)
     _finish(run)
 
 
@@ -103,7 +106,7 @@ def _prepared(
     return Run(frames, tracker, open_sink(output, reference), Tally(reference), video)
 
 
-def _gone(run: Run, source: str) -> None:
+def _gone(run: Run) -> None:
     from cmpdesign.tracking.run import stopped_by_hand
 
     with stopped_by_hand(run.stop), _progress(run) as watch:

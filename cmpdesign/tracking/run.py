@@ -47,14 +47,15 @@ class Run:
         Raises:
             OutputError: something could not be written; all that could be is complete, and the message says where.
         """
+        failed: list[str] = []
         try:
             self._track(watch)
         except OutputError as error:
-            raise OutputError(f"{error}; {self._kept()}") from None
+            failed.append(str(error))
         finally:
-            failed = self._closed()
+            failed += self._closed()
         if failed:
-            raise OutputError("; ".join((*failed, self._kept())))
+            raise OutputError("; ".join(dict.fromkeys((*failed, self.sink.kept()))))
 
     def _track(self, watch: Callable[[Tracked], None]) -> None:
         for frame in self.source.frames():
@@ -81,9 +82,6 @@ class Run:
             except OutputError as error:
                 failed.append(str(error))
         return failed
-
-    def _kept(self) -> str:
-        return f"the {self.tally.frames} frames so far are kept in {self.sink.kept()}"
 
 
 @contextmanager

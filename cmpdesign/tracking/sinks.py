@@ -32,7 +32,7 @@ KINDS = (".npz", ".parquet", ".csv")
 class Sink(Protocol):
     """A table that is written frame by frame.
 
-    ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says where the frames so far are.
+    ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says how many frames are where.
     """
 
     def add(self, frame: Tracked, rest: Rest | None) -> None: ...
@@ -113,13 +113,14 @@ class CsvSink:
     def __init__(self, path: Path, reference: Reference) -> None:
         self._path, self._part, self._reference = path, _part(path), reference
         self._file = self._part.open("xb", buffering=0)
-        self._end = 0
+        self._end, self._frames = 0, 0
         self._write((",".join(LONG_COLUMNS) + "\n").encode())
 
     def add(self, frame: Tracked, rest: Rest | None) -> None:
         columns = long_form(batch([frame]), self._reference.layer, self._reference.index)
         try:
             self._write(_lines(columns))
+            self._frames += 1
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
@@ -142,7 +143,7 @@ class CsvSink:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
     def kept(self) -> str:
-        return str(self._path if self._path.exists() and not self._part.exists() else self._part)
+        return f"{self._frames} frames are kept in {self._part if self._part.exists() else self._path}"
 
 
 def _lines(columns: Columns) -> bytes:
@@ -186,7 +187,7 @@ class ChunkSink:
         self._part.mkdir()
         self._frames: list[Tracked] = []
         self._rest: Rest | None = None
-        self._chunks = 0
+        self._chunks, self._kept = 0, 0
         self._last = time.monotonic()
 
     def add(self, frame: Tracked, rest: Rest | None) -> None:
@@ -199,11 +200,24 @@ class ChunkSink:
         try:
             _save(self._part / "about.npz", about(self._reference, self._rest))
             if self._frames:
-                _save(self._part / f"{self._chunks:06d}.npz", batch(self._frames))
-                self._chunks += 1
+                self._save(self._frames)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
         self._frames, self._last = [], time.monotonic()
+
+    def _save(self, frames: list[Tracked]) -> None:
+        """As one chunk; where it does not fit, as two halves, so that a full disk takes what it can."""
+        try:
+            _save(self._part / f"{self._chunks:06d}.npz", batch(frames))
+        except OSError:
+            if len(frames) == 1:
+                raise
+            half = len(frames) // 2
+            self._save(frames[:half])
+            self._save(frames[half:])
+            return
+        self._chunks += 1
+        self._kept += len(frames)
 
     def close(self) -> None:
         self._flush()
@@ -214,8 +228,8 @@ class ChunkSink:
 
     def kept(self) -> str:
         if not self._part.exists():
-            return str(self._path)
-        return f"{self._part} (make room, then call with --recover)"
+            return f"{self._kept} frames are kept in {self._path}"
+        return f"{self._kept} frames are kept in {self._part}; make room, then call with --recover"
 
 
 def _save(path: Path, columns: Columns) -> None:
