@@ -17,9 +17,17 @@ MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Stage 3. ``xy`` (N, 2) int32 pixels, ``ink`` (N,) uint8 1..3, ``area_px`` (N,) of the domains they stand for."""
+    """Stage 3: one seed per domain.
+
+    Attributes:
+        xy: (N, 2) int32, the pixel to grow from.
+        center: (N, 2) float64, the domain's geometric center.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        area_px: (N,) int64, the domain's area.
+    """
 
     xy: NDArray[np.int32]
+    center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
 
@@ -110,7 +118,7 @@ def _runs(label):  # type: ignore[no-untyped-def]
 
 @compiled
 def _seeds(runs, root):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, its ink and its area."""
+    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
     number = np.full(runs.shape[0], -1, np.int32)
     domains = 0
     for i in range(runs.shape[0]):
@@ -138,7 +146,9 @@ def _seeds(runs, root):  # type: ignore[no-untyped-def]
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    return xy, ink, area
+    for d in range(domains):
+        sums[d] /= area[d]
+    return xy, sums, ink, area
 
 
 def find_seeds(segmentation: Segmentation) -> Seeds:
@@ -146,9 +156,9 @@ def find_seeds(segmentation: Segmentation) -> Seeds:
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
     """
-    xy, ink, area = _seeds(*_runs(segmentation.label))
+    xy, center, ink, area = _seeds(*_runs(segmentation.label))
     keep = area >= MIN_DOMAIN_PX
-    return Seeds(xy=xy[keep], ink=ink[keep], area_px=area[keep])
+    return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
 
 
 @compiled
