@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,10 @@ from numpy.typing import NDArray
 
 from .displacement import Rest, rest_at
 from .errors import ImageError
-from .image import estimate_noise, prepare
+from .image import prepare
 from .pipeline import Extractor, Stages
 from .reference import Reference
-from .refine import refine
 from .types import Markers, Reason, Status
-from .virtual import interpolate
 from .warm import RIGHT, WRONG, Tables, WarmStart, completed, examine, predict, prove, tables_of
 
 MAX_WRONG = 0.02  # of the cells, which a refined warm start may show at odds with the image
@@ -72,9 +69,10 @@ class Tracked:
 
 @dataclass(frozen=True, eq=False)
 class _Memory:
-    """What a frame leaves to the next: positions, those before, and the look of every cell."""
+    """What a frame leaves to the next: positions, which of them were measured, those before, and every cell's look."""
 
     xy_px: NDArray[np.float64]
+    known: NDArray[np.bool_]
     before_px: NDArray[np.float64] | None
     look: NDArray[np.float64]
     mirrored: bool
@@ -179,8 +177,7 @@ class Tracker:
         predicted = stages.done("predict", predict(bgr, guesses, tables, memory.look))
         if predicted is None:
             return None
-        known = np.isfinite(memory.xy_px[:, 0])
-        start = prove(bgr, completed(tables, predicted), known, tables, memory.look)
+        start = prove(bgr, completed(tables, predicted), memory.known, tables, memory.look)
         if stages.done("prove", start) is None:
             return None
         assert start is not None
@@ -192,26 +189,14 @@ class Tracker:
         """Refined like any other frame, and examined once more where the refined markers lie."""
         memory, tables = self._memory, self._tables
         assert memory is not None and tables is not None
-        refined = stages.done("refine", refine(bgr, start.places, estimate_noise(bgr)))
-        proof = examine(bgr, refined.xy_px[tables.corners], tables, memory.look)
+        markers = self._extractor.finish(bgr, start.places, memory.mirrored, stages)
+        measured = markers.status == Status.MEASURED
+        xy = np.where(measured[:, None], markers.xy_px, np.nan)
+        proof = stages.done("examine", examine(bgr, xy[tables.corners], tables, memory.look))
         right, wrong = proof.verdict == RIGHT, proof.verdict == WRONG
-        status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
-        count = int((status == Status.MEASURED).sum())
+        count = int(measured.sum())
         if wrong.sum() > MAX_WRONG * right.sum() or count < MIN_KEPT * memory.expected:
             return None
-        stages.done("examine", proof)
-        virtual, virtual_status = stages.done("virtual", interpolate(self.layout, refined.xy_px, status))
-        markers = Markers(
-            xy_px=refined.xy_px,
-            cov_px2=refined.cov_px2,
-            status=status,
-            virtual_xy_px=virtual,
-            virtual_status=virtual_status,
-            mirrored=memory.mirrored,
-            reason=None,
-            timings_ms=MappingProxyType(stages.timings_ms),
-            stages=MappingProxyType(stages.results),
-        )
         look = np.where(right[:, None], proof.look, memory.look)
         self._remember(markers, look, max(count, memory.expected), memory.age + 1)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
@@ -219,7 +204,8 @@ class Tracker:
     def _remember(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:
         last = self._memory
         before = last.xy_px if last is not None and not last.gap else None
-        self._memory = _Memory(markers.xy_px, before, look, bool(markers.mirrored), expected, age)
+        known = markers.status == Status.MEASURED
+        self._memory = _Memory(markers.xy_px, known, before, look, bool(markers.mirrored), expected, age)
 
     def _booked(
         self,

@@ -141,9 +141,9 @@ def test_covered_markers_are_lost_and_come_back() -> None:
     x, y = rendered.truth.marker_xy_px[60]
     cv2.circle(image, (round(float(x)), round(float(y))), 10, (20, 20, 20), -1)
     covered_frame = tracker.track(image)
-    lost = covered_frame.markers.status == Status.LOST
-    assert 1 <= lost.sum() <= 7 and lost[60]
-    assert errors(covered_frame.markers.xy_px, rendered).max() < 1
+    gone = covered_frame.markers.status != Status.MEASURED
+    assert 1 <= gone.sum() <= 7 and gone[60]
+    assert errors(covered_frame.markers.xy_px, rendered).max() < WRONG_PX
     for seed in range(2, 6):
         frame = tracker.track(shot(seed=seed).image)
     assert frame.start is StartKind.WARM and (frame.markers.status == Status.MEASURED).all()
