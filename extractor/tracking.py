@@ -16,9 +16,8 @@ from .image import prepare
 from .pipeline import Extractor, Stages
 from .reference import Reference
 from .types import Markers, Reason, Status
-from .warm import RIGHT, WRONG, Tables, WarmStart, completed, examine, predict, prove, tables_of
+from .warm import Tables, WarmStart, completed, examine, predict, prove, tables_of
 
-MAX_WRONG = 0.02  # of the cells, which a refined warm start may show at odds with the image
 MIN_KEPT = 0.97  # of the markers of the last cold start; below it, a cold start may find more
 COLD_EVERY = 200  # frames; a cold start at least this often
 
@@ -186,19 +185,14 @@ class Tracker:
     def _finished(
         self, bgr: NDArray[np.uint8], start: WarmStart, stages: Stages
     ) -> tuple[Markers, StartKind] | None:
-        """Refined like any other frame, and examined once more where the refined markers lie."""
-        memory, tables = self._memory, self._tables
-        assert memory is not None and tables is not None
+        """Refined, which moves no marker by more than a quarter of an edge; None where too few are left."""
+        memory = self._memory
+        assert memory is not None
         markers = self._extractor.finish(bgr, start.places, memory.mirrored, stages)
-        measured = markers.status == Status.MEASURED
-        xy = np.where(measured[:, None], markers.xy_px, np.nan)
-        proof = stages.done("examine", examine(bgr, xy[tables.corners], tables, memory.look))
-        right, wrong = proof.verdict == RIGHT, proof.verdict == WRONG
-        count = int(measured.sum())
-        if wrong.sum() > MAX_WRONG * right.sum() or count < MIN_KEPT * memory.expected:
+        count = int((markers.status == Status.MEASURED).sum())
+        if count < MIN_KEPT * memory.expected:
             return None
-        look = np.where(right[:, None], proof.look, memory.look)
-        self._remember(markers, look, max(count, memory.expected), memory.age + 1)
+        self._remember(markers, start.look, max(count, memory.expected), memory.age + 1)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _remember(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:

@@ -31,6 +31,7 @@ MAX_SPREAD = 0.25  # of an edge, how far the shifts of cells that share a marker
 WHITE_RATIO = (
     0.75  # the white cell's brightness against an ink's, summed over the channels; black stays below
 )
+MIN_WHITE = 2  # of the three edges of a cell that must see it white, for it to be or to contest the reference
 MIN_COSINE = 0.8  # between an ink and the same cell's ink a frame ago, black subtracted
 STRENGTH = (0.4, 2.5)  # of an ink against the same cell's a frame ago
 INNER = 0.5  # of the way from the middle to each corner, where the ink is looked at again
@@ -95,19 +96,22 @@ class Proof:
         verdict: (C,) uint8, ``UNSEEN`` (outside the image or not predicted), ``WRONG`` or ``RIGHT``.
         look: (2, C, 3) float64 BGR, each seen cell's ink minus the black around it, and this black.
         white, not_white: how many edges of inked cells see the white cell beyond them where it belongs, and do not.
+        other_white: how many see something as bright where a black cell belongs.
     """
 
     verdict: NDArray[np.uint8]
     look: NDArray[np.float64]
     white: int
     not_white: int
+    other_white: int
 
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:
-    """Markers before refinement, and whether the rim proved them because the white cell is not to be seen."""
+    """Markers before refinement, how their cells look, and whether the rim proved them as the white cell is hidden."""
 
     places: Places
+    look: NDArray[np.float64]
     by_rim: bool
 
 
@@ -221,7 +225,7 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
     verdict = np.zeros(count, np.uint8)
     look = np.full((2, count, 3), np.nan)
     middle, black, other = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    white, not_white = 0, 0
+    white, not_white, other_white = 0, 0, 0
     for i in range(count):
         x, y = xy[i, :, 0].mean(), xy[i, :, 1].mean()
         size = np.hypot(xy[i, 0, 0] - x, xy[i, 0, 1] - y)
@@ -243,6 +247,7 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
                 white += bright
                 not_white += not bright
             else:
+                other_white += bright
                 fits = fits and not bright
                 black += other[k]
                 blacks += 1
@@ -270,7 +275,7 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
                     best, best_cosine = k + 1, cosine
             fits = fits and best == ink[i] and best_cosine > MIN_COSINE
         verdict[i] = RIGHT if fits else WRONG
-    return verdict, look, white, not_white
+    return verdict, look, white, not_white, other_white
 
 
 def examine(
@@ -425,9 +430,9 @@ def prove(
     right = proof.verdict == RIGHT
     by_rim = proof.white == 0
     first = tables.rim if by_rim else (tables.beyond == WHITE_CELL).any(axis=1)
-    if by_rim and not right[tables.rim].all():
+    if proof.other_white >= MIN_WHITE or (by_rim and not right[tables.rim].all()):
         return None
-    if not by_rim and (proof.white < 2 or proof.not_white > 0):
+    if not by_rim and (proof.white < MIN_WHITE or proof.not_white > 0):
         return None
     proved = _connected(tables.corners, right, first, tables.cells_of_marker)
     expected = known[tables.corners].all(axis=1) & (proof.verdict != UNSEEN)
@@ -436,7 +441,8 @@ def prove(
     cells = tables.corners[proved]
     kept = np.full_like(xy, np.nan)
     kept[cells] = xy[cells]
-    return WarmStart(Places(xy_px=kept, edge_px=edge_px, cells=cells), by_rim)
+    now = np.where(proved[:, None], proof.look, look)
+    return WarmStart(Places(xy_px=kept, edge_px=edge_px, cells=cells), now, by_rim)
 
 
 def _aligned(

@@ -133,6 +133,22 @@ def test_without_white_cell_and_whole_rim_nothing_is_claimed() -> None:
     assert (errors(frame.markers.xy_px, rendered) < WRONG_PX).all()
 
 
+def test_a_second_white_is_left_to_the_cold_start() -> None:
+    """Glare where the white cell was while the pattern jumps onto its own colors: the one forgery that fits."""
+    tracker = Tracker(reference())
+    rest = shot()
+    tracker.track(rest.image)
+    turn = np.radians(7.3 + 30)
+    away = 3**0.5 * PITCH_PX * np.array([np.cos(turn), -np.sin(turn)])
+    rendered = shot(centre_px=(159.5 + away[0], 119.5 + away[1]), seed=1)
+    white = reference().cell_corners[reference().reference_cell]
+    image = rendered.image.copy()
+    cv2.fillConvexPoly(image, np.round(rest.truth.marker_xy_px[white]).astype(np.int32), (245, 245, 245))
+    frame = tracker.track(image)
+    assert frame.start not in (StartKind.WARM, StartKind.RIM)
+    assert (errors(frame.markers.xy_px, rendered) < WRONG_PX).all()
+
+
 def test_covered_markers_are_lost_and_come_back() -> None:
     tracker = Tracker(reference())
     tracker.track(shot().image)
