@@ -133,17 +133,20 @@ def test_without_white_cell_and_whole_rim_nothing_is_claimed() -> None:
     assert (errors(frame.markers.xy_px, rendered) < WRONG_PX).all()
 
 
-def test_a_second_white_is_left_to_the_cold_start() -> None:
-    """Glare where the white cell was while the pattern jumps onto its own colors: the one forgery that fits."""
-    tracker = Tracker(reference())
-    rest = shot()
-    tracker.track(rest.image)
-    turn = np.radians(7.3 + 30)
+@pytest.mark.parametrize("forged", [False, True])
+@pytest.mark.parametrize("direction", range(3))
+def test_where_no_rim_is_seen_the_white_cell_alone_tells(direction: int, forged: bool) -> None:
+    """A pattern larger than the image jumps onto its own colors; forged: with glare where the white cell was."""
+    layout, rest = reference(layers=13), shot(layers=13)
+    tracker = Tracker(layout)
+    assert tracker.track(rest.image).status is FrameStatus.TRACKED
+    turn = np.radians(7.3 + 30 + 120 * direction)
     away = 3**0.5 * PITCH_PX * np.array([np.cos(turn), -np.sin(turn)])
-    rendered = shot(centre_px=(159.5 + away[0], 119.5 + away[1]), seed=1)
-    white = reference().cell_corners[reference().reference_cell]
+    rendered = shot(layers=13, centre_px=(159.5 + away[0], 119.5 + away[1]), seed=1)
     image = rendered.image.copy()
-    cv2.fillConvexPoly(image, np.round(rest.truth.marker_xy_px[white]).astype(np.int32), (245, 245, 245))
+    if forged:
+        white = layout.cell_corners[layout.reference_cell]
+        cv2.fillConvexPoly(image, np.round(rest.truth.marker_xy_px[white]).astype(np.int32), (245, 245, 245))
     frame = tracker.track(image)
     assert frame.start not in (StartKind.WARM, StartKind.RIM)
     assert (errors(frame.markers.xy_px, rendered) < WRONG_PX).all()
