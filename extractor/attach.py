@@ -13,6 +13,7 @@ from .numbering import Lattice, Numbering
 ROUNDS = 12
 WITNESSES = 20  # numbered cells through which a quadratic map to the layout is laid
 MIN_WITNESSES = 8
+SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, and its center is no witness
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
 MAX_MISFIT = 0.3  # in cells, between where the map puts a cell and the layout's place for it
 MAX_SIGMA = 0.12  # of the map there, in cells
@@ -27,11 +28,16 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     """
     from scipy.spatial import cKDTree
 
+    if (numbering.cell >= 0).all():
+        return numbering
     members = [np.flatnonzero(lattice.ink == ink) for ink in (1, 2, 3)]
     trees = [cKDTree(lattice.center_mm[mine]) for mine in members]
     cell = numbering.cell.copy()
+    whole = np.isfinite(cells.corner_px[:, 0, 0])
+    if whole.mean() < SHARP_SHARE:
+        whole[:] = True
     for _ in range(ROUNDS):
-        known, loose = np.flatnonzero(cell >= 0), np.flatnonzero(cell < 0)
+        known, loose = np.flatnonzero((cell >= 0) & whole), np.flatnonzero(cell < 0)
         if len(known) < MIN_WITNESSES or len(loose) == 0:
             break
         predicted, size = _predicted_mm(cells.center_px, cell, lattice, known, loose)

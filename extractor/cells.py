@@ -51,7 +51,7 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     area = seeds.area_px.astype(np.float64)
     if len(center) > NEIGHBOURS:
         _, near = cKDTree(center).query(center, NEIGHBOURS)
-        keep = area >= MIN_AREA_SHARE * np.median(area[near], axis=1)
+        keep = area >= MIN_AREA_SHARE * np.sort(area[near], axis=1)[:, NEIGHBOURS // 2]
     else:
         keep = np.ones(len(center), np.bool_)
     return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])

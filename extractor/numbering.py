@@ -26,14 +26,21 @@ from .sampling import sample_patch
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
 WHITE_RATIO = 0.75
+# Between the inks it must be darker than they are, even in haze: in pictures of anything else it is not.
+BLACK_RATIO = 0.95
+BLACK_SHARE = 0.8  # of the places between inks; the white cell and glare are among them
 SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
 MIN_LEAD = 2  # cells by which the best reference must explain more than the next
 MAX_WHITES = 8
+MAX_PARTS = 4
 # A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
 MIN_EVIDENCE = 0.06
+MIN_CELLS = 9  # or all, in a layout that has fewer
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 UNKNOWN = -(1 << 20)
+WITNESSES = 150  # faces that say which turn is that of the markers
+KEY = 1 << 16  # q KEY + r is one number for an axial place
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
 # From a cell's center to theirs, in axial steps, and in edges of an equilateral lattice.
@@ -189,18 +196,19 @@ def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignor
 
 
 def _number_part(
-    mesh: Mesh, start: int, front: int, reach: int, blocked: NDArray[np.bool_]
+    mesh: Mesh, part: NDArray[np.intp], front: int, reach: int, cells: int
 ) -> tuple[NDArray[np.int32], int]:
-    """Walk from one face; cells that are contradicted are left out and it is walked again."""
-    blocked = blocked.copy()
+    """Walk a part of the mesh from its first face; cells that are contradicted are left out and it is walked again."""
+    blocked = np.zeros(cells, np.bool_)
     for _ in range(MAX_ROUNDS):
-        at, bad = _walk(start, mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
+        sound = part[~blocked[mesh.faces[part]].any(axis=1)]
+        if len(sound) == 0:
+            break
+        at, bad = _walk(sound[0], mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
         if not bad.any():
             return at, int(blocked.sum())
         blocked |= bad
-        if blocked[mesh.faces[start]].any():
-            break
-    return np.full_like(at, UNKNOWN), int(blocked.sum())
+    return np.full((cells, 2), UNKNOWN, np.int32), int(blocked.sum())
 
 
 @compiled
@@ -247,11 +255,10 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     outside is the reference, unless two do so equally well: then nothing is reported.
     """
     found: list[tuple[int, Numbering]] = []
+    parts = _largest_parts(cells, mesh)
     for front in _fronts(image, cells, mesh):
-        for start in _starts(mesh):
-            at, conflicts = _number_part(
-                mesh, start, front, 2 * lattice.layers + 2, np.zeros(len(cells.ink), np.bool_)
-            )
+        for part in parts:
+            at, conflicts = _number_part(mesh, part, front, 2 * lattice.layers + 2, len(cells.ink))
             found += _with_white(image, cells, lattice, at, front, conflicts)
     if not found:
         return None
@@ -265,6 +272,7 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
 def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
     """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
     faces = np.flatnonzero(mesh.turn)
+    faces = faces[:: max(1, len(faces) // WITNESSES)]
     corner = cells.center_px[mesh.faces[faces]]
     middle = corner.mean(axis=1)
     radius = 0.12 * np.linalg.norm(corner - middle[:, None], axis=2).min(axis=1)
@@ -275,19 +283,41 @@ def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
     return [1] if np.median(plus) > np.median(minus) else [-1]
 
 
-def _starts(mesh: Mesh) -> list[int]:
-    """A face of each connected part of the mesh, the largest parts first."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+@compiled
+def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
+    """(F,) the connected part of the mesh that each face belongs to, counted from 0; -1 for no face."""
+    part = np.full(turn.shape[0], -1, np.int32)
+    stack = np.empty(turn.shape[0], np.int32)
+    count = 0
+    for first in range(turn.shape[0]):
+        if turn[first] == 0 or part[first] >= 0:
+            continue
+        part[first] = count
+        stack[0], height = first, 1
+        while height > 0:
+            height -= 1
+            f = stack[height]
+            for k in range(3):
+                g = neighbours[f, k]
+                if g >= 0 and part[g] < 0:
+                    part[g] = count
+                    stack[height] = g
+                    height += 1
+        count += 1
+    return part
 
-    rows, sides = np.nonzero(mesh.neighbours >= 0)
-    graph = coo_array(
-        (np.ones(len(rows), np.int8), (rows, mesh.neighbours[rows, sides])), shape=(len(mesh.turn),) * 2
-    )
-    _, part = connected_components(graph, directed=False)
-    sizes = np.bincount(part[mesh.turn != 0], minlength=part.max() + 1)
-    order = np.argsort(-sizes, kind="stable")[:4]
-    return [int(np.flatnonzero((part == p) & (mesh.turn != 0))[0]) for p in order if sizes[p] > 0]
+
+def _largest_parts(cells: Cells, mesh: Mesh) -> list[NDArray[np.intp]]:
+    """The faces of each of the largest connected parts of the mesh, the innermost first: rims are often damaged."""
+    part = _parts(mesh.neighbours, mesh.turn)
+    sizes = np.bincount(part[part >= 0])
+    found = []
+    for number_of in np.argsort(-sizes, kind="stable")[:MAX_PARTS]:
+        faces = np.flatnonzero(part == number_of)
+        middle = cells.center_px[mesh.faces[faces]].mean(axis=1)
+        distance = np.linalg.norm(middle - np.median(middle, axis=0), axis=1)
+        found.append(faces[np.argsort(distance, kind="stable")])
+    return found
 
 
 def _with_white(
@@ -308,16 +338,19 @@ def _with_white(
     for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
         steps = (low < DISTANCES) & (high >= DISTANCES)
         places, where, mean = _whiteness(image, cells, at, known, basis, steps)
+        if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
+            return []
         bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
         if len(bright):
             break
+    least = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
     found = []
     for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
         moved = np.full_like(at, UNKNOWN)
         moved[known] = _from_white(at[known], places[place])
         cell = cells_at(moved, lattice)
         inside = int((cell >= 0).sum())
-        if inside < MIN_EVIDENCE * len(lattice.ink) or len(known) - inside > MAX_OUTSIDE * len(known):
+        if inside < least or len(known) - inside > MAX_OUTSIDE * len(known):
             continue
         score = inside - 3 * (len(known) - inside) - conflicts
         found.append((score, Numbering(cell, front < 0, where[place], conflicts)))
@@ -338,12 +371,18 @@ def _whiteness(
     the ink that has most of each: white is, in light of any color, and no ink is.
     """
     center, radius = cells.center_px[known], 0.1 * np.sqrt(cells.area_px[known])
-    around = center[:, None] + np.einsum("nij,kj->nki", basis, OFFSETS[steps])
-    places, inverse = np.unique((at[known, None] + STEPS[steps]).reshape(-1, 2), axis=0, return_inverse=True)
-    color = colors_at(image, around.reshape(-1, 2), np.repeat(radius, around.shape[1]))
     own = colors_at(image, center, radius)
+    around = center[:, None] + np.einsum("nij,kj->nki", basis, OFFSETS[steps])
+    count = around.shape[1]
+    keys, place_of = np.unique(((at[known, None] + STEPS[steps]) @ (KEY, 1)).reshape(-1), return_inverse=True)
+    places = np.stack([(keys + KEY // 2) // KEY, (keys + KEY // 2) % KEY - KEY // 2], axis=1)
+    votes = np.bincount(place_of)
+    columns = (around[..., 0], around[..., 1], np.repeat(radius, count), np.repeat(own.sum(axis=1), count))
+    x, y, reach, level = (np.bincount(place_of, weights=v.reshape(-1)) / votes for v in columns)
+    where = np.stack([x, y], axis=1)
+    color = colors_at(image, where, reach)
     if DISTANCES[steps].min() < WHITE_REACHES[0]:
-        ratio = color.sum(axis=1) / np.repeat(np.maximum(own.sum(axis=1), 1.0), around.shape[1])
+        ratio = color.sum(axis=1) / np.maximum(level, 1.0)
     else:
         inks = [
             np.median(own[cells.ink[known] == ink], axis=0)
@@ -351,14 +390,7 @@ def _whiteness(
             if (cells.ink[known] == ink).any()
         ]
         ratio = (color / np.maximum(np.max(inks, axis=0), 1.0)).min(axis=1)
-    usable = np.isfinite(ratio)
-    place_of = inverse.reshape(-1)[usable]
-    count = np.maximum(np.bincount(place_of, minlength=len(places)), 1)
-    sums = [
-        np.bincount(place_of, weights=v[usable], minlength=len(places)) / count
-        for v in (around[..., 0].reshape(-1), around[..., 1].reshape(-1), ratio)
-    ]
-    return places.astype(np.int32), np.stack(sums[:2], axis=1), sums[2]
+    return places.astype(np.int32), where, np.where(np.isfinite(ratio), ratio, 0.0)
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -166,7 +166,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it."""
     height, width = label.shape
     owner = np.zeros((height, width), np.int32)
-    queue = np.empty((height * width, 2), np.int32)
+    queue = np.empty((limit_px + 2, 2), np.int32)
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
     half = HUES // 2
@@ -189,7 +189,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                     y = queue[i, 1] + (1 if side == 2 else -1 if side == 3 else 0)
                     if x < 0 or y < 0 or x >= width or y >= height or owner[y, x] != 0:
                         continue
-                    if label[y, x] != ink and label[y, x] != 0:
+                    if end > limit_px or (label[y, x] != ink and label[y, x] != 0):
                         continue
                     s, v = float(hsv[y, x, 1]), float(hsv[y, x, 2])
                     # circular: the pixel's hue is unwrapped to the side of the mean on which it lies

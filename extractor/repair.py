@@ -55,6 +55,8 @@ def repair(
     xy[outside], cov[outside] = np.nan, np.nan
     _drop_outliers(xy, cov, edge_px, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
+    if status[lattice.present].all():
+        return Repaired(xy, cov, status)
     edge = _filled(edge_px, lattice)
     measured = xy.copy()
     for place, sigma, kind in (

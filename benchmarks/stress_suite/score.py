@@ -84,7 +84,7 @@ def sure_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
     touching = np.zeros(len(truth.visible), dtype=np.bool_)
     touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
     from_rim = np.minimum(truth.marker_xy_px, np.array(shape[1::-1]) - 1 - truth.marker_xy_px).min(axis=1)
-    return touching & truth.visible & (from_rim >= RIM_PX)
+    return np.asarray(touching & truth.visible & (from_rim >= RIM_PX))
 
 
 def _against(
