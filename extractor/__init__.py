@@ -12,19 +12,26 @@ from .errors import ExtractorError, ImageError, LayoutError
 from .types import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
+    from .displacement import Rest
     from .pipeline import Extractor
     from .reference import Reference, load_layout, parse_layout
+    from .tracking import FrameStatus, StartKind, Tracked, Tracker
 
 __all__ = [
     "Extractor",
     "ExtractorError",
+    "FrameStatus",
     "ImageError",
     "LayoutError",
     "Markers",
     "Origin",
     "Reason",
     "Reference",
+    "Rest",
+    "StartKind",
     "Status",
+    "Tracked",
+    "Tracker",
     "VirtualStatus",
     "load_layout",
     "parse_layout",
@@ -32,7 +39,12 @@ __all__ = [
 
 _HOMES = {
     "Extractor": "pipeline",
+    "FrameStatus": "tracking",
     "Reference": "reference",
+    "Rest": "displacement",
+    "StartKind": "tracking",
+    "Tracked": "tracking",
+    "Tracker": "tracking",
     "load_layout": "reference",
     "parse_layout": "reference",
 }

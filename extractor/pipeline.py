@@ -17,14 +17,14 @@ from .errors import LayoutError
 from .image import estimate_noise, prepare
 from .mesh import build_mesh
 from .numbering import Numbering, number
-from .placing import place
+from .placing import Places, place
 from .reference import Reference
 from .refine import refine
 from .regions import find_seeds, grow
 from .repair import repair
 from .tables import lattice_of
 from .triangles import fit_triangles
-from .types import Markers, Reason
+from .types import Markers, Origin, Reason
 from .virtual import interpolate
 
 WORK_PIXELS = 1_400_000  # larger images are recognised at a reduced scale first
@@ -120,10 +120,17 @@ class Extractor:
         return stages.done("cells", find_cells(seeds, triangles, scale))  # type: ignore[no-any-return]
 
     def _measure(self, bgr: NDArray[np.uint8], cells: Cells, numbering: Numbering, stages: Stages) -> Markers:
-        """Refinement and virtual markers of what has been numbered."""
+        """The places of what has been numbered, and what follows from them."""
         numbering = stages.done("attach", attach(cells, numbering, self._lattice))
         size = (bgr.shape[1], bgr.shape[0])
         places = stages.done("place", place(cells, numbering, self._lattice, size))
+        return self.finish(bgr, places, numbering.mirrored, numbering.origin, stages)
+
+    def finish(
+        self, bgr: NDArray[np.uint8], places: Places, mirrored: bool, origin: Origin, stages: Stages
+    ) -> Markers:
+        """Refinement, repair and virtual markers: the same for every way to a numbering."""
+        size = (bgr.shape[1], bgr.shape[0])
         refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
         repaired = stages.done(
             "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
@@ -137,8 +144,8 @@ class Extractor:
             status=repaired.status,
             virtual_xy_px=virtual,
             virtual_status=virtual_status,
-            mirrored=numbering.mirrored,
-            origin=numbering.origin,
+            mirrored=mirrored,
+            origin=origin,
             reason=None,
             timings_ms=MappingProxyType(stages.timings_ms),
             stages=MappingProxyType(stages.results),

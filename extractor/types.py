@@ -33,6 +33,7 @@ class Origin(StrEnum):
 
     WHITE = "white"  # the white cell
     OUTLINE = "outline"  # it is hidden, and the pattern's rim leaves one way only
+    PREVIOUS = "previous"  # it is hidden, and the frame before leaves one way only
 
 
 class Reason(StrEnum):

@@ -1,0 +1,146 @@
+"""The overlay video: every frame with what was found in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.errors import CmpDesignError, OutputError
+
+if TYPE_CHECKING:
+    from extractor.displacement import Rest
+    from extractor.reference import Reference
+    from extractor.tracking import Tracked
+
+Picture = NDArray[np.uint8]
+
+CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}  # FFV1 is lossless
+EMPTY_SIZE = (640, 480)  # of the video when its first frame has no image
+ARROW_BGR = (255, 200, 0)
+WHITE_BGR = (255, 255, 255)
+FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
+
+
+class Overlay:
+    """Writes beside the file's place; ``close`` completes it.
+
+    Raises:
+        CmpDesignError: an ending that names no codec.
+        OutputError: the video cannot be written.
+    """
+
+    def __init__(self, path: Path, reference: Reference, fps: float) -> None:
+        if path.suffix not in CODECS:
+            raise CmpDesignError(f"--overlay {path}: unknown ending; expected one of {', '.join(CODECS)}")
+        self._path, self._part = path, path.with_name(f"{path.stem}.part{path.suffix}")
+        self._reference, self._fps = reference, fps
+        self._writer: Any = None
+        self._size = EMPTY_SIZE
+        self._frames = 0
+
+    def add(self, image: NDArray[Any] | None, frame: Tracked, rest: Rest | None) -> None:
+        picture = draw_frame(image, self._reference, frame, rest, self._size)
+        if self._writer is None:
+            self._open(picture)
+        self._writer.write(_fitted(picture, self._size))
+        self._frames += 1
+
+    def _open(self, picture: Picture) -> None:
+        import cv2
+
+        self._size = (picture.shape[1], picture.shape[0])
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        codec = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix])
+        self._writer = cv2.VideoWriter(str(self._part), codec, self._fps, self._size)
+        if not self._writer.isOpened():
+            raise OutputError(f"{self._path}: cannot be written as a video")
+
+    def close(self) -> None:
+        """Complete the video and look whether it can be read: OpenCV reports no full disk."""
+        import cv2
+
+        if self._writer is None:
+            return
+        self._writer.release()
+        written = cv2.VideoCapture(str(self._part))
+        frames = int(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
+        written.release()
+        if frames < self._frames:
+            raise OutputError(
+                f"{self._path}: holds {frames} of {self._frames} frames; is the disk full? It is kept as {self._part}"
+            )
+        try:
+            self._part.replace(self._path)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+
+
+def draw_frame(
+    image: NDArray[Any] | None, reference: Reference, frame: Tracked, rest: Rest | None, size: tuple[int, int]
+) -> Picture:
+    """A frame's picture: gridlines, markers by status, arrows from their rest, and what the frame says of itself.
+
+    Args:
+        size: (width, height) of the picture for a frame without an image.
+    """
+    from extractor.draw import draw_markers
+
+    if image is None:
+        picture = np.zeros((size[1], size[0], 3), np.uint8)
+    else:
+        picture = draw_markers(image, reference, frame.markers)
+        if rest is not None:
+            _draw_arrows(picture, rest.xy_px, frame.markers.xy_px, picture.shape[1] // image.shape[1])
+    _caption(picture, _said(frame))
+    return picture
+
+
+def _said(frame: Tracked) -> str:
+    time = "" if np.isnan(frame.time_s) else f"  {frame.time_s:.3f} s"
+    start = f"  {frame.start}" if frame.start else ""
+    reason = f"  {frame.reason}" if frame.reason else ""
+    return f"frame {frame.index}{time}  {frame.status.name.lower().replace('_', ' ')}{start}{reason}"
+
+
+def _draw_arrows(
+    picture: Picture, rest_px: NDArray[np.float64], xy_px: NDArray[np.float64], scale: int
+) -> None:
+    import cv2
+
+    ends = np.stack([rest_px, xy_px], axis=1)
+    known = np.isfinite(ends).all(axis=(1, 2))
+    fixed = np.round(((ends[known] + 0.5) * scale - 0.5) * (1 << FIXED_BITS)).astype(np.int32)
+    cv2.polylines(picture, list(fixed), False, ARROW_BGR, 1, cv2.LINE_AA, FIXED_BITS)
+
+
+def _caption(picture: Picture, text: str) -> None:
+    import cv2
+
+    size = float(np.clip(picture.shape[1] / 1600, 0.4, 1.0))
+    cv2.rectangle(picture, (0, 0), (picture.shape[1], round(34 * size)), (25, 25, 25), -1)
+    at = (round(12 * size), round(23 * size))
+    ascii_text = text.encode("ascii", "replace").decode()
+    cv2.putText(picture, ascii_text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+
+
+def _fitted(picture: Picture, size: tuple[int, int]) -> Picture:
+    """In the middle of a picture of the video's size, as large as fits."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    if (width, height) == size:
+        return picture
+    factor = min(size[0] / width, size[1] / height)
+    small = cv2.resize(
+        picture, (max(1, int(width * factor)), max(1, int(height * factor))), interpolation=cv2.INTER_AREA
+    )
+    canvas = np.zeros((size[1], size[0], 3), np.uint8)
+    top, left = (size[1] - small.shape[0]) // 2, (size[0] - small.shape[1]) // 2
+    canvas[top : top + small.shape[0], left : left + small.shape[1]] = small
+    return canvas

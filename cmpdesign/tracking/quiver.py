@@ -1,0 +1,93 @@
+"""The quiver plot: where the markers of one frame went from their rest, as arrows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from extractor.displacement import Rest
+    from extractor.reference import Reference
+    from extractor.tracking import Tracked
+
+Picture = NDArray[np.uint8]
+
+SIDE_PX = 1000  # the longer side of the drawing
+MARGIN_PX = 60
+FOOT_PX = 70
+LONGEST_EDGES = 1.5  # the longest arrow is drawn about as long as this many edges
+FIXED_BITS = 4
+GRID_BGR = (215, 215, 215)
+TEXT_BGR = (40, 40, 40)
+
+
+def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
+    """(H, W, 3) uint8 BGR: the gridlines at rest and an arrow for every marker that has a displacement.
+
+    Arrows point as seen in the image; they are drawn magnified by the whole factor that the caption states, and
+    colored by their length.
+    """
+    import cv2
+
+    known = np.isfinite(frame.displacement_px[:, 0])
+    scale, offset = _frame_of(rest.xy_px)
+    points = (rest.xy_px - offset) * scale + MARGIN_PX
+    size = np.nanmax(points, axis=0) + MARGIN_PX
+    canvas = np.full((int(size[1]) + FOOT_PX, int(size[0]), 3), 255, np.uint8)
+    lines = points[reference.edges]
+    _polylines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], GRID_BGR, 1)
+    length = np.linalg.norm(frame.displacement_px[known], axis=1)
+    largest = float(length.max()) if len(length) else 0.0
+    magnification = _magnification(lines, largest * scale)
+    tips = points[known] + frame.displacement_px[known] * scale * magnification
+    shade = np.round(255 * length / max(largest, 1e-12)).astype(np.uint8)
+    colors = cv2.applyColorMap(shade[:, None], cv2.COLORMAP_VIRIDIS)[:, 0] if len(shade) else shade
+    for start, tip, color in zip(points[known], tips, colors, strict=True):
+        _arrow(canvas, start, tip, tuple(int(c) for c in color))
+    _foot(canvas, frame, largest, magnification)
+    return canvas
+
+
+def _frame_of(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    low, high = np.nanmin(xy_px, axis=0), np.nanmax(xy_px, axis=0)
+    return (SIDE_PX - 2 * MARGIN_PX) / max(float((high - low).max()), 1.0), low
+
+
+def _magnification(lines: NDArray[np.float64], longest: float) -> int:
+    edge = float(np.nanmedian(np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1)))
+    return max(1, int(LONGEST_EDGES * edge / max(longest, 1e-9))) if longest > 0 else 1
+
+
+def _polylines(canvas: Picture, lines: NDArray[np.float64], color: Any, thickness: int) -> None:
+    import cv2
+
+    fixed = np.round(lines * (1 << FIXED_BITS)).astype(np.int32)
+    cv2.polylines(canvas, list(fixed), False, color, thickness, cv2.LINE_AA, FIXED_BITS)
+
+
+def _arrow(canvas: Picture, start: NDArray[np.float64], tip: NDArray[np.float64], color: Any) -> None:
+    along = tip - start
+    length = float(np.hypot(*along))
+    if length < 0.5:
+        return
+    back = along / length * min(0.35 * length, 9.0)
+    side = 0.5 * np.array([-back[1], back[0]])
+    _polylines(canvas, np.stack([start, tip])[None], color, 2)
+    _polylines(canvas, np.stack([tip - back + side, tip, tip - back - side])[None], color, 2)
+
+
+def _foot(canvas: Picture, frame: Tracked, largest_px: float, magnification: int) -> None:
+    import cv2
+
+    height, width = canvas.shape[:2]
+    bar = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[None], cv2.COLORMAP_VIRIDIS)
+    top, left = height - FOOT_PX + 15, MARGIN_PX
+    right = min(left + 300, width - MARGIN_PX)
+    canvas[top : top + 14, left:right] = cv2.resize(bar, (right - left, 14))
+    mm = np.linalg.norm(frame.displacement_mm, axis=1)
+    largest_mm = f" = {np.nanmax(mm):.4g} mm" if np.isfinite(mm).any() else ""
+    text = f"0 to {largest_px:.3g} px{largest_mm}; arrows x {magnification}; frame {frame.index}"
+    at = (left, top + 42)
+    cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)

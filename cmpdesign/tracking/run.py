@@ -1,0 +1,131 @@
+"""From a source through a tracker into what is written, until the source ends or somebody stops it."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.images import read_image
+from cmpdesign.tracking.overlay import Overlay
+from cmpdesign.tracking.sinks import Sink
+from cmpdesign.tracking.sources import Source, open_source
+from cmpdesign.tracking.summary import Tally
+
+if TYPE_CHECKING:
+    from extractor import Markers, Reference
+    from extractor.tracking import Tracked, Tracker
+
+
+@dataclass(eq=False)
+class Stop:
+    """Set from outside, looked at between two frames, so that no frame is torn."""
+
+    asked: bool = False
+
+
+@dataclass(eq=False)
+class Run:
+    """One run's parts. ``tally`` and ``ended_early`` tell how it went."""
+
+    source: Source
+    tracker: Tracker
+    sink: Sink
+    tally: Tally
+    overlay: Overlay | None = None
+    limit: int | None = None
+    ended_early: str = ""
+    stop: Stop = field(default_factory=Stop)
+
+    def go(self, watch: Callable[[Tracked], None]) -> None:
+        """Track to the end; ``watch`` sees every frame.
+
+        Raises:
+            OutputError: something could not be written; all that could be is complete, and the message says where.
+        """
+        failed: list[str] = []
+        try:
+            self._track(watch)
+        except OutputError as error:
+            failed.append(str(error))
+        finally:
+            failed += self._closed()
+        if failed:
+            raise OutputError("; ".join(dict.fromkeys((*failed, self.sink.kept()))))
+
+    def _track(self, watch: Callable[[Tracked], None]) -> None:
+        for frame in self.source.frames():
+            tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
+            self.sink.add(tracked, self.tracker.rest)
+            self.tally.add(tracked)
+            if self.overlay is not None:
+                self.overlay.add(frame.image, tracked, self.tracker.rest)
+            watch(tracked)
+            if self.stop.asked:
+                self.ended_early = f"stopped by hand after {self.tally.frames} frames"
+                return
+            if self.limit is not None and self.tally.frames >= self.limit:
+                return
+        self.ended_early = self.source.ended_early
+
+    def _closed(self) -> list[str]:
+        """Complete the files, each of them whatever becomes of the others; what could not be."""
+        failed = []
+        for part in (self.sink, self.overlay):
+            try:
+                if part is not None:
+                    part.close()
+            except OutputError as error:
+                failed.append(str(error))
+        return failed
+
+
+@contextmanager
+def stopped_by_hand(stop: Stop) -> Iterator[None]:
+    """Ctrl-C and a request to terminate end the run after the current frame; a second one ends it at once."""
+
+    def ask(number: int, frame: Any) -> None:
+        if stop.asked:
+            raise KeyboardInterrupt
+        stop.asked = True
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def rest_markers(text: str, source: str, reference: Reference, fps: float | None) -> Markers:
+    """The markers at rest: of a frame of the source by its number, or of an image file.
+
+    Raises:
+        CmpDesignError: there is no such frame or image, or no pattern is found in it.
+    """
+    from extractor import Extractor
+
+    image = _frame_at(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
+    name = f"frame {text}" if text.isdecimal() else text
+    if image is None:
+        raise CmpDesignError(f"--rest {text}: {name} cannot be read; choose another")
+    markers = Extractor(reference).extract(image)
+    if markers.reason is not None:
+        raise CmpDesignError(
+            f"--rest {text}: no pattern is found in {name} ({markers.reason}); choose another"
+        )
+    return markers
+
+
+def _frame_at(number: int, text: str, fps: float | None) -> Any:
+    source = open_source(text, fps)
+    if source.name.startswith("camera"):
+        raise CmpDesignError(f"--rest {number}: a camera's frames cannot be read ahead; give an image file")
+    for index, frame in enumerate(source.frames()):
+        if index == number:
+            return frame.image
+    raise CmpDesignError(f"--rest {number}: {text} has fewer frames")

@@ -1,0 +1,325 @@
+"""Where tracked frames go, as they come: whatever happens, what was written so far can be read.
+
+CSV grows beside its place as ``FILE.part``. NPZ and Parquet cannot grow: their frames go to ``FILE.part/``, a folder
+of chunks, each of them an .npz of its own, and are assembled at the end. A killed run leaves these for ``recover``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.tracking.table import LONG_COLUMNS, Columns, about, batch, long_form
+
+if TYPE_CHECKING:
+    from extractor.displacement import Rest
+    from extractor.reference import Reference
+    from extractor.tracking import Tracked
+
+CHUNK_FRAMES = 256
+CHUNK_S = 5.0  # what a crash can cost
+KINDS = (".npz", ".parquet", ".csv")
+
+
+class Sink(Protocol):
+    """A table that is written frame by frame.
+
+    ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says how many frames are where.
+    """
+
+    def add(self, frame: Tracked, rest: Rest | None) -> None: ...
+
+    def close(self) -> None: ...
+
+    def kept(self) -> str: ...
+
+
+def open_sink(path: Path, reference: Reference) -> Sink:
+    """The sink for a file's ending.
+
+    Raises:
+        CmpDesignError: another ending, Parquet without pyarrow, or an interrupted run's frames are there.
+        OutputError: nothing can be written there.
+    """
+    _require_kind(path)
+    part = _part(path)
+    if part.exists():
+        raise CmpDesignError(
+            f"{part} holds the frames of an interrupted run; call with --recover, or delete it"
+        )
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; give a file's name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return CsvSink(path, reference) if path.suffix == ".csv" else ChunkSink(path, reference)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def recover(path: Path) -> int:
+    """Make the file that an interrupted run left in pieces; returns how many frames it has.
+
+    Raises:
+        CmpDesignError: there are no pieces.
+        OutputError: the file cannot be written; the pieces are still there.
+    """
+    _require_kind(path)
+    part = _part(path)
+    if not part.exists():
+        raise CmpDesignError(f"{part}: there is nothing to recover")
+    try:
+        if path.suffix == ".csv":
+            rows = _cut_to_whole_lines(part)
+            part.replace(path)
+            return rows
+        return _assemble(part, path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error}); {part} is kept") from None
+
+
+def _part(path: Path) -> Path:
+    return path.with_name(path.name + ".part")
+
+
+def _require_kind(path: Path) -> None:
+    if path.suffix not in KINDS:
+        raise CmpDesignError(f"{path}: unknown ending; expected one of {', '.join(KINDS)}")
+    if path.suffix == ".parquet":
+        _pyarrow()
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise CmpDesignError(
+            "Parquet needs pyarrow: pip install 'cmpdesign[parquet]', or write .npz or .csv"
+        ) from None
+    return pyarrow
+
+
+class CsvSink:
+    """The long form as text, flushed frame by frame; a frame that does not fit on the disk is cut off again."""
+
+    def __init__(self, path: Path, reference: Reference) -> None:
+        self._path, self._part, self._reference = path, _part(path), reference
+        self._file = self._part.open("xb", buffering=0)
+        self._end, self._frames = 0, 0
+        self._write((",".join(LONG_COLUMNS) + "\n").encode())
+
+    def add(self, frame: Tracked, rest: Rest | None) -> None:
+        columns = long_form(batch([frame]), self._reference.layer, self._reference.index)
+        try:
+            self._write(_lines(columns))
+            self._frames += 1
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+
+    def _write(self, data: bytes) -> None:
+        written = 0
+        try:
+            while written < len(data):
+                written += self._file.write(data[written:])
+        except OSError:
+            self._file.truncate(self._end)
+            self._file.seek(self._end)
+            raise
+        self._end += written
+
+    def close(self) -> None:
+        try:
+            self._file.close()
+            self._part.replace(self._path)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+
+    def kept(self) -> str:
+        return f"{self._frames} frames are kept in {self._part if self._part.exists() else self._path}"
+
+
+def _lines(columns: Columns) -> bytes:
+    """A frame's rows; an empty field where nothing is known."""
+    reason = io.StringIO()
+    csv.writer(reason, lineterminator="").writerow([columns["reason"][0]])
+    head = f"{columns['frame'][0]},{_number(columns['time_s'][0], 6)},{columns['frame_status'][0]},{reason.getvalue()},"
+    digits = {name: 5 for name in LONG_COLUMNS[8:]} | {
+        "cov_xx_px2": 8,
+        "cov_xy_px2": 8,
+        "cov_yy_px2": 8,
+        "dx_mm": 6,
+        "dy_mm": 6,
+    }
+    if not columns["reason"][0]:
+        head = head.replace('""', "")
+    whole = [columns[name].tolist() for name in LONG_COLUMNS[4:8]]
+    real = [[_number(v, digits[name]) for v in columns[name].tolist()] for name in LONG_COLUMNS[8:]]
+    return "".join(head + ",".join(map(str, row)) + "\n" for row in zip(*whole, *real, strict=True)).encode()
+
+
+def _number(value: float, digits: int) -> str:
+    return "" if value != value else f"{value:.{digits}f}"
+
+
+def _cut_to_whole_lines(part: Path) -> int:
+    """Cut a line that was being written; returns how many frames have all their rows."""
+    with part.open("r+b") as file:
+        data = file.read()
+        end = data.rfind(b"\n") + 1
+        file.truncate(end)
+    frames = {line.split(b",", 1)[0] for line in data[:end].splitlines()[1:]}
+    return len(frames)
+
+
+class ChunkSink:
+    """Frames in chunks of some seconds, assembled at the end."""
+
+    def __init__(self, path: Path, reference: Reference) -> None:
+        self._path, self._part, self._reference = path, _part(path), reference
+        self._part.mkdir()
+        self._frames: list[Tracked] = []
+        self._rest: Rest | None = None
+        self._chunks, self._kept = 0, 0
+        self._last = time.monotonic()
+
+    def add(self, frame: Tracked, rest: Rest | None) -> None:
+        self._frames.append(frame)
+        self._rest = rest
+        if len(self._frames) >= CHUNK_FRAMES or time.monotonic() - self._last > CHUNK_S:
+            self._flush()
+
+    def _flush(self) -> None:
+        try:
+            _save(self._part / "about.npz", about(self._reference, self._rest))
+            if self._frames:
+                self._save(self._frames)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        self._frames, self._last = [], time.monotonic()
+
+    def _save(self, frames: list[Tracked]) -> None:
+        """As one chunk; where it does not fit, as two halves, so that a full disk takes what it can."""
+        try:
+            _save(self._part / f"{self._chunks:06d}.npz", batch(frames))
+        except OSError:
+            if len(frames) == 1:
+                raise
+            half = len(frames) // 2
+            self._save(frames[:half])
+            self._save(frames[half:])
+            return
+        self._chunks += 1
+        self._kept += len(frames)
+
+    def close(self) -> None:
+        self._flush()
+        try:
+            _assemble(self._part, self._path)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+
+    def kept(self) -> str:
+        if not self._part.exists():
+            return f"{self._kept} frames are kept in {self._path}"
+        return f"{self._kept} frames are kept in {self._part}; make room, then call with --recover"
+
+
+def _save(path: Path, columns: Columns) -> None:
+    """A chunk is there whole or not at all."""
+    beside = path.with_suffix(".new")
+    try:
+        with beside.open("wb") as file:
+            np.savez(file, allow_pickle=False, **columns)
+        beside.replace(path)
+    except OSError:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def _chunks(part: Path) -> Iterator[Columns]:
+    """The chunks in order, one in memory at a time."""
+    for path in sorted(part.glob("[0-9]*.npz")):
+        with np.load(path, allow_pickle=False) as file:
+            yield {name: file[name] for name in file.files}
+
+
+def _assemble(part: Path, path: Path) -> int:
+    """The chunks as one file; they are removed when it is complete. Returns the number of frames."""
+    with np.load(part / "about.npz", allow_pickle=False) as file:
+        fixed = {name: file[name] for name in file.files}
+    beside = part / ("whole" + path.suffix)
+    try:
+        frames = (_to_npz if path.suffix == ".npz" else _to_parquet)(part, beside, fixed)
+    except OSError:
+        beside.unlink(missing_ok=True)
+        raise
+    beside.replace(path)
+    shutil.rmtree(part)
+    return frames
+
+
+def _to_npz(part: Path, path: Path, fixed: Columns) -> int:
+    """Array by array and chunk by chunk, so that an hour of frames needs no more memory than a chunk."""
+    import zipfile
+
+    shapes: dict[str, tuple[np.dtype[Any], list[int]]] = {}
+    frames = 0
+    for columns in _chunks(part):
+        for name, values in columns.items():
+            shapes.setdefault(name, (values.dtype, list(values.shape)))
+        frames += len(columns["frame"])
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, values in fixed.items():
+            with archive.open(_member(name), "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asarray(values), allow_pickle=False)
+        for name, (dtype, shape) in shapes.items():
+            header = {
+                "descr": np.lib.format.dtype_to_descr(dtype),
+                "fortran_order": False,
+                "shape": (frames, *shape[1:]),
+            }
+            with archive.open(_member(name), "w", force_zip64=True) as file:
+                np.lib.format.write_array_header_1_0(file, header)
+                for columns in _chunks(part):
+                    file.write(np.ascontiguousarray(columns[name]).tobytes())
+    return frames
+
+
+def _member(name: str) -> Any:
+    """A zip member without a date."""
+    import zipfile
+
+    member = zipfile.ZipInfo(f"{name}.npy")
+    member.compress_type = zipfile.ZIP_DEFLATED
+    return member
+
+
+def _to_parquet(part: Path, path: Path, fixed: Columns) -> int:
+    """The long form, a row group for every chunk."""
+    arrow = _pyarrow()
+    frames, writer = 0, None
+    try:
+        for columns in _chunks(part):
+            long = long_form(columns, fixed["layer"], fixed["index"])
+            arrays = {
+                name: arrow.array(values, from_pandas=values.dtype.kind == "f")
+                for name, values in long.items()
+            }
+            table = arrow.table(arrays).replace_schema_metadata({"digest": str(fixed["digest"])})
+            writer = writer or arrow.parquet.ParquetWriter(path, table.schema, compression="zstd")
+            writer.write_table(table)
+            frames += len(columns["frame"])
+    finally:
+        if writer is not None:
+            writer.close()
+    if writer is None:
+        raise OSError(0, "no frame was tracked")
+    return frames

@@ -1,0 +1,202 @@
+"""Where frames come from: a video, a folder of images, a camera. A frame that cannot be read is a frame, too."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.images import Image, ImageFileError, read_image
+
+IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
+DEFAULT_FPS = 30.0
+PATIENCE = 10  # frames that may fail one after the other before a stream counts as ended
+
+
+class SourceError(CmpDesignError, ValueError):
+    """A source that cannot be opened; names it and what is expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What a source hands on: an image, or None and why there is none."""
+
+    time_s: float
+    image: Image | None
+    problem: str = ""
+
+
+class Source(Protocol):
+    """A sequence of frames that is read once.
+
+    Attributes:
+        name: for messages.
+        total: how many frames it says it has; None: not known.
+        fps: frames per second; None: not known.
+        ended_early: after the last frame: why there are no more, "" where all were read.
+    """
+
+    name: str
+    total: int | None
+    fps: float | None
+    ended_early: str
+
+    def frames(self) -> Iterator[Frame]: ...
+
+
+def open_source(text: str, fps: float | None = None) -> Source:
+    """The source that a text names: a number is a camera, else a folder of images or a video file.
+
+    Args:
+        fps: frames per second of a folder (30 without) or of a video whose own rate is wrong.
+
+    Raises:
+        SourceError: nothing to track there.
+    """
+    path = Path(text)
+    if text.isdecimal() and not path.exists():
+        return Camera(int(text))
+    if path.is_dir():
+        return Folder(path, fps or DEFAULT_FPS)
+    return Video(path, fps)
+
+
+class Folder:
+    """The images of a folder in the order of their names, numbers in them counted as numbers."""
+
+    def __init__(self, path: Path, fps: float) -> None:
+        try:
+            self.paths = sorted((p for p in path.iterdir() if p.suffix.lower() in IMAGES), key=_natural)
+        except OSError as error:
+            raise SourceError(f"{path}: cannot be read ({error.strerror or error})") from None
+        if not self.paths:
+            raise SourceError(f"{path}: holds no image; expected files ending in {', '.join(sorted(IMAGES))}")
+        self.name, self.ended_early = str(path), ""
+        self.total: int | None = len(self.paths)
+        self.fps: float | None = fps
+        self._fps = fps
+
+    def frames(self) -> Iterator[Frame]:
+        for index, path in enumerate(self.paths):
+            time_s = index / self._fps
+            try:
+                yield Frame(time_s, read_image(path))
+            except ImageFileError as error:
+                yield Frame(time_s, None, str(error))
+
+
+def _natural(path: Path) -> list[tuple[int, int | str]]:
+    """Sorts frame2 before frame10."""
+    parts: list[tuple[int, int | str]] = []
+    digits = ""
+    for letter in path.name + "\0":
+        if letter in "0123456789":
+            digits += letter
+            continue
+        if digits:
+            parts.append((0, int(digits)))
+            digits = ""
+        parts.append((1, letter))
+    return parts
+
+
+class Video:
+    """A video file, read by OpenCV; time stamps are the file's own, or counted at ``fps`` where that is given."""
+
+    def __init__(self, path: Path, fps: float | None) -> None:
+        if not path.is_file():
+            raise SourceError(
+                f"{path}: no such file or folder; expected a video, a folder of images or a camera's number"
+            )
+        self._capture = _capture(str(path))
+        if not self._capture.isOpened():
+            raise SourceError(
+                f"{path}: is not a video that can be read, or its end with the index is missing"
+            )
+        import cv2
+
+        self.name, self.ended_early = str(path), ""
+        declared = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        own = float(self._capture.get(cv2.CAP_PROP_FPS))
+        self.total = declared if 0 < declared < 1 << 30 else None
+        self.fps = fps or (own if 0 < own < 1e5 else None)
+        self._counted = fps is not None
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that comes out; one in the middle that cannot be decoded is handed on as unreadable."""
+        import cv2
+
+        index, failed = 0, 0
+        try:
+            while failed < PATIENCE:
+                good, image = self._capture.read()
+                if not good or image is None:
+                    if self.total is None or index + failed >= self.total:
+                        break
+                    failed += 1
+                    continue
+                for _ in range(failed):
+                    yield Frame(self._time(index), None, "cannot be decoded")
+                    index += 1
+                failed = 0
+                time_s = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1e3
+                yield Frame(self._time(index) if self._counted or time_s < 0 else time_s, image)
+                index += 1
+        finally:
+            self._capture.release()
+        if self.total is not None and index < self.total:
+            self.ended_early = f"the video ends after {index} of the {self.total} frames that it declares"
+
+    def _time(self, index: int) -> float:
+        return index / self.fps if self.fps else float("nan")
+
+
+class Camera:
+    """A camera by its number; time stamps are taken when a frame arrives, counted from the first one."""
+
+    def __init__(self, number: int) -> None:
+        self._capture = _capture(number)
+        if not self._capture.isOpened():
+            raise SourceError(
+                f"camera {number} cannot be opened; is it connected, and free of other programs?"
+            )
+        self.name, self.ended_early = f"camera {number}", ""
+        self.total: int | None = None
+        self.fps: float | None = None
+
+    def frames(self) -> Iterator[Frame]:
+        """Until the camera stops, or for ever."""
+        start: float | None = None
+        failed, index = 0, 0
+        try:
+            while failed < PATIENCE:
+                good, image = self._capture.read()
+                now = time.monotonic()
+                start = now if start is None else start
+                if good and image is not None:
+                    failed = 0
+                    yield Frame(now - start, image)
+                else:
+                    failed += 1
+                    yield Frame(now - start, None, "the camera gave no image")
+                index += 1
+        finally:
+            self._capture.release()
+        self.ended_early = f"the camera stopped after {index - failed} frames"
+
+
+def _capture(source: str | int) -> Any:
+    """OpenCV's reader, which would tell on stderr of every damaged frame; a frame's status says it."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    import cv2
+
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.VideoCapture(source)
+    finally:
+        cv2.utils.logging.setLogLevel(level)

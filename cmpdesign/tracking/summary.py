@@ -1,0 +1,127 @@
+"""What a run of tracking amounts to, counted frame by frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from extractor.displacement import Rest
+    from extractor.reference import Reference
+    from extractor.tracking import Tracked
+
+AT_REST_PX = 0.2  # median displacement below which the pattern counts as resting
+MIN_REST_PAIRS = 10  # resting frames after resting frames, below which no jitter is stated
+
+
+class Tally:
+    """Counts; ``farthest`` is the frame with the largest RMS displacement, for the quiver plot."""
+
+    def __init__(self, reference: Reference) -> None:
+        self._reference = reference
+        self._elapsed_ms: list[float] = []
+        self._statuses: Counter[str] = Counter()
+        self._starts: Counter[str] = Counter()
+        self._reasons: Counter[str] = Counter()
+        self._markers = np.zeros(4, np.int64)
+        self._resting: Tracked | None = None
+        self._pairs, self._squares, self._values = 0, 0.0, 0
+        self._largest = (-1.0, -1, -1, float("nan"))
+        self._farthest_px = -1.0
+        self.farthest: Tracked | None = None
+
+    @property
+    def frames(self) -> int:
+        return len(self._elapsed_ms)
+
+    @property
+    def tracked(self) -> int:
+        return self._statuses["tracked"]
+
+    def add(self, frame: Tracked) -> None:
+        self._elapsed_ms.append(frame.elapsed_ms)
+        self._statuses[frame.status.name.lower()] += 1
+        self._reasons[frame.reason] += 1
+        self._starts[frame.start or "none"] += 1
+        self._markers += np.bincount(frame.markers.status[self._reference.present], minlength=4)
+        self._add_motion(frame)
+
+    def _add_motion(self, frame: Tracked) -> None:
+        length = np.linalg.norm(frame.displacement_px, axis=1)
+        if not np.isfinite(length).any():
+            self._resting = None
+            return
+        marker = int(np.nanargmax(length))
+        if length[marker] > self._largest[0]:
+            mm = float(np.linalg.norm(frame.displacement_mm[marker]))
+            self._largest = (float(length[marker]), frame.index, marker, mm)
+        rms = float(np.sqrt(np.nanmean(length**2)))
+        if rms > self._farthest_px:
+            self._farthest_px, self.farthest = rms, frame
+        if np.nanmedian(length) >= AT_REST_PX:
+            self._resting = None
+            return
+        if self._resting is not None:
+            step = frame.markers.xy_px - self._resting.markers.xy_px
+            step = step[np.isfinite(step)]
+            self._pairs += 1
+            self._squares += float(np.sum(step**2))
+            self._values += len(step)
+        self._resting = frame
+
+    @property
+    def jitter_px(self) -> float | None:
+        """A resting marker's standard deviation per axis, from frame to frame; None with too few resting frames."""
+        if self._pairs < MIN_REST_PAIRS or not self._values:
+            return None
+        return float(np.sqrt(self._squares / self._values / 2))
+
+    def to_json(self, source: str, declared: int | None, ended: str, rest: Rest | None) -> dict[str, Any]:
+        """The summary as it is written; see docs/tracking.md."""
+        total = max(int(self._markers.sum()), 1)
+        lost, measured, repaired, fitted = (float(n) / total for n in self._markers)
+        return {
+            "format": "cmp-tracking",
+            "version": 1,
+            "source": source,
+            "pattern": self._reference.pattern,
+            "digest": self._reference.digest,
+            "ended_early": ended or None,
+            "frames": {
+                "declared": declared,
+                "read": self.frames,
+                **{name: self._statuses[name] for name in ("tracked", "lost", "unreadable", "other_size")},
+            },
+            "reasons": {reason: count for reason, count in sorted(self._reasons.items()) if reason},
+            "starts": {str(start): count for start, count in sorted(self._starts.items()) if start != "none"},
+            "marker_shares": {"measured": measured, "repaired": repaired + fitted, "lost": lost},
+            "time_ms": self._percentiles(),
+            "frames_per_s": {name: 1e3 / ms if ms else None for name, ms in self._percentiles().items()},
+            "rest": _rest(rest),
+            "jitter_px": self.jitter_px,
+            "jitter_pairs": self._pairs,
+            "largest_displacement": self._largest_json(),
+        }
+
+    def _percentiles(self) -> dict[str, float]:
+        values = np.percentile(self._elapsed_ms, (50, 95, 99)) if self._elapsed_ms else np.zeros(3)
+        return dict(zip(("p50", "p95", "p99"), (float(v) for v in values), strict=True))
+
+    def _largest_json(self) -> dict[str, Any] | None:
+        px, frame, marker, mm = self._largest
+        if frame < 0:
+            return None
+        return {"px": px, "mm": mm if np.isfinite(mm) else None, "frame": frame, "marker": marker}
+
+
+def _rest(rest: Rest | None) -> dict[str, Any] | None:
+    if rest is None:
+        return None
+    residual = rest.residual_mm
+    return {
+        "markers": int(np.isfinite(rest.xy_px[:, 0]).sum()),
+        "mm_per_px": rest.mm_per_px,
+        "residual_mm": residual if np.isfinite(residual) else None,
+    }
