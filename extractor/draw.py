@@ -41,6 +41,7 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     points = _at(markers.xy_px, scale)
     _draw_edges(canvas, reference, points)
     _draw_reference(canvas, reference, points)
+    _draw_fiducials(canvas, reference, points)
     edge = _median_edge(reference, points)
     radius = float(np.clip(edge / 9, 1.5, 6.0))
     for status, color in STATUS_BGR.items():
@@ -133,6 +134,21 @@ def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.fl
         _lines(canvas, corners[None], WHITE_BGR, 2)
         x, y = points[reference.reference_marker]
         _dot(canvas, x, y, 9.0, WHITE_BGR, 2)
+
+
+def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
+    """Rings where the registration marks must be, carried over from the layout by the markers' homography."""
+    known = np.isfinite(points[:, 0])
+    if len(reference.fiducials_mm) == 0 or known.sum() < 4:
+        return
+    carry, _ = cv2.findHomography(reference.xy_mm[known], points[known])
+    if carry is None:
+        return
+    around = np.linspace(0.0, 2 * np.pi, 33)[:-1]
+    ring = 0.5 * reference.fiducial_diameter_mm * np.stack([np.cos(around), np.sin(around)], axis=1)
+    rings = (reference.fiducials_mm[:, None] + ring).reshape(-1, 1, 2)
+    drawn = np.asarray(cv2.perspectiveTransform(rings, carry), np.float64).reshape(-1, len(ring), 2)
+    _lines(canvas, drawn, WHITE_BGR, 2)
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:

@@ -197,7 +197,8 @@ def test_gcode_of_a_pocket_turns_its_lines() -> None:
 
 def test_pygcode_reads_it() -> None:
     """Another interpreter agrees on every place."""
-    pygcode = pytest.importorskip("pygcode")
+    import pygcode
+
     job, drawing = drawn(0)
     text = drawing_to_gcode(drawing.only(job.passes[-2]))
     places = []

@@ -77,7 +77,8 @@ def test_a_video_becomes_arrays(made: Path, tmp_path: Path) -> None:
 
 
 def test_all_tables_and_sources_say_the_same(made: Path, tmp_path: Path) -> None:
-    pyarrow = pytest.importorskip("pyarrow.parquet")
+    import pyarrow.parquet as pyarrow
+
     table = tracked(made, "video.avi", tmp_path / "a.npz")
     folder = tracked(made, "frames", tmp_path / "b.npz", "--fps", "25")
     for name in ("xy_px", "status", "displacement_mm", "time_s", "frame"):
