@@ -132,7 +132,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wheel_holds_what_is_shipped(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     shipped = {"extractor/layout.schema.json", "extractor/py.typed", "cmpdesign/py.typed"}
-    shipped |= {f"cmpdesign/templates/{path.name}" for path in (ROOT / "templates").glob("*.toml")}
+    shipped |= {f"cmpdesign/{path.relative_to(ROOT)}" for path in (ROOT / "templates").rglob("*.toml")}
     shipped |= {str(path.relative_to(ROOT)) for path in SOURCES}
     assert shipped <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import ezdxf
 import numpy as np
+import pygcode
 import pytest
 import svgelements
 from laser_tools import Points, groups_of, made_job, run_gcode
@@ -197,8 +198,6 @@ def test_gcode_of_a_pocket_turns_its_lines() -> None:
 
 def test_pygcode_reads_it() -> None:
     """Another interpreter agrees on every place."""
-    import pygcode
-
     job, drawing = drawn(0)
     text = drawing_to_gcode(drawing.only(job.passes[-2]))
     places = []
