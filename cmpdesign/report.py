@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -88,12 +89,13 @@ def report(design: Design, layout: Layout) -> Report:
     )
 
 
-def report_to_json(figures: Report) -> str:
-    """report.json's text."""
+def report_to_json(figures: Report, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+    """report.json's text; ``products`` (name -> figures) are what the products measured of themselves."""
     document = {
         "format": "cmp-report",
         "version": 1,
         **asdict(figures),
+        **(products or {}),
         "generator": f"cmpdesign {__version__}",
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"

@@ -112,6 +112,19 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "1", "b": "2"}
 
 
+def test_a_folder_takes_sub_folders(tmp_path: Path) -> None:
+    paths = write_folder(
+        tmp_path / "made", {"job/1.svg": "first", "2.svg": "second", "other/1.svg": b"third"}
+    )
+    assert [path.relative_to(tmp_path / "made").as_posix() for path in paths] == [
+        "job/1.svg",
+        "2.svg",
+        "o/1.svg",
+    ]
+    assert [path.read_text() for path in paths] == ["first", "second", "third"]
+    assert {path.name for path in (tmp_path / "made").iterdir()} == {"job", "o", "2.svg"}
+
+
 def test_what_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder").mkdir()

@@ -9,13 +9,10 @@ import typer
 
 from cmpdesign.cli.terminal import console, print_warning, printable
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.products import PRODUCTS, USUAL, chosen_products, make_products
 
 if TYPE_CHECKING:
-    from cmpdesign.design import Design
-    from cmpdesign.layout import Layout
     from cmpdesign.report import Report
-
-FILES = {"svg": "pattern.svg", "layout": "layout.json", "preview": "preview.png", "report": "report.json"}
 
 DesignArgument = Annotated[str, typer.Argument(metavar="DESIGN", help="A template's name or a TOML file.")]
 SetOption = Annotated[
@@ -33,24 +30,24 @@ def build(
     ] = Path("out"),
     override: SetOption = None,
     only: Annotated[
-        str, typer.Option(metavar="NAMES", help=f"Which files, separated by commas: {', '.join(FILES)}.")
-    ] = ",".join(FILES),
+        str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
+    ] = USUAL,
 ) -> None:
-    """Write a design's files: SVG, layout file, preview and report."""
+    """Write a design's files: SVG, layout file, preview and report, or what --only names."""
     from cmpdesign.build import build_layout
     from cmpdesign.design import load_design
     from cmpdesign.report import report
     from cmpdesign.writers.atomic import write_folder
 
-    names = chosen_files(only)
+    names = chosen_products(only)
     parameters = load_design(design, overrides(override))
     layout = build_layout(parameters)
     figures = report(parameters, layout)
-    contents = {FILES[name]: _content(name, parameters, layout, figures) for name in names}
-    for path in write_folder(output, contents):
+    files, findings = make_products(names, parameters, layout, figures)
+    for path in write_folder(output, files):
         console().print(f"wrote {printable(path)}")
     print_figures(figures)
-    for finding in figures.findings:
+    for finding in (*figures.findings, *findings):
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
 
@@ -64,36 +61,6 @@ def overrides(texts: list[str] | None) -> dict[str, str]:
             raise CmpDesignError(f"--set {text}: expected NAME=VALUE, as in pitch_mm=1.5mm")
         found[name.strip()] = value.strip()
     return found
-
-
-def chosen_files(only: str) -> list[str]:
-    names = [name.strip() for name in only.split(",") if name.strip()]
-    for name in names:
-        if name not in FILES:
-            raise CmpDesignError(f"--only {name}: unknown; there are {', '.join(FILES)}")
-    if not names:
-        raise CmpDesignError(f"--only names no file; there are {', '.join(FILES)}")
-    return [name for name in FILES if name in names]
-
-
-def _content(name: str, design: Design, layout: Layout, figures: Report) -> str | bytes:
-    if name == "svg":
-        from cmpdesign.writers.svg import layout_to_svg
-
-        return layout_to_svg(
-            layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror
-        )
-    if name == "layout":
-        from cmpdesign.writers.layout_file import layout_to_json
-
-        return layout_to_json(layout)
-    if name == "preview":
-        from cmpdesign.writers.preview import layout_to_png
-
-        return layout_to_png(layout)
-    from cmpdesign.report import report_to_json
-
-    return report_to_json(figures)
 
 
 def print_figures(figures: Report) -> None:

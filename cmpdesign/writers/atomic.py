@@ -32,7 +32,7 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
 
     Args:
         folder: made if missing.
-        files: name -> content.
+        files: name -> content; a name may lead into sub-folders ("laser/1-red.svg"), which are made.
 
     Returns:
         The paths in the order of ``files``.
@@ -47,10 +47,12 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
         for path in paths:
             _refuse_folder(path)
         with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=folder) as stage:
-            for name, content in files.items():
-                _write_through(Path(stage) / name, content)
+            for number, content in enumerate(files.values()):
+                _write_through(Path(stage) / str(number), content)
             for path in paths:
-                (Path(stage) / path.name).replace(path)
+                path.parent.mkdir(parents=True, exist_ok=True)
+            for number, path in enumerate(paths):
+                (Path(stage) / str(number)).replace(path)
     return paths
 
 

@@ -1,0 +1,129 @@
+"""What a design can be turned into: the registry of products, and their making.
+
+A product is added by one line in ``PRODUCTS``, which names its maker as "module:function"
+so that nothing is imported before it is asked for. The maker takes ``(design, layout)`` and returns a
+``Made``: the files (path relative to the output folder -> content) and, where it has any, figures for
+``report.json`` (they stand there under the product's name) and findings that the user should hear of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from cmpdesign.checks import Finding
+    from cmpdesign.design import Design
+    from cmpdesign.layout import Layout
+    from cmpdesign.report import Report
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a product came to.
+
+    Attributes:
+        files: path relative to the output folder, with "/" -> content; the same bytes for the same design.
+        figures: what the product measures of itself, as JSON values; its member in ``report.json``.
+        findings: what will not or may not work.
+    """
+
+    files: Mapping[str, str | bytes]
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+Maker = Callable[["Design", "Layout"], Made]
+
+
+@dataclass(frozen=True)
+class Product:
+    """One entry of the registry.
+
+    Attributes:
+        maker: "module:function" of the ``Maker``.
+        where: the file or folder that appears, for help texts.
+        usual: made by a plain ``build``; the others only when ``--only`` names them.
+    """
+
+    maker: str
+    where: str
+    usual: bool = False
+
+
+REPORT = "report"
+PRODUCTS: Mapping[str, Product] = {
+    "svg": Product("cmpdesign.products:_svg", "pattern.svg", usual=True),
+    "layout": Product("cmpdesign.products:_layout", "layout.json", usual=True),
+    "preview": Product("cmpdesign.products:_preview", "preview.png", usual=True),
+    # The report comes last and is no ``Maker``: it is written from what the others measured.
+    REPORT: Product("cmpdesign.report:report_to_json", "report.json", usual=True),
+}
+USUAL = ",".join(name for name, product in PRODUCTS.items() if product.usual)
+
+
+def chosen_products(only: str) -> list[str]:
+    """The names in a text such as "svg, layout", in the registry's order.
+
+    Raises:
+        CmpDesignError: an unknown name, or none.
+    """
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    for name in names:
+        if name not in PRODUCTS:
+            raise CmpDesignError(f"--only {name}: unknown; there are {', '.join(PRODUCTS)}")
+    if not names:
+        raise CmpDesignError(f"--only names no file; there are {', '.join(PRODUCTS)}")
+    return [name for name in PRODUCTS if name in names]
+
+
+def make_products(
+    names: Sequence[str], design: Design, layout: Layout, report: Report
+) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
+    """Make the named products.
+
+    A product that has figures brings ``report.json`` with it, named or not.
+
+    Returns:
+        All files by relative path, in the registry's order, and the products' findings.
+
+    Raises:
+        CmpDesignError: one of them cannot be made; nothing has been written.
+    """
+    made = {name: _maker(name)(design, layout) for name in names if name != REPORT}
+    files = {path: content for product in made.values() for path, content in product.files.items()}
+    figures = {name: product.figures for name, product in made.items() if product.figures}
+    if figures or REPORT in names:
+        from cmpdesign.report import report_to_json
+
+        files[PRODUCTS[REPORT].where] = report_to_json(report, figures)
+    return files, tuple(finding for product in made.values() for finding in product.findings)
+
+
+def _maker(name: str) -> Maker:
+    module, _, function = PRODUCTS[name].maker.partition(":")
+    maker: Maker = getattr(import_module(module), function)
+    return maker
+
+
+def _svg(design: Design, layout: Layout) -> Made:
+    from cmpdesign.writers.svg import layout_to_svg
+
+    text = layout_to_svg(layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror)
+    return Made({PRODUCTS["svg"].where: text})
+
+
+def _layout(design: Design, layout: Layout) -> Made:
+    from cmpdesign.writers.layout_file import layout_to_json
+
+    return Made({PRODUCTS["layout"].where: layout_to_json(layout)})
+
+
+def _preview(design: Design, layout: Layout) -> Made:
+    from cmpdesign.writers.preview import layout_to_png
+
+    return Made({PRODUCTS["preview"].where: layout_to_png(layout)})
