@@ -1,0 +1,135 @@
+"""Closed outlines of straight sides and circular arcs: what every face of a mold is bounded by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A closed outline, counter-clockwise.
+
+    Attributes:
+        points: (m, 2) mm; side i goes from point i to point i + 1.
+        centres: (m, 2) mm, NaN for a straight side; else side i is the counter-clockwise arc around it.
+    """
+
+    points: Points
+    centres: Points
+
+    def moved(self, offset_mm: float) -> Loop:
+        """The outline ``offset_mm`` further out: straight sides shift, arcs grow around the same centres.
+
+        Where two straight sides meet, their corner stays sharp (a mitre).
+        """
+        return Loop(self.points + offset_mm * self._moves(), self.centres)
+
+    def _moves(self) -> Points:
+        """(m, 2): how far each point moves when every side moves outward by one."""
+        side = np.roll(self.points, -1, axis=0) - self.points
+        normal = np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
+        curved = ~np.isnan(self.centres[:, 0])
+        start, end = normal.copy(), normal.copy()
+        centre = self.centres[curved]
+        start[curved] = _unit(self.points[curved] - centre)
+        end[curved] = _unit(np.roll(self.points, -1, axis=0)[curved] - centre)
+        before = np.roll(end, 1, axis=0)
+        moves: Points = (before + start) / (1 + (before * start).sum(axis=1))[:, None]
+        return moves
+
+    def area_mm2(self) -> float:
+        """The enclosed area: the shoelace formula and a segment for each arc, both exact."""
+        x, y = self.points.T
+        area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+        for side in np.flatnonzero(~np.isnan(self.centres[:, 0])):
+            radius, _, sweep = self.arc(int(side))
+            area += radius**2 * (sweep - np.sin(sweep)) / 2
+        return area
+
+    def arc(self, side: int) -> tuple[float, float, float]:
+        """Radius (mm), first angle and sweep (radians, positive) of a curved side."""
+        first = self.points[side] - self.centres[side]
+        last = self.points[(side + 1) % len(self.points)] - self.centres[side]
+        angle = float(np.arctan2(first[1], first[0]))
+        sweep = float(np.arctan2(first[0] * last[1] - first[1] * last[0], first @ last)) % (2 * np.pi)
+        return float(np.hypot(*first)), angle, sweep
+
+    def shifted(self, x_mm: float, y_mm: float) -> Loop:
+        """The outline at another place."""
+        move = np.array([x_mm, y_mm])
+        return Loop(self.points + move, self.centres + move)
+
+    def box(self) -> tuple[Points, Points]:
+        """Lower left and upper right corner of what the outline covers (arcs at their full circle's reach)."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        for side in np.flatnonzero(~np.isnan(self.centres[:, 0])):
+            radius, first, sweep = self.arc(int(side))
+            for quarter in range(4):
+                angle = quarter * np.pi / 2
+                if (angle - first) % (2 * np.pi) < sweep:
+                    point = self.centres[side] + radius * np.array([np.cos(angle), np.sin(angle)])
+                    low, high = np.minimum(low, point), np.maximum(high, point)
+        return low, high
+
+
+def _unit(vectors: Points) -> Points:
+    unit: Points = vectors / np.hypot(*vectors.T)[:, None]
+    return unit
+
+
+def polygon(points: Points) -> Loop:
+    """A loop of straight sides."""
+    return Loop(np.asarray(points, dtype=np.float64), np.full((len(points), 2), np.nan))
+
+
+def circle(centre: Points, diameter_mm: float) -> Loop:
+    """A circle of two half arcs."""
+    centre = np.asarray(centre, dtype=np.float64)
+    reach = np.array([diameter_mm / 2, 0.0])
+    return Loop(np.stack([centre + reach, centre - reach]), np.stack([centre, centre]))
+
+
+def rounded(corners: Points, radius_mm: float) -> Loop:
+    """A convex polygon (counter-clockwise) whose corners are arcs of the given radius; sharp at radius 0.
+
+    The arcs touch the polygon's sides from inside, as a cutter or a beam of that radius leaves them.
+    """
+    if radius_mm == 0:
+        return polygon(corners)
+    core = polygon(corners).moved(-radius_mm).points
+    side = np.roll(corners, -1, axis=0) - corners
+    normal = radius_mm * np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
+    points = np.stack([core + np.roll(normal, 1, axis=0), core + normal], axis=1).reshape(-1, 2)
+    centres = np.stack([core, np.full_like(core, np.nan)], axis=1).reshape(-1, 2)
+    return Loop(points, centres)
+
+
+def grown(corners: Points, offset_mm: float) -> Loop:
+    """Everything within ``offset_mm`` of a convex polygon: its corners become arcs around themselves."""
+    side = np.roll(corners, -1, axis=0) - corners
+    normal = offset_mm * np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
+    points = np.stack([corners + np.roll(normal, 1, axis=0), corners + normal], axis=1).reshape(-1, 2)
+    centres = np.stack([corners, np.full_like(corners, np.nan)], axis=1).reshape(-1, 2)
+    return Loop(points, centres)
+
+
+def rounded_rectangle(low: Points, high: Points, radius_mm: float) -> Loop:
+    """An upright rectangle from its lower left to its upper right corner."""
+    (left, bottom), (right, top) = low, high
+    return rounded(np.array([(left, bottom), (right, bottom), (right, top), (left, top)]), radius_mm)
+
+
+def frustum_volume_mm3(lower: Loop, upper: Loop, height_mm: float) -> float:
+    """Volume between two parallel outlines that belong together side by side.
+
+    A drafted wall's section grows with the square of the height, so Simpson's rule is exact: it needs the
+    section half way, whose points lie half way between the outlines' points.
+    """
+    middle = Loop((lower.points + upper.points) / 2, lower.centres)
+    sections = lower.area_mm2() + 4 * middle.area_mm2() + upper.area_mm2()
+    return height_mm * sections / 6
