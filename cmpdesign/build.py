@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.design import Design
 from cmpdesign.errors import DesignError
+from cmpdesign.fiducials import fiducial_positions
 from cmpdesign.graphs import Mesh
 from cmpdesign.layout import DECIMALS, Layout
 from cmpdesign.numbering import Ints
@@ -63,6 +64,8 @@ def build_layout(design: Design) -> Layout:
         palette=design.palette.model_dump(),
         border_mm=design.border_mm,
         outline_mm=_rounded(outline_mm + centre_mm),
+        fiducials_mm=_rounded(fiducial_positions(design.fiducials, outline_mm + centre_mm)),
+        fiducial_diameter_mm=design.fiducials.diameter_mm if design.fiducials.count else 0.0,
     )
 
 

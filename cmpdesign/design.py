@@ -5,60 +5,23 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    WithJsonSchema,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from cmpdesign.errors import DesignError
+from cmpdesign.fiducials import Fiducials
 from cmpdesign.graphs import MAX_LAYERS
+from cmpdesign.laser.options import LaserOptions
 from cmpdesign.patterns import patterns
-from cmpdesign.units import ANGLES_DEG, LENGTHS_MM, parse_angle_deg, parse_length_mm
+from cmpdesign.quantities import Angle, Color, Length, LengthOrZero
 
 # An ellipse flatter than 4 : 1 brings cells with corners below 15 degrees, which neither print nor read.
 ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
-LARGEST_MM = 10_000.0
 SMALLEST_PITCH_MM = 0.001
 MAX_VIRTUAL_PER_EDGE = 100
-
-
-def _quantity_schema(units: Sequence[str], zero: bool, signed: bool = False) -> dict[str, Any]:
-    sign = "[+-]?" if signed else "[+]?"
-    number: dict[str, Any] = {"type": "number"}
-    if not signed:
-        number["minimum" if zero else "exclusiveMinimum"] = 0
-    pattern = rf"^\s*{sign}(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*({'|'.join(units)})?\s*$"
-    return {"anyOf": [number, {"type": "string", "pattern": pattern}]}
-
-
-_LENGTH = BeforeValidator(parse_length_mm)
-Length = Annotated[
-    float,
-    Field(gt=0, le=LARGEST_MM),
-    _LENGTH,
-    WithJsonSchema(_quantity_schema(tuple(LENGTHS_MM), zero=False)),
-]
-LengthOrZero = Annotated[
-    float, Field(ge=0, le=LARGEST_MM), _LENGTH, WithJsonSchema(_quantity_schema(tuple(LENGTHS_MM), zero=True))
-]
-Angle = Annotated[
-    float,
-    Field(ge=-360, le=360),
-    BeforeValidator(parse_angle_deg),
-    WithJsonSchema(_quantity_schema(tuple(ANGLES_DEG), zero=True, signed=True)),
-]
-Color = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$"), AfterValidator(str.lower)]
 
 
 class _Strict(BaseModel):
@@ -138,6 +101,13 @@ class Design(_Strict):
     clip_diameter_mm: Length | None = Field(None, description="Diameter of a circular clip outline.")
 
     palette: Palette = Field(default_factory=Palette, description="The inks.")
+    fiducials: Fiducials = Field(
+        default_factory=Fiducials,
+        description="Marks around the pattern by which jobs, prints and molds agree.",
+    )
+    laser: LaserOptions = Field(
+        default_factory=LaserOptions, description="How a laser carves the cells; for --only laser."
+    )
 
     print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")
     print_scale: bool = Field(
@@ -298,7 +268,7 @@ def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
         path = ".".join(str(part) for part in item["loc"])
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
-            fields = Palette.model_fields if len(item["loc"]) > 1 else model.model_fields
+            fields = _fields_at(model, item["loc"][:-1])
             parts.append(f"{path} is unknown{_nearest(str(item['loc'][-1]), fields)}")
         elif item["type"] == "missing":
             parts.append(f"{path} is missing")
@@ -311,3 +281,12 @@ def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
             message = message.removeprefix("Input should be ")
             parts.append(f"{path} = {item['input']!r} must be {message}{unit}")
     return "; ".join(parts)
+
+
+def _fields_at(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
+    """The fields of the table that a path of names leads to."""
+    for name in path:
+        table = model.model_fields[str(name)].annotation
+        assert isinstance(table, type) and issubclass(table, BaseModel)
+        model = table
+    return model.model_fields

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -37,6 +37,8 @@ class Layout:
         border_mm: width of the black border around the pattern.
         outline_mm: (K, 2) float64, the ground's closed outline (border included), counter-clockwise, the
             first point not repeated.
+        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
+        fiducial_diameter_mm: their diameter.
     """
 
     pattern: str
@@ -53,6 +55,8 @@ class Layout:
     palette: Mapping[str, str]
     border_mm: float
     outline_mm: NDArray[np.float64]
+    fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    fiducial_diameter_mm: float = 0.0
 
     def __post_init__(self) -> None:
         columns: tuple[NDArray[Any], ...] = (

@@ -39,4 +39,6 @@ def layout_from_reference(reference: Reference) -> Layout:
         palette=reference.palette,
         border_mm=reference.border_mm,
         outline_mm=reference.outline_mm,
+        fiducials_mm=reference.fiducials_mm,
+        fiducial_diameter_mm=reference.fiducial_diameter_mm,
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -32,6 +32,7 @@ FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
+OPTIONAL_FIELDS = ("fiducials",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,8 @@ class Reference:
         border_mm: width of the black border.
         outline_mm: (K, 2) float64, the ground's closed outline, counter-clockwise.
         digest: SHA-256 (hex) of the geometry.
+        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where the file names none.
+        fiducial_diameter_mm: their diameter.
     """
 
     pattern: str
@@ -71,10 +74,13 @@ class Reference:
     border_mm: float
     outline_mm: NDArray[np.float64]
     digest: str
+    fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    fiducial_diameter_mm: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("layer", "index", "xy_mm", "cell_corners", "cell_color", "edges", "outline_mm"):
             getattr(self, name).setflags(write=False)
+        self.fiducials_mm.setflags(write=False)
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
 
@@ -148,6 +154,7 @@ def _reference(document: dict[str, Any]) -> Reference:
     corners = fields.integer_rows(cells["corners"], "cells.corners", count - 1, (3, 4))
     start = fields.mapping(document["reference"], "reference")
     fields.known_fields(start, ("cell", "marker"), "reference.")
+    fiducials_mm, fiducial_diameter_mm = _fiducials(document)
     reference = Reference(
         pattern=fields.text_field(document["pattern"], "pattern"),
         parameters=_parameters(document["parameters"]),
@@ -164,6 +171,8 @@ def _reference(document: dict[str, Any]) -> Reference:
         border_mm=fields.length_mm(document["border_mm"], "border_mm"),
         outline_mm=fields.points_mm(document["outline"], "outline"),
         digest=fields.text_field(document["digest"], "digest"),
+        fiducials_mm=fiducials_mm,
+        fiducial_diameter_mm=fiducial_diameter_mm,
     )
     check_consistency(reference)
     _check_digest(reference)
@@ -177,7 +186,8 @@ def _check_header(document: dict[str, Any]) -> None:
         if type(value) is not type(expected) or value != expected:
             found = fields.shown(value) if field in document else "missing"
             fields.fail(field, found, fields.shown(expected))
-    fields.known_fields(document, FIELDS)
+    known = FIELDS + tuple(name for name in OPTIONAL_FIELDS if name in document)
+    fields.known_fields(document, known)
     fields.text_field(document["generator"], "generator")
 
 
@@ -195,6 +205,18 @@ def _palette(value: object) -> dict[str, str]:
         if type(ink) is not str or not re.fullmatch("#[0-9a-fA-F]{6}", ink):
             fields.fail(f"palette.{name}", fields.shown(ink), 'a color as "#rrggbb"')
     return palette
+
+
+def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
+    if "fiducials" not in document:
+        return np.empty((0, 2)), 0.0
+    marks = fields.mapping(document["fiducials"], "fiducials")
+    fields.known_fields(marks, ("x", "y", "diameter_mm"), "fiducials.")
+    count = len(marks["x"]) if isinstance(marks["x"], list) else 1
+    x_mm = fields.lengths_mm(marks["x"], "fiducials.x", count)
+    y_mm = fields.lengths_mm(marks["y"], "fiducials.y", count)
+    diameter_mm = fields.length_mm(marks["diameter_mm"], "fiducials.diameter_mm")
+    return np.column_stack([x_mm, y_mm]), diameter_mm
 
 
 def _check_digest(reference: Reference) -> None:

@@ -61,7 +61,8 @@ def test_the_text_is_deterministic_and_one_column_a_line() -> None:
     text = layout_to_json(layout())
     assert text == layout_to_json(layout())
     assert text.endswith("}\n")
-    assert sum('"x": [' in line and line.rstrip(",").endswith("]") for line in text.splitlines()) == 1
+    # The markers' and the fiducials'.
+    assert sum('"x": [' in line and line.rstrip(",").endswith("]") for line in text.splitlines()) == 2
     assert text.count("\n") < 50
 
 
@@ -119,10 +120,10 @@ def test_a_folder_takes_sub_folders(tmp_path: Path) -> None:
     assert [path.relative_to(tmp_path / "made").as_posix() for path in paths] == [
         "job/1.svg",
         "2.svg",
-        "o/1.svg",
+        "other/1.svg",
     ]
     assert [path.read_text() for path in paths] == ["first", "second", "third"]
-    assert {path.name for path in (tmp_path / "made").iterdir()} == {"job", "o", "2.svg"}
+    assert {path.name for path in (tmp_path / "made").iterdir()} == {"job", "other", "2.svg"}
 
 
 def test_what_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:

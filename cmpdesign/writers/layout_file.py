@@ -50,6 +50,12 @@ def layout_to_json(layout: Layout) -> str:
         "generator": f"cmpdesign {__version__}",
         "digest": layout.digest,
     }
+    if len(layout.fiducials_mm):
+        document["fiducials"] = {
+            "x": layout.fiducials_mm[:, 0].tolist(),
+            "y": layout.fiducials_mm[:, 1].tolist(),
+            "diameter_mm": layout.fiducial_diameter_mm,
+        }
     return _members(document, "") + "\n"
 
 
