@@ -102,11 +102,12 @@ class Design(_Strict):
 
     palette: Palette = Field(default_factory=Palette, description="The inks.")
     fiducials: Fiducials = Field(
-        default_factory=Fiducials,
+        default_factory=lambda: Fiducials.model_validate({}),
         description="Marks around the pattern by which jobs, prints and molds agree.",
     )
     laser: LaserOptions = Field(
-        default_factory=LaserOptions, description="How a laser carves the cells; for --only laser."
+        default_factory=lambda: LaserOptions.model_validate({}),
+        description="How a laser carves the cells; for --only laser.",
     )
 
     print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")

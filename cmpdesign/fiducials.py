@@ -1,9 +1,9 @@
-"""Fiducials: marks outside the pattern by which every laser pass, print and mold of a design lie on each other.
+"""Fiducials: marks outside the pattern by which all passes, prints and molds of a design agree.
 
 +------------------------+
-| o                      |      Three marks in four corners: a pad that is taken out for filling cannot be
-|        /\\  /\\          |      put back turned. A fourth (count = 4) lets a photo be rectified; it then lies
-|       pattern          |      a diameter further out, so that the four still tell the corners apart.
+| o                      |      Three marks in four corners: a pad taken out for filling cannot be put
+|        /\\  /\\          |      back turned. A fourth (count = 4) lets a photo be rectified; it lies a
+|       pattern          |      diameter further out, so that the four still tell the corners apart.
 |        \\/  \\/          |
 | o                    o |
 +------------------------+

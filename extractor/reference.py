@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as with_default
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -55,7 +56,7 @@ class Reference:
         border_mm: width of the black border.
         outline_mm: (K, 2) float64, the ground's closed outline, counter-clockwise.
         digest: SHA-256 (hex) of the geometry.
-        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where the file names none.
+        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where there are none.
         fiducial_diameter_mm: their diameter.
     """
 
@@ -74,7 +75,7 @@ class Reference:
     border_mm: float
     outline_mm: NDArray[np.float64]
     digest: str
-    fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    fiducials_mm: NDArray[np.float64] = with_default(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
 
     def __post_init__(self) -> None:

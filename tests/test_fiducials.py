@@ -1,4 +1,4 @@
-"""Fiducials: where they lie, that the layout file carries them, and that old files without them still read."""
+"""Fiducials: where they lie; the layout file carries them; old files without them still read."""
 
 from __future__ import annotations
 

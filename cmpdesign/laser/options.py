@@ -35,9 +35,7 @@ class LaserOptions(BaseModel):
         "front", description="Where a cell has its nominal size when the beam tapers."
     )
     fill: Literal["hatch", "offset"] = Field("hatch", description="Pocket: parallel lines or rings.")
-    hatch_mm: Length | None = Field(
-        None, description="Pocket: distance of lines or rings; else half the kerf."
-    )
+    hatch_mm: Length | None = Field(None, description="Pocket: pitch of lines or rings, else half the kerf.")
     hatch_deg: Angle = Field(0.0, description="Pocket: direction of the first pass' lines.")
     hatch_turn_deg: Angle = Field(67.0, description="Pocket: turn of the lines from pass to pass.")
     depth_mm: Length | None = Field(None, description="Depth of the cavities; else the material's thickness.")
@@ -51,10 +49,8 @@ class LaserOptions(BaseModel):
     passes: Passes | None = Field(None, description="How often the beam runs over every path.")
     minimum_web_mm: LengthOrZero | None = Field(None, description="The narrowest wall that holds.")
 
-    holes: bool = Field(True, strict=True, description="A first job that cuts the fiducials as pin holes.")
-    outline: bool = Field(
-        False, strict=True, description="A last job that cuts the pad out along the outline."
-    )
+    holes: bool = Field(True, strict=True, description="First job: the fiducials as pin holes.")
+    outline: bool = Field(False, strict=True, description="Last job: the pad, cut out along its outline.")
     x_mm: LengthOrZero | None = Field(None, description="The job's left edge on the bed; else centred.")
     y_mm: LengthOrZero | None = Field(None, description="The job's lower edge on the bed; else centred.")
 
