@@ -15,6 +15,7 @@ from cmpdesign.errors import DesignError
 from cmpdesign.fiducials import Fiducials
 from cmpdesign.graphs import MAX_LAYERS
 from cmpdesign.laser.options import LaserOptions
+from cmpdesign.mold.options import MoldOptions
 from cmpdesign.patterns import patterns
 from cmpdesign.quantities import Angle, Color, Length, LengthOrZero
 
@@ -108,6 +109,10 @@ class Design(_Strict):
     laser: LaserOptions = Field(
         default_factory=lambda: LaserOptions.model_validate({}),
         description="How a laser carves the cells; for --only laser.",
+    )
+    mold: MoldOptions = Field(
+        default_factory=lambda: MoldOptions.model_validate({}),
+        description="How the elastomer is cast in layers; for --only mold,mesh.",
     )
 
     print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.mold.loops import Loop
+from cmpdesign.mold.loops import Loop, frustum_volume_mm3
 from cmpdesign.mold.sheets import Point, Sheet, Wire, backward, forward, plain_sheet, tiled_sheet
 
 TOLERANCE_MM = 1e-7
@@ -63,23 +63,23 @@ class ShellBuilder:
         from OCP.BRep import BRep_Builder
         from OCP.TopoDS import TopoDS_Shell
 
-        self._make = BRep_Builder()
-        self._shell = TopoDS_Shell()
-        self._make.MakeShell(self._shell)
+        self.make = BRep_Builder()
+        self.shell = TopoDS_Shell()
+        self.make.MakeShell(self.shell)
 
     def solid(self) -> Any:
         """The closed solid (TopoDS_Solid)."""
         from OCP.TopoDS import TopoDS_Solid
 
-        self._shell.Closed(True)
+        self.shell.Closed(True)
         solid = TopoDS_Solid()
-        self._make.MakeSolid(solid)
-        self._make.Add(solid, self._shell)
+        self.make.MakeSolid(solid)
+        self.make.Add(solid, self.shell)
         return solid
 
     def place(self, sheet: Sheet, z: float, up: bool) -> PlacedSheet:
         """Add a sheet's faces at a height; ``up`` tells whether the material lies below them."""
-        return PlacedSheet(self._make, self._shell, sheet, z, up)
+        return PlacedSheet(self.make, self.shell, sheet, z, up)
 
     def walls(self, lower: PlacedSheet, rim: int, upper: PlacedSheet, upper_rim: int, outward: bool) -> None:
         """Join two rims side by side; ``outward`` when the material lies inside the outlines."""
@@ -95,7 +95,7 @@ class ShellBuilder:
         start = lower.sheet.edges[lower.sheet.rims[rim][side][0]][0]
         end = upper.sheet.edges[upper.sheet.rims[upper_rim][side][0]][0]
         return straight_edge(
-            self._make, lower.vertices[start], lower.xyz(start), upper.vertices[end], upper.xyz(end)
+            self.make, lower.vertices[start], lower.xyz(start), upper.vertices[end], upper.xyz(end)
         )
 
     def _wall(
@@ -114,19 +114,19 @@ class ShellBuilder:
         run, back = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
         surface = _surface(lower, below, upper, above)
         face, wire = TopoDS_Face(), TopoDS_Wire()
-        self._make.MakeFace(face, surface.geometry, TOLERANCE_MM)
-        self._make.MakeWire(wire)
+        self.make.MakeFace(face, surface.geometry, TOLERANCE_MM)
+        self.make.MakeWire(wire)
         for edge in below:
-            self._make.Add(wire, lower.shapes[edge].Oriented(run))
-        self._make.Add(wire, after.Oriented(run))
+            self.make.Add(wire, lower.shapes[edge].Oriented(run))
+        self.make.Add(wire, after.Oriented(run))
         for edge in reversed(above):
-            self._make.Add(wire, upper.shapes[edge].Oriented(back))
-        self._make.Add(wire, post.Oriented(back))
+            self.make.Add(wire, upper.shapes[edge].Oriented(back))
+        self.make.Add(wire, post.Oriented(back))
         if surface.round is not None:
             self._pcurves(surface, lower, below, upper, above, (post, after))
         wire.Closed(True)
-        self._make.Add(face, wire)
-        self._make.Add(self._shell, face.Oriented(run if outward else back))
+        self.make.Add(face, wire)
+        self.make.Add(self.shell, face.Oriented(run if outward else back))
 
     def _pcurves(
         self,
@@ -148,7 +148,7 @@ class ShellBuilder:
 
         def add(edge: Any, u: float, v: float, across: bool) -> None:
             line = Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(0.0, 1.0) if across else gp_Dir2d(1.0, 0.0))
-            self._make.UpdateEdge(edge, line, surface.geometry, here, TOLERANCE_MM)
+            self.make.UpdateEdge(edge, line, surface.geometry, here, TOLERANCE_MM)
 
         # An arc's parameter is the angle itself, so its curve starts at u = 0.
         turn = 2 * np.pi * round((lower.angles[below[0]] - first) / (2 * np.pi))
@@ -334,16 +334,16 @@ def _bottom(slab: Slab) -> Sheet:
 def _top(slab: Slab) -> Sheet:
     """The top's faces; an island's outline belongs to a face of its own, inside the ring."""
     holes = [above for _, above in slab.through]
-    islands: list[tuple[int, Loop]] = []
+    islands: list[int] = []
     for feature in slab.features:
         holes.append(feature.root)
         if feature.island is not None:
-            islands.append((len(holes), feature.island[0]))
             holes.append(feature.island[0])
+            islands.append(len(holes))
     many = [above for _, above in slab.many_through] + [feature.root for feature in slab.many]
     if not islands:
         return tiled_sheet(slab.outer, holes, many, TILE_MARGIN_MM)
-    return _with_islands(slab, holes, [number for number, _ in islands])
+    return _with_islands(slab, holes, islands)
 
 
 def _with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Sheet:
@@ -375,3 +375,16 @@ def _add_feature(builder: ShellBuilder, top: PlacedSheet, rim: int, feature: Fea
             builder.walls(top, rim + number, end, number, outward)
         else:
             builder.walls(end, number, top, rim + number, outward)
+
+
+def slab_volume_mm3(slab: Slab) -> float:
+    """The slab's volume in closed form, from areas of outlines."""
+    height = slab.top_mm - slab.bottom_mm
+    volume = slab.outer.area_mm2() * height
+    for below, above in (*slab.through, *slab.many_through):
+        volume -= frustum_volume_mm3(below, above, height)
+    for feature in (*slab.features, *slab.many):
+        volume += frustum_volume_mm3(feature.root, feature.tip, feature.height_mm)
+        if feature.island is not None:
+            volume -= frustum_volume_mm3(*feature.island, feature.height_mm)
+    return volume
