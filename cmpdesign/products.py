@@ -60,6 +60,9 @@ PRODUCTS: Mapping[str, Product] = {
     "svg": Product("cmpdesign.products:_svg", "pattern.svg", usual=True),
     "layout": Product("cmpdesign.products:_layout", "layout.json", usual=True),
     "preview": Product("cmpdesign.products:_preview", "preview.png", usual=True),
+    "mold": Product("cmpdesign.mold.make:make_mold", "mold/"),
+    "mesh": Product("cmpdesign.mold.meshes:make_meshes", "mesh/"),
+    "print": Product("cmpdesign.writers.print_sheet:make_print_sheet", "print/"),
     # The report comes last and is no ``Maker``: it is written from what the others measured.
     REPORT: Product("cmpdesign.report:report_to_json", "report.json", usual=True),
 }

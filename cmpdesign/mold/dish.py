@@ -8,7 +8,7 @@ the shells are exact: volumes are sums over facets.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,8 @@ class Dish:
         return sum(frustum_volume_mm3(start, end, self.height_mm) for start, end in self.outlines.values())
 
 
-def dish_of(stack: Stack, color: int, through: bool) -> Dish:
-    """The dish of a color's plate or (``through``) stencil, in the mold's frame, seen from above.
+def bare_dish(stack: Stack) -> Dish:
+    """The crown without bosses or holes, in the mold's frame, seen from above.
 
     Cells must be triangles: four markers on a crown are in no plane.
     """
@@ -77,14 +77,20 @@ def dish_of(stack: Stack, color: int, through: bool) -> Dish:
     number[kept] = len(border) + np.arange(len(kept))
     cells = [tuple(corners) for corners in number[stack.layout.cell_corners].tolist()]
     facets = [*cells, *_rim_facets(points[:, :2], len(border), cells)]
+    return Dish(points, foot, facets, ends, {}, 0.0)
+
+
+def dish_of(stack: Stack, color: int, through: bool) -> Dish:
+    """The dish of a color's plate or (``through``) stencil; a facet's number is its cell's."""
+    dish = bare_dish(stack)
     height = stack.options.stencil_mm if through else stack.thickness_mm[1]
     outlines = {}
     for cell in np.flatnonzero(stack.layout.cell_color == color).tolist():
-        start = polygon(root_corners(stack, points[list(cells[cell]), :2]))
+        start = polygon(root_corners(stack, dish.points[list(dish.facets[cell]), :2]))
         if through:
             start = start.moved(-stack.options.clearance_mm)
         outlines[cell] = start, start.moved((STENCIL_LEAN if through else -stack.lean) * height)
-    return Dish(points, foot, facets, ends, outlines, height)
+    return replace(dish, outlines=outlines, height_mm=height)
 
 
 def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:

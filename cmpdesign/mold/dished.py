@@ -45,7 +45,7 @@ def dished_sheet(slab: Slab, dish: Dish) -> Any:
     holes = [below for below, _ in slab.through]
     sheet = plain_sheet(slab.outer, [*holes, foot])
     bottom = builder.place(sheet, slab.bottom_mm, up=False)
-    top = builder.place(plain_sheet(slab.outer, [*holes, foot]), slab.top_mm, up=True)
+    top = builder.place(plain_sheet(slab.outlines[1], [*holes, foot]), slab.top_mm, up=True)
     for rim in range(1 + len(holes)):
         builder.walls(bottom, rim, top, rim, outward=rim == 0)
     shift = len(lower.points)

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 
 
+# Chords of meshes: corners of bosses take a few, pin holes many.
+FINE_RADIUS_MM, FINE_DEG, COARSE_DEG = 0.25, 7.5, 40.0
+
+
 @dataclass(frozen=True, eq=False)
 class Loop:
     """A closed outline, counter-clockwise.
@@ -75,6 +79,31 @@ class Loop:
                     point = self.centres[side] + radius * np.array([np.cos(angle), np.sin(angle)])
                     low, high = np.minimum(low, point), np.maximum(high, point)
         return low, high
+
+
+    def chorded(self, radius_mm: float | None = None) -> Loop:
+        """The outline with its arcs as chords: a few for small radii, one for every 7.5 degrees for large ones.
+
+        ``radius_mm`` decides in place of each arc's own radius, so that paired outlines get paired chords.
+        """
+        points = []
+        for side, point in enumerate(self.points):
+            points.append(point)
+            if np.isnan(self.centres[side, 0]):
+                continue
+            radius, first, sweep = self.arc(side)
+            fine = (radius_mm or radius) >= FINE_RADIUS_MM
+            count = max(1, int(np.ceil(np.degrees(sweep) / (FINE_DEG if fine else COARSE_DEG) - 1e-6)))
+            angles = first + sweep * np.arange(1, count) / count
+            points += list(self.centres[side] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
+        return polygon(np.array(points))
+
+
+def chorded_pair(first: Loop, second: Loop) -> tuple[Loop, Loop]:
+    """Two outlines that belong together, with the same number of chords."""
+    curved = np.flatnonzero(~np.isnan(first.centres[:, 0]))
+    radius = max((first.arc(int(side))[0] for side in curved), default=1.0)
+    return first.chorded(radius), second.chorded(radius)
 
 
 def _unit(vectors: Points) -> Points:

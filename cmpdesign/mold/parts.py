@@ -59,6 +59,22 @@ class Part:
     crown: str = ""
     color_number: int = -1
 
+    @property
+    def pulled(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """The box, in the part's own frame, in which its walls are pulled from silicone."""
+        edge = self.stack.edges(2)[1].points
+        (left, bottom), (right, top) = edge.min(axis=0), edge.max(axis=0)
+        if self.turned:
+            bottom, top = -top, -bottom
+        apex = self.stack.crown.height_mm if self.stack.crown else 0.0
+        heights = {
+            "base": (0.0, self.stack.z_base_mm),
+            "boss": (-apex, self.stack.thickness_mm[1]),
+            "stencil": (0.0, apex + self.stack.options.stencil_mm),
+        }
+        low, high = heights.get(self.name.partition("-")[0], (0.0, float("inf")))
+        return (float(left), float(bottom), low), (float(right), float(top), high)
+
     @cached_property
     def dish(self) -> Dish:
         return dish_of(self.stack, self.color_number, through=self.crown == "sheet")

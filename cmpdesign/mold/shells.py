@@ -45,6 +45,7 @@ class Slab:
         many: many small bosses on the top, convex.
         many_through: many small through holes, convex.
         bottom_mm, top_mm: heights of its faces.
+        outer_top: its outline at the top, if its outer walls lean.
     """
 
     outer: Loop
@@ -54,6 +55,12 @@ class Slab:
     features: Sequence[Feature] = ()
     many: Sequence[Feature] = ()
     many_through: Sequence[tuple[Loop, Loop]] = ()
+    outer_top: Loop | None = None
+
+    @property
+    def outlines(self) -> tuple[Loop, Loop]:
+        """At the bottom and at the top."""
+        return self.outer, self.outer_top or self.outer
 
 
 class ShellBuilder:
@@ -342,14 +349,15 @@ def _top(slab: Slab) -> Sheet:
             islands.append(len(holes))
     many = [above for _, above in slab.many_through] + [feature.root for feature in slab.many]
     if not islands:
-        return tiled_sheet(slab.outer, holes, many, TILE_MARGIN_MM)
+        return tiled_sheet(slab.outlines[1], holes, many, TILE_MARGIN_MM)
     return _with_islands(slab, holes, islands)
 
 
 def _with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Sheet:
     """Rims inside an island are cut out of it, the others out of the slab."""
-    sheet = plain_sheet(slab.outer, holes)
-    boxes = [np.array(loop.box()) for loop in (slab.outer, *holes)]
+    outer = slab.outlines[1]
+    sheet = plain_sheet(outer, holes)
+    boxes = [np.array(loop.box()) for loop in (outer, *holes)]
 
     def inside(inner: int, outer: int) -> bool:
         low, high = boxes[outer]
@@ -380,7 +388,7 @@ def _add_feature(builder: ShellBuilder, top: PlacedSheet, rim: int, feature: Fea
 def slab_volume_mm3(slab: Slab) -> float:
     """The slab's volume in closed form, from areas of outlines."""
     height = slab.top_mm - slab.bottom_mm
-    volume = slab.outer.area_mm2() * height
+    volume = frustum_volume_mm3(*slab.outlines, height)
     for below, above in (*slab.through, *slab.many_through):
         volume -= frustum_volume_mm3(below, above, height)
     for feature in (*slab.features, *slab.many):
