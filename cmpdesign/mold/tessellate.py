@@ -59,10 +59,12 @@ def _add_face(face: Any, points: list[tuple[float, float, float]], corners: list
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
-    triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), TopLoc_Location())
+    place = TopLoc_Location()
+    triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
+    move = place.Transformation()
     first = len(points) - 1
     for number in range(1, triangulation.NbNodes() + 1):
-        node = triangulation.Node(number)
+        node = triangulation.Node(number).Transformed(move)
         points.append((node.X(), node.Y(), node.Z()))
     turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
     for number in range(1, triangulation.NbTriangles() + 1):
