@@ -104,7 +104,8 @@ def make_products(
         from cmpdesign.report import report_to_json
 
         files[PRODUCTS[REPORT].where] = report_to_json(report, figures)
-    return files, tuple(finding for product in made.values() for finding in product.findings)
+    findings = dict.fromkeys(finding for product in made.values() for finding in product.findings)
+    return files, tuple(findings)
 
 
 def _maker(name: str) -> Maker:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -169,13 +170,12 @@ def _curing(stack: Stack) -> Iterator[Finding]:
     tool = stack.options.tool
     for name, silicone in zip(LAYERS, stack.silicones, strict=True):
         if tool in silicone.inhibited_by.value:
-            subject = f"{name} layer: {silicone.name} may not cure on {tool}, kinds of material that inhibit it"
+            subject = f"materials at the {name} layer on which {silicone.name} may not cure ({tool})"
             yield Finding(subject, 1, 0, "", silicone.remedy, "warning")
-    for (below, under), (above, over) in zip(
-        list(zip(LAYERS, stack.silicones, strict=True)), list(zip(LAYERS, stack.silicones, strict=True))[1:], strict=False
-    ):
+    layers = list(zip(LAYERS, stack.silicones, strict=True))
+    for (below, under), (above, over) in pairwise(layers):
         if under.cure == "tin" and over.cure == "platinum":
-            subject = f"{over.name} ({above}) does not cure on {under.name} ({below}): tin-cured layers under platinum"
+            subject = f"tin-cured layers ({below}: {under.name}) under a platinum-cured one ({above}: {over.name})"
             yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
     scales = [silicone.scale for silicone in stack.silicones]
     reach = float(np.hypot(*stack.outline_mm.T).max())

@@ -1,4 +1,4 @@
-"""The product "mold": a STEP file for every part and one of all steps, each part checked before it is written."""
+"""The product "mold": a STEP file for every part and one of all steps; each part is checked before it is written."""
 
 from __future__ import annotations
 
@@ -26,15 +26,12 @@ class MoldError(CmpDesignError):
 
 
 def make_mold(design: Design, layout: Layout) -> Made:
-    """Every part's STEP file, the assembly, the job sheet and its pictures.
+    """Every part's STEP file and the assembly's.
 
     Raises:
         DesignError: what cannot be made, before any solid is built.
         MoldError: a solid that is open, invalid or of another volume than computed.
     """
-    from cmpdesign.mold.job_sheet import job_sheet
-    from cmpdesign.mold.pictures import exploded_png, part_pictures
-
     stack = stack_of(design, layout)
     findings = check_mold(stack)
     refuse_impossible(findings)
@@ -45,10 +42,7 @@ def make_mold(design: Design, layout: Layout) -> Made:
         f"{FOLDER}/{part.name}.step": solid_to_step(solids[part.name]) for part in parts
     }
     files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts, solids))
-    files |= {f"{FOLDER}/{name}": png for name, png in part_pictures(parts).items()}
-    files[f"{FOLDER}/exploded.png"] = exploded_png(parts)
     summary = {"parts": figures, **mold_figures(stack)}
-    files[f"{FOLDER}/job-sheet.html"] = job_sheet(design, stack, parts, summary, findings)
     return Made(files, summary, tuple(findings))
 
 

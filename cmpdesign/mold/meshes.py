@@ -1,4 +1,4 @@
-"""The product "mesh": STL of every part and layer, GLB and 3MF of the mold and of the finished pad."""
+"""The product "mesh": STL of every part and layer, GLB and 3MF of mold and pad, pictures, and the job sheet."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from cmpdesign.design import Design
 from cmpdesign.layout import Layout
 from cmpdesign.mold.checks import check_mold, refuse_impossible
+from cmpdesign.mold.job_sheet import job_sheet
 from cmpdesign.mold.make import MoldError
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import Part, parts_of
+from cmpdesign.mold.pictures import exploded_png, part_pictures
 from cmpdesign.mold.shells import slab_solid, slab_volume_mm3
 from cmpdesign.mold.stack import Stack, stack_of
 from cmpdesign.mold.tessellate import chorded, mesh_of_solid
@@ -40,7 +42,8 @@ def make_meshes(design: Design, layout: Layout) -> Made:
     findings = check_mold(stack)
     refuse_impossible(findings)
     figures: dict[str, Any] = {}
-    mold = [_checked(f"mold/{part.name}", *part_mesh(part), figures) for part in parts_of(stack)]
+    parts = parts_of(stack)
+    mold = [_checked(f"mold/{part.name}", *part_mesh(part), figures) for part in parts]
     pad = [_checked(f"pad/{mesh.name}", mesh, volume, EXACT, figures) for mesh, volume in pad_meshes(stack)]
     files: dict[str, str | bytes] = {f"{FOLDER}/mold-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in mold}
     files |= {f"{FOLDER}/pad-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in pad}
@@ -49,7 +52,10 @@ def make_meshes(design: Design, layout: Layout) -> Made:
     files[f"{FOLDER}/mold.3mf"] = meshes_to_3mf(laid_out, f"{design.name} mold")
     files[f"{FOLDER}/pad.glb"] = meshes_to_glb(pad, OPACITY)
     files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad")
-    return Made(files, figures, ())
+    pictures = {**part_pictures(mold), "exploded.png": exploded_png(parts, mold)}
+    files |= {f"{FOLDER}/pictures/{name}": png for name, png in pictures.items()}
+    files[f"{FOLDER}/job-sheet.html"] = job_sheet(design.name, stack, parts, findings)
+    return Made(files, figures, tuple(findings))
 
 
 def part_mesh(part: Part) -> tuple[Mesh, float, float]:

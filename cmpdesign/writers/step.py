@@ -145,18 +145,66 @@ def _written(document: Any, name: str) -> bytes:
 
 
 def _canonical(data: bytes, name: str) -> bytes:
-    """The file without what changes from run to run: the time stamp, and counters in names."""
-    head, mark, body = data.partition(b"ENDSEC;")
-    head = re.sub(rb"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'", f"'{TIME_STAMP}'".encode(), head)
-    head = head.replace(b"'Open CASCADE Shape Model'", f"'{name}.step'".encode(), 1)
-    numbers: dict[bytes, int] = {}
+    """The file without what changes from run to run: time stamp, counters in names, order of the styles."""
+    head, mark, body = data.decode("utf-8").partition("ENDSEC;")
+    head = re.sub(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'", f"'{TIME_STAMP}'", head)
+    head = head.replace("'Open CASCADE Shape Model'", f"'{name}.step'", 1)
+    numbers: dict[str, int] = {}
 
-    def renumbered(match: re.Match[bytes]) -> bytes:
-        number = numbers.setdefault(match[1], len(numbers) + 1)
-        return b"NEXT_ASSEMBLY_USAGE_OCCURRENCE('%d'" % number
+    def renumbered(match: re.Match[str]) -> str:
+        return f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{numbers.setdefault(match[1], len(numbers) + 1)}'"
 
-    body = re.sub(rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)'", renumbered, body)
-    return head + mark + body
+    body = re.sub(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)'", renumbered, body)
+    return (head + mark + _styles_in_order(body)).encode("utf-8")
+
+
+_STYLES = "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
+_STYLE = """#{0} = MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(
+    #{1}),#{context});
+#{1} = STYLED_ITEM('color',(#{2}),#{item});
+#{2} = PRESENTATION_STYLE_ASSIGNMENT((#{3}));
+#{3} = SURFACE_STYLE_USAGE(.BOTH.,#{4});
+#{4} = SURFACE_SIDE_STYLE('',(#{5}));
+#{5} = SURFACE_STYLE_FILL_AREA(#{6});
+#{6} = FILL_AREA_STYLE('',(#{7}));
+#{7} = FILL_AREA_STYLE_COLOUR('',#{8});
+#{8} = COLOUR_RGB('',{rgb});
+"""
+_STYLE_ENTITIES = 9
+
+
+def _styles_in_order(body: str) -> str:
+    """The styles, which stand last, by the solid that they color; the translator orders them by address."""
+    first = re.search(rf"#(\d+) = {_STYLES}", body)
+    if first is None:
+        return body
+    start, end = first.start(), body.index("ENDSEC;", first.start())
+    entities = dict(re.findall(r"#(\d+) = (.*?);\n", body[start:end], flags=re.DOTALL))
+    styles = []
+    for text in entities.values():
+        if not text.startswith(_STYLES):
+            continue
+        styled, context = re.findall(r"#(\d+)", text)
+        item, rgb = _styled(entities, styled)
+        styles.append((item, context, rgb))
+    number, written = int(first[1]), ""
+    for item, context, rgb in sorted(styles):
+        numbers = range(number, number + _STYLE_ENTITIES)
+        written += _STYLE.format(*numbers, context=context, item=item, rgb=rgb)
+        number += _STYLE_ENTITIES
+    return body[:start] + written + body[end:]
+
+
+def _styled(entities: dict[str, str], number: str) -> tuple[int, str]:
+    """The number of the entity that a STYLED_ITEM colors, and the color's text."""
+    *styles, item = re.findall(r"#(\d+)", entities[number])
+    todo = styles
+    while todo:
+        text = entities[todo.pop(0)]
+        if text.startswith("COLOUR_RGB"):
+            return int(item), text.partition(",")[2].rstrip(")")
+        todo = re.findall(r"#(\d+)", text) + todo
+    raise RuntimeError("STEP: a style without a color")
 
 
 @contextmanager
