@@ -97,7 +97,11 @@ def _find_code(grey: NDArray[np.uint8]) -> tuple[SheetKey, Points] | None:
     detector = cv2.QRCodeDetector()
     for side in SEARCH_PX:
         factor = min(1.0, side / max(grey.shape))
-        small = grey if factor == 1 else cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        small = (
+            grey
+            if factor == 1
+            else cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        )
         text, corners, _ = detector.detectAndDecode(small)
         key = parse_key(text) if text else None
         if key is not None and corners is not None:

@@ -70,5 +70,9 @@ def _line(row: dict[str, Any]) -> str:
     if "ratio" not in row:
         return head + "\n"
     known = row["scale_x"] is not None
-    scale = f"scale x {row['scale_x']:.4f}, y {row['scale_y']:.4f}" if known else f"scale x / y {row['ratio']:.4f}"
+    scale = (
+        f"scale x {row['scale_x']:.4f}, y {row['scale_y']:.4f}"
+        if known
+        else f"scale x / y {row['ratio']:.4f}"
+    )
     return f"{head} ({row['name']}, {scale}, skew {row['skew_deg']:+.3f} deg)\n"

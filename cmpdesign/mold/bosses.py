@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.mold.loops import Loop, Points, polygon, rounded
+from cmpdesign.mold.loops import Loop, Points, inset_cells, polygon
 from cmpdesign.mold.shells import Feature
 from cmpdesign.mold.stack import Stack
 
@@ -17,20 +17,24 @@ def root_corners(stack: Stack, cell: Points) -> Points:
     return polygon(cell).moved(-stack.options.gap_mm / 2).points
 
 
-def boss(stack: Stack, cell: Points) -> Feature:
-    """A boss: as wide as the cavity's open side at its root, narrower by the draft at its tip.
+def bosses(stack: Stack, cells: Points) -> list[Feature]:
+    """Bosses: as wide as the cavity's open side at the root, narrower by the draft at the tip.
 
     The radius of the upright edges is the given one at the tip and grows with the draft towards the root.
     """
-    height = stack.thickness_mm[1]
+    height, inset = stack.thickness_mm[1], stack.options.gap_mm / 2
     narrower = stack.lean * height
     radius = stack.options.tip_radius_mm
-    root = rounded(root_corners(stack, cell), radius + narrower if radius else 0.0)
-    return Feature(root, root.moved(-narrower), height)
+    roots = inset_cells(cells, inset, radius + narrower if radius else 0.0)
+    tips = inset_cells(cells, inset + narrower, radius)
+    return [Feature(root, tip, height) for root, tip in zip(roots, tips, strict=True)]
 
 
-def stencil_hole(stack: Stack, cell: Points) -> tuple[Loop, Loop]:
-    """A stencil's hole at its lower and upper face; below, it keeps its clearance to the cavity's rim."""
-    corners = polygon(root_corners(stack, cell)).moved(-stack.options.clearance_mm).points
-    below = rounded(corners, stack.options.tip_radius_mm)
-    return below, below.moved(STENCIL_LEAN * stack.options.stencil_mm)
+def stencil_holes(stack: Stack, cells: Points) -> list[tuple[Loop, Loop]]:
+    """A stencil's holes at its lower and upper face; below, they keep their clearance to the cavities' rims."""
+    inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
+    wider = STENCIL_LEAN * stack.options.stencil_mm
+    radius = stack.options.tip_radius_mm
+    below = inset_cells(cells, inset, radius)
+    above = inset_cells(cells, inset - wider, radius + wider if radius else 0.0)
+    return list(zip(below, above, strict=True))

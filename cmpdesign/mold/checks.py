@@ -11,8 +11,8 @@ import numpy as np
 from cmpdesign.checks import Finding
 from cmpdesign.errors import DesignError
 from cmpdesign.layout import COLORS
-from cmpdesign.mold.bosses import boss, root_corners
-from cmpdesign.mold.loops import Loop, polygon
+from cmpdesign.mold.bosses import bosses
+from cmpdesign.mold.loops import Points, frusta_volume_mm3, inset_cells
 from cmpdesign.mold.stack import LAYERS, Stack
 
 
@@ -70,17 +70,29 @@ def tip_width_mm(stack: Stack) -> float:
     return min(_inscribed_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
-def _inscribed_mm(cells: np.ndarray) -> float:  # type: ignore[type-arg]
+def _inscribed_mm(cells: Points) -> float:
     side = np.roll(cells, -1, axis=1) - cells
-    area = np.abs((cells[..., 0] * np.roll(cells[..., 1], -1, axis=1)).sum(1)
-                  - (np.roll(cells[..., 0], -1, axis=1) * cells[..., 1]).sum(1)) / 2
+    area = (
+        np.abs(
+            (cells[..., 0] * np.roll(cells[..., 1], -1, axis=1)).sum(1)
+            - (np.roll(cells[..., 0], -1, axis=1) * cells[..., 1]).sum(1)
+        )
+        / 2
+    )
     return float((4 * area / np.hypot(side[..., 0], side[..., 1]).sum(axis=1)).min())
 
 
 def _bosses(stack: Stack) -> Iterator[Finding]:
     option, limit = stack.options, feature_limit_mm(stack)
     if option.gap_mm == 0:
-        yield Finding("mold.gap_mm", 0.0, WEB_WARNING_MM, "mm", "make it larger, or neighbouring cavities touch", "error")
+        yield Finding(
+            "mold.gap_mm",
+            0.0,
+            WEB_WARNING_MM,
+            "mm",
+            "make it larger, or neighbouring cavities touch",
+            "error",
+        )
         return
     if option.gap_mm < WEB_WARNING_MM:
         remedy = "make mold.gap_mm larger, or the black web tears"
@@ -98,7 +110,9 @@ def _bosses(stack: Stack) -> Iterator[Finding]:
         yield Finding("narrowest stencil hole", stencil_width_mm(stack), limit, "mm", remedy, "error")
     elif 2 * option.tip_radius_mm >= stencil_width_mm(stack):
         remedy = "make mold.tip_radius_mm smaller"
-        yield Finding("mold.tip_radius_mm", option.tip_radius_mm, stencil_width_mm(stack) / 2, "mm", remedy, "error")
+        yield Finding(
+            "mold.tip_radius_mm", option.tip_radius_mm, stencil_width_mm(stack) / 2, "mm", remedy, "error"
+        )
     yield from _slender(height / width)
     web, name = plate_web_mm(stack)
     if web < limit:
@@ -126,7 +140,8 @@ def plate_web_mm(stack: Stack) -> tuple[float, str]:
 
     least, name = float("inf"), ""
     for color in stack.colors:
-        roots = shapely.polygons([root_corners(stack, cell) for cell in stack.cells(color)])
+        inset = inset_cells(stack.cells(color), stack.options.gap_mm / 2, 0.0)
+        roots = shapely.polygons([loop.points for loop in inset])
         if len(roots) < 2:
             continue
         _, distances = shapely.STRtree(roots).query_nearest(roots, exclusive=True, return_distance=True)
@@ -160,10 +175,14 @@ def _sheets(stack: Stack) -> Iterator[Finding]:
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
         if getattr(option, field) < least:
-            yield Finding(f"mold.{field}", getattr(option, field), least, "mm", "make the wall thicker", "error")
+            yield Finding(
+                f"mold.{field}", getattr(option, field), least, "mm", "make the wall thicker", "error"
+            )
     if option.vents and stack.crown is None and stack.layout.border_mm < option.vent_mm + 0.2:
         remedy = "make border_mm larger or mold.vent_mm smaller, or vents leave marks on cells"
-        yield Finding("border_mm under the vents", stack.layout.border_mm, option.vent_mm + 0.2, "mm", remedy, "warning")
+        yield Finding(
+            "border_mm under the vents", stack.layout.border_mm, option.vent_mm + 0.2, "mm", remedy, "warning"
+        )
 
 
 def _curing(stack: Stack) -> Iterator[Finding]:
@@ -175,7 +194,9 @@ def _curing(stack: Stack) -> Iterator[Finding]:
     layers = list(zip(LAYERS, stack.silicones, strict=True))
     for (below, under), (above, over) in pairwise(layers):
         if under.cure == "tin" and over.cure == "platinum":
-            subject = f"tin-cured layers ({below}: {under.name}) under a platinum-cured one ({above}: {over.name})"
+            subject = (
+                f"tin-cured layers ({below}: {under.name}) under a platinum-cured one ({above}: {over.name})"
+            )
             yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
     scales = [silicone.scale for silicone in stack.silicones]
     reach = float(np.hypot(*stack.outline_mm.T).max())
@@ -188,6 +209,9 @@ def _curing(stack: Stack) -> Iterator[Finding]:
 
 def _shapes(stack: Stack) -> Iterator[Finding]:
     option = stack.options
+    if stack.crown is not None and stack.layout.cell_corners.shape[1] != 3:
+        remedy = "choose a triangular pattern, or make the pad flat"
+        yield Finding("corners of a cell on a crown (four are in no plane)", 4, 3, "", remedy, "error")
     wall = moat_to_pin_mm(stack)
     if wall < LEAST_WALL_MM:
         remedy = "make fiducials.gap_mm larger, or mold.parting_mm or mold.moat_mm smaller"
@@ -200,32 +224,25 @@ def _shapes(stack: Stack) -> Iterator[Finding]:
         yield Finding("mold.fillet_mm", option.fillet_mm, float(size) / 2, "mm", "make it smaller", "error")
     if stack.crown is None:
         return
-    if stack.layout.cell_corners.shape[1] != 3:
-        remedy = "choose a triangular pattern, or make the pad flat"
-        yield Finding("corners of a cell on a crown (four are in no plane)", 4, 3, "", remedy, "error")
     thin = float(np.cos(np.radians(stack.crown.slope_deg)))
     if thin < THIN_WARNING:
         remedy = "make mold.crown_radius_mm larger, or expect thinner layers at the pad's edge"
-        yield Finding("thickness at the crown's foot over that at its apex", thin, THIN_WARNING, "", remedy, "warning")
+        yield Finding(
+            "thickness at the crown's foot over that at its apex", thin, THIN_WARNING, "", remedy, "warning"
+        )
 
 
 def moat_to_pin_mm(stack: Stack) -> float:
     """The least wall between the moat and a pin hole in the base."""
     import shapely
 
-    pad = shapely.Polygon(_polygon_of(stack.edges(0)[1]))
+    pad = shapely.Polygon(stack.edges(0)[1].points)
     pins = shapely.points(stack.pins_mm)
     away = stack.options.parting_mm + stack.options.moat_mm + stack.pin_diameter_mm / 2
     return float(shapely.distance(pad, pins).min()) - away
 
 
-def _polygon_of(loop: Loop) -> np.ndarray:  # type: ignore[type-arg]
-    return polygon(loop.points).points
-
-
 def boss_volume_mm3(stack: Stack, color: int) -> float:
     """Silicone that fills a color's cavities: for the job sheet."""
-    from cmpdesign.mold.loops import frustum_volume_mm3
-
-    features = (boss(stack, cell) for cell in stack.cells(color))
-    return sum(frustum_volume_mm3(f.root, f.tip, f.height_mm) for f in features)
+    pairs = [(feature.root, feature.tip) for feature in bosses(stack, stack.cells(color))]
+    return frusta_volume_mm3(pairs, stack.thickness_mm[1])

@@ -107,7 +107,11 @@ def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
     back = np.column_stack([x, np.full_like(x, crown.length_mm), z])
     front = np.column_stack([-x, np.full_like(x, -crown.length_mm), z])
     n = ARCH_POINTS
-    return np.concatenate([back, front]), (0, n - 1, n, 2 * n - 1), [tuple(range(n))[::-1], tuple(range(n, 2 * n))[::-1]]
+    return (
+        np.concatenate([back, front]),
+        (0, n - 1, n, 2 * n - 1),
+        [tuple(range(n))[::-1], tuple(range(n, 2 * n))[::-1]],
+    )
 
 
 def _rim_facets(plan: Points, border: int, cells: Sequence[Facet]) -> list[Facet]:

@@ -34,7 +34,9 @@ def job_sheet(name: str, stack: Stack, parts: Sequence[Part], findings: Sequence
         "<h2>Parts</h2>",
         *(_part(part) for part in parts),
     ]
-    head = f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Casting {escape(name)}</title>'
+    head = (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Casting {escape(name)}</title>'
+    )
     return f"{head}<style>{_STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n"
 
 

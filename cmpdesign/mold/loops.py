@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,13 +48,8 @@ class Loop:
         return moves
 
     def area_mm2(self) -> float:
-        """The enclosed area: the shoelace formula and a segment for each arc, both exact."""
-        x, y = self.points.T
-        area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
-        for side in np.flatnonzero(~np.isnan(self.centres[:, 0])):
-            radius, _, sweep = self.arc(int(side))
-            area += radius**2 * (sweep - np.sin(sweep)) / 2
-        return area
+        """The enclosed area, exact for arcs, too."""
+        return float(_areas_mm2(self.points[None], self.centres[None])[0])
 
     def arc(self, side: int) -> tuple[float, float, float]:
         """Radius (mm), first angle and sweep (radians, positive) of a curved side."""
@@ -67,19 +63,6 @@ class Loop:
         """The outline at another place."""
         move = np.array([x_mm, y_mm])
         return Loop(self.points + move, self.centres + move)
-
-    def box(self) -> tuple[Points, Points]:
-        """Lower left and upper right corner of what the outline covers (arcs at their full circle's reach)."""
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        for side in np.flatnonzero(~np.isnan(self.centres[:, 0])):
-            radius, first, sweep = self.arc(int(side))
-            for quarter in range(4):
-                angle = quarter * np.pi / 2
-                if (angle - first) % (2 * np.pi) < sweep:
-                    point = self.centres[side] + radius * np.array([np.cos(angle), np.sin(angle)])
-                    low, high = np.minimum(low, point), np.maximum(high, point)
-        return low, high
-
 
     def chorded(self, radius_mm: float | None = None) -> Loop:
         """The outline with its arcs as chords: a few for small radii, one for every 7.5 degrees for large ones.
@@ -153,12 +136,88 @@ def rounded_rectangle(low: Points, high: Points, radius_mm: float) -> Loop:
     return rounded(np.array([(left, bottom), (right, bottom), (right, top), (left, top)]), radius_mm)
 
 
-def frustum_volume_mm3(lower: Loop, upper: Loop, height_mm: float) -> float:
-    """Volume between two parallel outlines that belong together side by side.
+def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -> list[Loop]:
+    """For each of many convex polygons: its sides moved inward, its corners rounded by arcs inside them.
+
+    Args:
+        cells: (N, k, 2) corners, counter-clockwise.
+    """
+    side = np.roll(cells, -1, axis=1) - cells
+    normal = np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.hypot(side[..., 0], side[..., 1])[..., None]
+    before = np.roll(normal, 1, axis=1)
+    mitre = (before + normal) / (1 + (before * normal).sum(axis=-1))[..., None]
+    core = cells - (inset_mm + radius_mm) * mitre
+    straight = np.full_like(core, np.nan)
+    if radius_mm == 0:
+        return [Loop(points, centres) for points, centres in zip(core, straight, strict=True)]
+    n, k, _ = cells.shape
+    points = np.stack([core + radius_mm * before, core + radius_mm * normal], axis=2).reshape(n, 2 * k, 2)
+    centres = np.stack([core, straight], axis=2).reshape(n, 2 * k, 2)
+    return [Loop(*pair) for pair in zip(points, centres, strict=True)]
+
+
+def boxes_of(loops: Sequence[Loop]) -> NDArray[np.float64]:
+    """(N, 2, 2) lower left and upper right corner of each; arcs must sweep less than 180 degrees."""
+    result = np.empty((len(loops), 2, 2))
+    for numbers, points, centres in _alike(loops):
+        low, high = points.min(axis=1), points.max(axis=1)
+        start, end = points - centres, np.roll(points, -1, axis=1) - centres
+        radius = np.hypot(start[..., 0], start[..., 1])
+        for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+            way = np.zeros(2)
+            way[axis] = sign
+            # NaN, on straight sides, compares as false.
+            within = (_cross(start, way) >= 0) & (_cross(way, end) >= 0)
+            reach = np.where(within, centres[..., axis] + sign * radius, np.nan)
+            if sign > 0:
+                high[:, axis] = np.fmax(high[:, axis], np.fmax.reduce(reach, axis=1))
+            else:
+                low[:, axis] = np.fmin(low[:, axis], np.fmin.reduce(reach, axis=1))
+        result[numbers] = np.stack([low, high], axis=1)
+    return result
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    result: NDArray[np.float64] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return result
+
+
+def _alike(loops: Sequence[Loop]) -> Iterator[tuple[list[int], NDArray[np.float64], NDArray[np.float64]]]:
+    """The loops' numbers, (N, m, 2) points and centres, for each number of sides m."""
+    groups: dict[int, list[int]] = {}
+    for number, loop in enumerate(loops):
+        groups.setdefault(len(loop.points), []).append(number)
+    for numbers in groups.values():
+        points = np.stack([loops[number].points for number in numbers])
+        yield numbers, points, np.stack([loops[number].centres for number in numbers])
+
+
+def _areas_mm2(points: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) the shoelace formula and a segment for each arc, both exact."""
+    x, y = points[..., 0], points[..., 1]
+    polygons = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2
+    start, end = points - centres, np.roll(points, -1, axis=1) - centres
+    sweep = np.arctan2(_cross(start, end), (start * end).sum(axis=-1)) % (2 * np.pi)
+    segments = (start**2).sum(axis=-1) * (sweep - np.sin(sweep)) / 2
+    areas: NDArray[np.float64] = polygons + np.nansum(segments, axis=1)
+    return areas
+
+
+def frusta_volume_mm3(pairs: Sequence[tuple[Loop, Loop]], height_mm: float) -> float:
+    """Volume of all frusta of one height between parallel outlines that belong together side by side.
 
     A drafted wall's section grows with the square of the height, so Simpson's rule is exact: it needs the
     section half way, whose points lie half way between the outlines' points.
     """
-    middle = Loop((lower.points + upper.points) / 2, lower.centres)
-    sections = lower.area_mm2() + 4 * middle.area_mm2() + upper.area_mm2()
-    return height_mm * sections / 6
+    lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+    total = 0.0
+    for numbers, points, centres in _alike(lower):
+        other = np.stack([upper[number].points for number in numbers])
+        sections = [_areas_mm2(p, centres) for p in (points, (points + other) / 2, other)]
+        total += float((sections[0] + 4 * sections[1] + sections[2]).sum())
+    return height_mm * total / 6
+
+
+def frustum_volume_mm3(lower: Loop, upper: Loop, height_mm: float) -> float:
+    """Of one."""
+    return frusta_volume_mm3([(lower, upper)], height_mm)

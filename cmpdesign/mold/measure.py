@@ -90,7 +90,9 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
         elif kind == GeomAbs_SurfaceType.GeomAbs_Cone:
             lean = float(np.degrees(abs(surface.Cone().SemiAngle())))
         elif kind == GeomAbs_SurfaceType.GeomAbs_Cylinder:
-            lean = 90.0 - float(np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z())))))
+            lean = 90.0 - float(
+                np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z()))))
+            )
         if lean < LEVEL_DEG and _within(face, low_mm, high_mm):
             leans.append(lean)
     return (min(leans), max(leans)) if leans else (float("nan"), float("nan"))

@@ -11,6 +11,7 @@ from cmpdesign.design import Design
 from cmpdesign.layout import Layout
 from cmpdesign.mold.checks import check_mold, refuse_impossible
 from cmpdesign.mold.job_sheet import job_sheet
+from cmpdesign.mold.loops import boxes_of
 from cmpdesign.mold.make import MoldError
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import Part, parts_of
@@ -93,7 +94,7 @@ def _checked(name: str, mesh: Mesh, volume: float, tolerance: float, figures: di
 
 def side_by_side(stack: Stack, meshes: Sequence[Mesh]) -> list[Mesh]:
     """The parts on a plate, four in a row, each standing on z = 0."""
-    low, high = stack.block.box()
+    low, high = boxes_of([stack.block])[0]
     step = high - low + APART_MM
     placed = []
     for number, mesh in enumerate(meshes):

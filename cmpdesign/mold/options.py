@@ -28,7 +28,9 @@ class MoldOptions(BaseModel):
 
     draft_deg: Angle = Field(2.0, description="Lean of every wall that silicone is pulled from.")
     tip_radius_mm: LengthOrZero = Field(0.05, description="Radius of a boss's upright edges at its tip.")
-    gap_mm: LengthOrZero = Field(0.1, description="Black web between neighbouring cells, where it is thinnest.")
+    gap_mm: LengthOrZero = Field(
+        0.1, description="Black web between neighbouring cells, where it is thinnest."
+    )
     minimum_feature_mm: Length | None = Field(
         None, description="The nozzle, beam or cutter; else what the tool's material usually allows."
     )
@@ -45,7 +47,9 @@ class MoldOptions(BaseModel):
     stencil_mm: Length = Field(0.5, description="Stencils.")
     wall_mm: Length = Field(3.0, description="From a pin hole or the moat to the parts' outer edge.")
     fillet_mm: LengthOrZero = Field(2.0, description="Radius of the parts' upright outer edges.")
-    clearance_mm: Length = Field(0.1, description="Hole less pin, in diameter; stencil less cavity, each side.")
+    clearance_mm: Length = Field(
+        0.1, description="Hole less pin, in diameter; stencil less cavity, each side."
+    )
     pin_diameter_mm: Length | None = Field(None, description="Dowel pins; else the fiducials' diameter.")
     vents: Count = Field(6, description="Vents through the lid, spaced along the pad's edge.")
     vent_mm: Length = Field(0.6, description="Diameter of a vent.")

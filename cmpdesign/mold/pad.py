@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cmpdesign.layout import BLACK, COLORS
-from cmpdesign.mold.bosses import boss
+from cmpdesign.mold.bosses import bosses
 from cmpdesign.mold.dish import Dish, bare_dish, dish_of
 from cmpdesign.mold.dished import dished_sheet, dished_volume_mm3
 from cmpdesign.mold.loops import Loop, chorded_pair, frustum_volume_mm3
@@ -68,8 +68,7 @@ def _layer(pad: Stack, layer: int, name: str, color: str, z: float) -> tuple[Mes
 
 def _outlines(pad: Stack, color: int) -> list[tuple[Loop, Loop]]:
     """Each cavity's outline at the base and at its open side."""
-    bosses = (boss(pad, cell) for cell in pad.cells(color))
-    return [chorded_pair(part.tip, part.root) for part in bosses]
+    return [chorded_pair(part.tip, part.root) for part in bosses(pad, pad.cells(color))]
 
 
 def _cavities(pad: Stack) -> Dish:

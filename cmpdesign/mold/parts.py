@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.layout import COLORS
-from cmpdesign.mold.bosses import boss, stencil_hole
+from cmpdesign.mold.bosses import bosses, stencil_holes
 from cmpdesign.mold.dish import Dish, dish_of
 from cmpdesign.mold.dished import dished_plate, dished_sheet, dished_volume_mm3
 from cmpdesign.mold.loops import Loop, Points, circle, grown, polygon
@@ -161,10 +161,10 @@ def _ring(stack: Stack, layer: int) -> Slab:
 
 def _boss_plate(stack: Stack, color: int) -> Part:
     name = COLORS[color]
-    bosses = () if stack.crown else tuple(boss(stack, cell) for cell in turned_over(stack.cells(color)))
+    standing = () if stack.crown else bosses(stack, turned_over(stack.cells(color)))
     holes = [hole for loop in (*stack.holes(), *_jacks(stack)) for hole in [_loop_turned(loop)]]
     depth = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
-    slab = Slab(_loop_turned(stack.block), -depth, 0.0, [(h, h) for h in holes], (), bosses)
+    slab = Slab(_loop_turned(stack.block), -depth, 0.0, [(h, h) for h in holes], (), standing)
     use = f"bosses that leave the {name} cavities in the black layer"
     crown = "plate" if stack.crown else ""
     return Part(
@@ -174,13 +174,21 @@ def _boss_plate(stack: Stack, color: int) -> Part:
 
 def _stencil(stack: Stack, color: int) -> Part:
     name = COLORS[color]
-    through = () if stack.crown else tuple(stencil_hole(stack, cell) for cell in stack.cells(color))
+    through = () if stack.crown else stencil_holes(stack, stack.cells(color))
     holes = [(hole, hole) for hole in stack.holes()]
     slab = Slab(stack.block, 0.0, stack.options.stencil_mm, holes, many_through=through)
     use = f"mask for filling the {name} cavities"
     crown = "sheet" if stack.crown else ""
     return Part(
-        f"stencil-{name}", use, stack.layout.palette[name], slab, stack.z_marker_mm, stack, False, crown, color
+        f"stencil-{name}",
+        use,
+        stack.layout.palette[name],
+        slab,
+        stack.z_marker_mm,
+        stack,
+        False,
+        crown,
+        color,
     )
 
 

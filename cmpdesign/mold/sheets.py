@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmpdesign.mold.loops import Loop, Points, rounded_rectangle
+from cmpdesign.mold.loops import Loop, Points, boxes_of, rounded_rectangle
 
 HOLES_PER_TILE = 4
 # Lines keep this distance from every corner of a hole, so that no edge is shorter.
@@ -116,7 +116,7 @@ def tiled_sheet(outer: Loop, holes: Sequence[Loop], features: Sequence[Loop], ma
     """
     if not features:
         return plain_sheet(outer, holes)
-    boxes = np.array([loop.box() for loop in features])
+    boxes = boxes_of(features)
     sheet = Sheet()
     if not holes:
         Tiler(sheet, outer, features, boxes).tile()
@@ -212,7 +212,9 @@ class Tiler:
                 side, (y, _) = lower if down else upper
                 cuts.append((side, (x, y)))
         numbers = self.sheet.add_rim(self.frame, cuts)
-        ends = list(zip(numbers[0 : 2 * len(self.lines) : 2], numbers[1 : 2 * len(self.lines) : 2], strict=True))
+        ends = list(
+            zip(numbers[0 : 2 * len(self.lines) : 2], numbers[1 : 2 * len(self.lines) : 2], strict=True)
+        )
         feet_from = 2 * len(self.lines)
         heads_from = feet_from + len(self.uprights[0])
         return ends, numbers[feet_from:heads_from], numbers[heads_from:]
@@ -310,7 +312,9 @@ class _Rail:
     def __init__(
         self, sheet: Sheet, y: float, ends: tuple[int, int], uprights: list[float], cuts: list[_Cut]
     ) -> None:
-        nodes: list[tuple[float, int, _Cut | None]] = [(x, sheet.point(x, y), None) for x in sorted(set(uprights))]
+        nodes: list[tuple[float, int, _Cut | None]] = [
+            (x, sheet.point(x, y), None) for x in sorted(set(uprights))
+        ]
         self._point = {x: point for x, point, _ in nodes}
         nodes += [(cut.left, cut.left_point, cut) for cut in cuts]
         nodes.append((sheet.points[ends[1]][0], ends[1], None))

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.mold.loops import Loop, frustum_volume_mm3
+from cmpdesign.mold.loops import Loop, boxes_of, frusta_volume_mm3, frustum_volume_mm3
 from cmpdesign.mold.sheets import Point, Sheet, Wire, backward, forward, plain_sheet, tiled_sheet
 
 TOLERANCE_MM = 1e-7
@@ -357,7 +357,7 @@ def _with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Sheet:
     """Rims inside an island are cut out of it, the others out of the slab."""
     outer = slab.outlines[1]
     sheet = plain_sheet(outer, holes)
-    boxes = [np.array(loop.box()) for loop in (outer, *holes)]
+    boxes = boxes_of([outer, *holes])
 
     def inside(inner: int, outer: int) -> bool:
         low, high = boxes[outer]
@@ -389,10 +389,12 @@ def slab_volume_mm3(slab: Slab) -> float:
     """The slab's volume in closed form, from areas of outlines."""
     height = slab.top_mm - slab.bottom_mm
     volume = frustum_volume_mm3(*slab.outlines, height)
-    for below, above in (*slab.through, *slab.many_through):
-        volume -= frustum_volume_mm3(below, above, height)
-    for feature in (*slab.features, *slab.many):
+    volume -= frusta_volume_mm3([*slab.through, *slab.many_through], height)
+    for feature in slab.features:
         volume += frustum_volume_mm3(feature.root, feature.tip, feature.height_mm)
         if feature.island is not None:
             volume -= frustum_volume_mm3(*feature.island, feature.height_mm)
+    for tall in {feature.height_mm for feature in slab.many}:
+        pairs = [(feature.root, feature.tip) for feature in slab.many if feature.height_mm == tall]
+        volume += frusta_volume_mm3(pairs, tall)
     return volume

@@ -161,7 +161,9 @@ def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, 
         )
     reach = float(radius * np.sin(slope)) + FOOT_MM
     if reach >= radius * np.sin(np.radians(STEEPEST_DEG + 10)):
-        raise DesignError(f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make it larger")
+        raise DesignError(
+            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make it larger"
+        )
     edge = max(layout.border_mm, option.vent_mm + 2 * FOOT_MM)
     if option.crown == "sphere":
         crown = Crown("sphere", radius, reach, reach)

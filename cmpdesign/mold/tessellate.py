@@ -53,7 +53,9 @@ def mesh_of_solid(name: str, color: str, solid: Any) -> Mesh:
     return merged(name, color, np.array(points), np.array(corners))
 
 
-def _add_face(face: Any, points: list[tuple[float, float, float]], corners: list[tuple[int, int, int]]) -> None:
+def _add_face(
+    face: Any, points: list[tuple[float, float, float]], corners: list[tuple[int, int, int]]
+) -> None:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopLoc import TopLoc_Location
@@ -95,7 +97,9 @@ def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop
         points += [np.column_stack([lower.points, lower_z]), np.column_stack([upper.points, upper_z])]
         i, after = np.arange(m), (np.arange(m) + 1) % m
         fan = np.stack([np.zeros(m - 2, dtype=np.int64), i[1:-1], i[2:]], axis=1)
-        sides = np.concatenate([np.stack([i, after, m + after], axis=1), np.stack([i, m + after, m + i], axis=1)])
+        sides = np.concatenate(
+            [np.stack([i, after, m + after], axis=1), np.stack([i, m + after, m + i], axis=1)]
+        )
         triangles += [first + fan[:, ::-1], first + m + fan, first + sides]
         first += 2 * m
     return Mesh(name, color, np.concatenate(points), np.concatenate(triangles))

@@ -34,7 +34,9 @@ def meshes_to_glb(meshes: Sequence[Mesh], opacity: dict[str, float] | None = Non
     document["buffers"] = [{"byteLength": len(data)}]
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    )
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
@@ -48,7 +50,14 @@ def _add_mesh(document: dict[str, Any], number: int, mesh: Mesh, offset: int) ->
     ]
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     document["accessors"] += [
-        {"bufferView": view, "componentType": _FLOAT, "count": len(points), "type": "VEC3", "min": low, "max": high},
+        {
+            "bufferView": view,
+            "componentType": _FLOAT,
+            "count": len(points),
+            "type": "VEC3",
+            "min": low,
+            "max": high,
+        },
         {"bufferView": view + 1, "componentType": _UINT, "count": indices.size, "type": "SCALAR"},
     ]
     primitive = {"attributes": {"POSITION": view}, "indices": view + 1, "material": number}

@@ -19,5 +19,7 @@ def mesh_to_stl(mesh: Mesh) -> bytes:
     facets["normal"] = normals / np.where(lengths > 0, lengths, 1)
     facets["corners"] = corners
     # A header that starts with "solid" would be taken for the text format.
-    header = f"cmpdesign {mesh.name}, mm".encode("ascii", "replace")[:_HEADER_BYTES].ljust(_HEADER_BYTES, b"\0")
+    header = f"cmpdesign {mesh.name}, mm".encode("ascii", "replace")[:_HEADER_BYTES].ljust(
+        _HEADER_BYTES, b"\0"
+    )
     return header + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -46,7 +46,9 @@ def print_page(design: Design, layout: Layout) -> tuple[Page, int]:
         items += _pad(layout, place, design.sheet.bleed_mm, design.print_mirror)
     items += _key(layout, height)
     items += _patches(layout, width, height)
-    return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(places)
+    return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(
+        places
+    )
 
 
 def _places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
@@ -93,9 +95,15 @@ def _crop_marks(place: Points, size_mm: tuple[float, float], away: float) -> lis
     half = HAIRLINE_MM / 2
     marks = []
     for x in (left, right):
-        marks += [box(x - half, top - away - CROP_MM, 2 * half, CROP_MM), box(x - half, bottom + away, 2 * half, CROP_MM)]
+        marks += [
+            box(x - half, top - away - CROP_MM, 2 * half, CROP_MM),
+            box(x - half, bottom + away, 2 * half, CROP_MM),
+        ]
     for y in (top, bottom):
-        marks += [box(left - away - CROP_MM, y - half, CROP_MM, 2 * half), box(right + away, y - half, CROP_MM, 2 * half)]
+        marks += [
+            box(left - away - CROP_MM, y - half, CROP_MM, 2 * half),
+            box(right + away, y - half, CROP_MM, 2 * half),
+        ]
     return marks
 
 
@@ -111,7 +119,9 @@ def _key(layout: Layout, height: float) -> list[Shapes | Text]:
     left, top = MARGIN_MM, height - MARGIN_MM - CODE_MM
     matrix = np.array([list(row) for row in segno.make_qr(key.text(), error="m").matrix], dtype=bool)
     module = CODE_MM / len(matrix)
-    modules = [box(left + module * c, top + module * r, module, module) for r, c in np.argwhere(matrix).tolist()]
+    modules = [
+        box(left + module * c, top + module * r, module, module) for r, c in np.argwhere(matrix).tolist()
+    ]
     half = THICK_MM / 2
     x_bar = box(left + X_BAR[0][0], top + X_BAR[0][1] - half, BAR_MM, THICK_MM)
     y_bar = box(left + Y_BAR[1][0] - half, top + Y_BAR[1][1], THICK_MM, BAR_MM)
@@ -139,5 +149,8 @@ def _patches(layout: Layout, width: float, height: float) -> list[Shapes | Text]
         y = height - MARGIN_MM - PATCH_MM - 6
         frame = box(x - 0.1, y - 0.1, PATCH_MM + 0.2, PATCH_MM + 0.2)
         items += [Shapes([frame], INK), Shapes([box(x, y, PATCH_MM, PATCH_MM)], layout.palette[name])]
-        items += [Text(name, x, y + PATCH_MM + 3, 2.2), Text(layout.palette[name], x, y + PATCH_MM + 5.6, 2.2)]
+        items += [
+            Text(name, x, y + PATCH_MM + 3, 2.2),
+            Text(layout.palette[name], x, y + PATCH_MM + 5.6, 2.2),
+        ]
     return items
