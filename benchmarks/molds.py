@@ -3,7 +3,8 @@
     python benchmarks/molds.py            plates, booleans, a pad of 22 layers
     python benchmarks/molds.py --large    and one of 44
 
-Times are of one core (user and system time), so that a busy machine does not blur them; whole processes show wall time too.
+Times are of one core (user and system time), so that a busy machine does not blur them; whole processes show
+wall time too.
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,10 +17,12 @@ if TYPE_CHECKING:
 
 Points = NDArray[np.float64]
 # Codes are looked for in pictures of about this size; larger scans are reduced first.
-SEARCH_PX = (2400, 1600, 3600, 1000)
-# An end is searched this far from where the code says that it is, and measured over this part of the bar's width.
+SEARCH_PX = (2400, 1800, 1200)
+# An end is searched this far from where the code says that it is, and measured over this part of the bar's
+# width.
 REACH_MM, ACROSS_MM, INSIDE_MM = 2.5, 0.6 * THICK_MM, 3.0
 LEAST_CONTRAST = 40.0
+PASSES = 3
 MM_PER_INCH = 25.4
 
 
@@ -91,23 +95,35 @@ def _grey(image: Image) -> NDArray[np.uint8]:
 
 
 def _find_code(grey: NDArray[np.uint8]) -> tuple[SheetKey, Points] | None:
-    """The key and the code's (4, 2) corners in the picture: upper left, upper right, lower right, lower left."""
+    """The key and the code's (4, 2) corners in the picture: upper left, upper right, lower right, lower left.
+
+    The detector misses codes that are small in a large picture, or of a size that it dislikes: several sizes
+    are tried, and the picture's quarters.
+    """
     import cv2
 
-    detector = cv2.QRCodeDetector()
-    for side in SEARCH_PX:
-        factor = min(1.0, side / max(grey.shape))
-        small = (
-            grey
-            if factor == 1
-            else cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-        )
-        text, corners, _ = detector.detectAndDecode(small)
-        key = parse_key(text) if text else None
-        if key is not None and corners is not None:
-            # Pixel centres: the detector's corners are those of a grid of pixels, too.
-            return key, (corners.reshape(4, 2).astype(np.float64) + 0.5) / factor - 0.5
+    detectors = (cv2.QRCodeDetectorAruco(), cv2.QRCodeDetector())
+    for left, top, part in _regions(grey):
+        for side, detector in product(SEARCH_PX, detectors):
+            factor = min(1.0, side / max(part.shape))
+            size = cv2.INTER_AREA
+            small = part if factor == 1 else cv2.resize(part, None, fx=factor, fy=factor, interpolation=size)
+            text, corners, _ = detector.detectAndDecode(small)
+            key = parse_key(text) if text else None
+            if key is not None and corners is not None:
+                # From the reduced picture's pixel centres to the whole one's.
+                return key, (corners.reshape(4, 2).astype(np.float64) + 0.5) / factor - 0.5 + (left, top)
     return None
+
+
+def _regions(grey: NDArray[np.uint8]) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+    """The picture, then its overlapping quarters, with their upper left corners."""
+    yield 0, 0, grey
+    height, width = grey.shape
+    tall, wide = (3 * height) // 5, (3 * width) // 5
+    for top in (height - tall, 0):
+        for left in (0, width - wide):
+            yield left, top, grey[top : top + tall, left : left + wide]
 
 
 def _measure_bar(
@@ -115,15 +131,17 @@ def _measure_bar(
 ) -> tuple[Points, Points] | None:
     """Both ends of a bar in the picture, to a fraction of a pixel."""
     ends = np.array([first, last])
+    found = ends
     basis = _plane(corners)
     # Ends that were found replace the code's poorer prediction of direction and scale.
-    for _ in range(3):
+    for _ in range(PASSES):
         places = ends @ basis[:, :2].T + basis[:, 2]
         along = (places[1] - places[0]) / BAR_MM
-        found = [_end(grey, places[0], -along), _end(grey, places[1], along)]
-        if found[0] is None or found[1] is None:
+        start, end = _end(grey, places[0], -along), _end(grey, places[1], along)
+        if start is None or end is None:
             return None
-        basis = _through(basis, ends, np.array(found))
+        found = np.array([start, end])
+        basis = _through(basis, ends, found)
     return found[0], found[1]
 
 
@@ -160,7 +178,7 @@ def _end(grey: NDArray[np.uint8], place: Points, outward: Points) -> Points | No
 def _edge(
     grey: NDArray[np.uint8], place: Points, towards: Points, beside: Points, expected_mm: float
 ) -> float | None:
-    """How far from ``place`` (mm) the brightness, averaged along ``beside``, is half way from ink to paper."""
+    """How far from ``place`` (mm) the mean brightness along ``beside`` is half way from ink to paper."""
     import cv2
 
     step_mm = 0.25 / float(np.hypot(*towards))

@@ -31,7 +31,7 @@ def bosses(stack: Stack, cells: Points) -> list[Feature]:
 
 
 def stencil_holes(stack: Stack, cells: Points) -> list[tuple[Loop, Loop]]:
-    """A stencil's holes at its lower and upper face; below, they keep their clearance to the cavities' rims."""
+    """A stencil's holes at its lower and upper face; below, they keep clear of the cavities' rims."""
     inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
     wider = STENCIL_LEAN * stack.options.stencil_mm
     radius = stack.options.tip_radius_mm

@@ -24,8 +24,8 @@ class ToolLimits:
     sheet_mm: float
 
 
-# Usual values of makers' design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm a nozzle's line,
-# 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
+# Usual values of makers' design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm a nozzle's
+# line, 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
 TOOLS = {
     "sla-resin": ToolLimits(0.2, 0.4),
     "fdm-pla": ToolLimits(0.4, 0.6),

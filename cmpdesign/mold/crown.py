@@ -1,8 +1,8 @@
 """The crown of a domed pad: its height over the plan, and how a flat pattern comes on it.
 
-Every surface of a domed pad is the same crown, moved along z. So thicknesses are constant along the direction in
-which the mold opens, all parts pull straight, and one lid fits every layer; measured at right angles to the
-surface, a layer is thinner by the cosine of the slope.
+Every surface of a domed pad is the same crown, moved along z. So thicknesses are constant along the
+direction in which the mold opens, all parts pull straight, and one lid fits every layer; measured at right
+angles to the surface, a layer is thinner by the cosine of the slope.
 """
 
 from __future__ import annotations
@@ -74,4 +74,5 @@ def projected(xy_mm: Points, shape: str, radius_mm: float, projection: str) -> P
         return np.stack([radius_mm * np.sin(xy_mm[:, 0] / radius_mm), xy_mm[:, 1]], axis=-1)
     away = np.hypot(*xy_mm.T)
     shrink = np.sinc(away / radius_mm / np.pi)
-    return xy_mm * shrink[:, None]
+    plan: Points = xy_mm * shrink[:, None]
+    return plan

@@ -1,8 +1,8 @@
-"""The curved side of plates and stencils on a domed pad: flat facets between markers, bosses or holes in them.
+"""The curved side of a domed pad's plates and stencils: flat facets between markers, bosses or holes in them.
 
-The facets are the pattern's own cells, with their corners on the crown, and triangles from the pattern's rim to the
-crown's foot. A facet lies below the crown by at most pitch^2 / (6 radius), some micrometres. As everything is flat,
-the shells are exact: volumes are sums over facets.
+The facets are the pattern's own cells, with their corners on the crown, and triangles from the pattern's rim
+to the crown's foot. A facet lies below the crown by at most pitch^2 / (6 radius), some micrometres. As
+everything is flat, the shells are exact: volumes are sums over facets.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def dish_of(stack: Stack, color: int, through: bool) -> Dish:
 
 
 def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
-    """(B, 3) points around the crown in plan, counter-clockwise; those at its foot; a cylinder's end facets."""
+    """(B, 3) points around the crown in plan, counter-clockwise; the foot's; a cylinder's end facets."""
     if crown.shape == "sphere":
         angle = 2 * np.pi * np.arange(FOOT_POINTS) / FOOT_POINTS
         ring = crown.reach_mm * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)

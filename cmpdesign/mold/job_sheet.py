@@ -1,4 +1,4 @@
-"""The job sheet of a mold: what to mix, the steps in order, every part from two sides. Plain HTML beside its pictures."""
+"""The job sheet of a mold: what to mix, the steps in order, every part from two sides. Plain HTML."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def _pours(stack: Stack) -> str:
         cells = (
             f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume / 1000:.3f} ml</td>"
             f"<td class=n>{grams:.3f} g</td><td class=n>{grams * (1 + LOSS_PERCENT / 100):.2f} g</td>"
-            f"<td class=n>{silicone.pot_life_min.value:g} min</td><td class=n>{silicone.cure_h.value:g} h</td>"
+            f"<td class=n>{silicone.pot_life_min.value:g} min</td><td "
+            f"class=n>{silicone.cure_h.value:g} h</td>"
         )
         rows.append(f"<tr>{cells}</tr>")
     head = f"<tr><th>layer<th>silicone<th>cast<th>cast<th>mix (+{LOSS_PERCENT} %)<th>pot life<th>cure</tr>"
@@ -60,25 +61,32 @@ def _pours(stack: Stack) -> str:
 def _steps(stack: Stack) -> list[str]:
     """The way of working that the parts are made for."""
     steps = [
-        "Degrease all parts; try whether a drop of each silicone cures on them; spray release agent on everything "
+        "Degrease all parts; try whether a drop of each silicone cures on them; spray release agent "
+        "on everything "
         "but the pins. Press the four pins into the base: they stand so that no part fits turned.",
-        "Degas the base layer's silicone and pour it. Lower the lid on from one side; what is too much leaves "
-        "through the vents and over the land into the moat. Cure level; lift the lid with the two jack screws (M3).",
-        "Lay the frame on the base. Mix the black layer with a retarder and a thixotropic agent, so that it stays "
+        "Degas the base layer's silicone and pour it. Lower the lid on from one side; what is too "
+        "much leaves "
+        "through the vents and over the land into the moat. Cure level; lift the lid with the two "
+        "jack screws (M3).",
+        "Lay the frame on the base. Mix the black layer with a retarder and a thixotropic agent, so "
+        "that it stays "
         "dough, and draw it off flush with the frame.",
     ]
     for color in stack.colors:
         name = COLORS[color]
         steps.append(
-            f"<b>{name}</b>: press the plate <i>boss-{name}</i> down until it lies on the frame; its bosses then "
+            f"<b>{name}</b>: press the plate <i>boss-{name}</i> down until it lies on the frame; its "
+            "bosses then "
             f"stand on the base layer. Let the dough set, lift the plate straight up by its jack screws. Lay "
-            f"<i>stencil-{name}</i> on, wipe {name} silicone through it, vacuum until bubbles have left, wipe again, "
+            f"<i>stencil-{name}</i> on, wipe {name} silicone through it, vacuum until bubbles have "
+            "left, wipe again, "
             "lift the stencil, draw off flush."
         )
     steps += [
         "Cure the marker layer fully, wipe it with isopropanol.",
         "Lay the cover frame on, pour the protective layer, close with the lid, cure.",
-        "Take lid, cover and frame off; peel the pad from the base, starting at a corner; cut the vents' plugs off.",
+        "Take lid, cover and frame off; peel the pad from the base, starting at a corner; cut the "
+        "vents' plugs off.",
     ]
     return steps
 

@@ -65,7 +65,7 @@ class Loop:
         return Loop(self.points + move, self.centres + move)
 
     def chorded(self, radius_mm: float | None = None) -> Loop:
-        """The outline with its arcs as chords: a few for small radii, one for every 7.5 degrees for large ones.
+        """The outline with its arcs as chords: a few for small radii, one for 7.5 degrees of large ones.
 
         ``radius_mm`` decides in place of each arc's own radius, so that paired outlines get paired chords.
         """
@@ -143,7 +143,9 @@ def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -
         cells: (N, k, 2) corners, counter-clockwise.
     """
     side = np.roll(cells, -1, axis=1) - cells
-    normal = np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.hypot(side[..., 0], side[..., 1])[..., None]
+    normal = (
+        np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.hypot(side[..., 0], side[..., 1])[..., None]
+    )
     before = np.roll(normal, 1, axis=1)
     mitre = (before + normal) / (1 + (before * normal).sum(axis=-1))[..., None]
     core = cells - (inset_mm + radius_mm) * mitre

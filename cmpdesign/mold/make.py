@@ -1,4 +1,4 @@
-"""The product "mold": a STEP file for every part and one of all steps; each part is checked before it is written."""
+"""The product "mold": a STEP file for every part and one of all steps, each part checked first."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from cmpdesign.writers.step import Assembly, Place, Solid, assembly_to_step, sol
 FOLDER = "mold"
 # Free space between the steps of the assembly, and the share by which a volume may differ from its formula.
 STEP_APART_MM = 10.0
+BASE_STEP = "1-base"
 VOLUME_TOLERANCE = 1e-9
 
 
@@ -57,8 +58,10 @@ def checked(part: Part) -> dict[str, Any]:
     if not found.valid or not found.closed or error > VOLUME_TOLERANCE:
         state = "closed" if found.closed else "open"
         raise MoldError(
-            f"mold: {part.name} came out {'valid' if found.valid else 'invalid'}, {state}, with a volume off by "
-            f"{error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of cmpdesign, please report it"
+            f"mold: {part.name} came out {'valid' if found.valid else 'invalid'}, {state}, with a "
+            "volume off by "
+            f"{error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of cmpdesign, "
+            "please report it"
         )
     drafts = drafts_deg(part.solid, *part.pulled)
     return {
@@ -106,23 +109,23 @@ def assembly_of(stack: Stack, parts: Sequence[Part], solids: dict[str, Solid]) -
         places = [_place(by_name[member], solids, x, name) for member in members]
         for index, (pin_x, pin_y) in enumerate(stack.pins_mm.tolist(), start=1):
             pin = by_name["pin"]
-            places.append(Place(solids["pin"], f"{name} pin {index}", (x + pin_x, pin_y, pin.z_mm)))
+            places.append(Place(solids["pin"], f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
         groups.append(Assembly(name, places))
     return Assembly("assembly", (), groups)
 
 
 def _place(part: Part, solids: dict[str, Solid], x: float, step: str) -> Place:
     # Over the base alone, the lid lies a frame and a cover lower than over the finished pad.
-    z = part.stack.z_base_mm if (part.name, step) == ("lid", "1 base") else part.z_mm
-    return Place(solids[part.name], f"{step} {part.name}", (x, 0.0, z), part.turned)
+    z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_STEP) else part.z_mm
+    return Place(solids[part.name], f"{step}-{part.name}", (x, 0.0, z), part.turned)
 
 
 def steps_of(stack: Stack) -> dict[str, tuple[str, ...]]:
     """The steps of the work, and the parts that lie on each other in each."""
-    steps: dict[str, tuple[str, ...]] = {"1 base": ("base", "lid")}
+    steps: dict[str, tuple[str, ...]] = {BASE_STEP: ("base", "lid")}
     for color in stack.colors:
         name = COLORS[color]
-        steps[f"{len(steps) + 1} emboss {name}"] = ("base", "frame", f"boss-{name}")
-        steps[f"{len(steps) + 1} fill {name}"] = ("base", "frame", f"stencil-{name}")
-    steps[f"{len(steps) + 1} cover"] = ("base", "frame", "cover", "lid")
+        steps[f"{len(steps) + 1}-emboss-{name}"] = ("base", "frame", f"boss-{name}")
+        steps[f"{len(steps) + 1}-fill-{name}"] = ("base", "frame", f"stencil-{name}")
+    steps[f"{len(steps) + 1}-cover"] = ("base", "frame", "cover", "lid")
     return steps

@@ -1,4 +1,4 @@
-"""The product "mesh": STL of every part and layer, GLB and 3MF of mold and pad, pictures, and the job sheet."""
+"""The product "mesh": STL of every part and layer, GLB and 3MF of mold and pad, pictures, job sheet."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ def _checked(name: str, mesh: Mesh, volume: float, tolerance: float, figures: di
     error = abs(float(mesh.volume_mm3()) / volume - 1)
     if not body.is_watertight or not body.is_winding_consistent or error > tolerance:
         raise MoldError(
-            f"mesh: {name}: watertight {body.is_watertight}, winding consistent {body.is_winding_consistent}, volume "
+            f"mesh: {name}: watertight {body.is_watertight}, winding consistent "
+            f"{body.is_winding_consistent}, volume "
             f"off by {error:.2g}, limit {tolerance:g}; this is a fault of cmpdesign, please report it"
         )
     figures[name] = {

@@ -13,7 +13,7 @@ Count = Annotated[int, Field(ge=0, le=64, strict=True)]
 
 
 class MoldOptions(BaseModel):
-    """How the elastomer is cast in layers. Lengths in mm (of the cured pad where a layer is meant), angles in deg."""
+    """How the elastomer is cast in layers. Lengths in mm (layers: as cured), angles in degrees."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

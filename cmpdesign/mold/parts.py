@@ -1,7 +1,7 @@
 """The parts of a mold: base, frame, boss plates, stencils, cover, lid, pins.
 
-Each is described first (a ``Slab`` and, on a domed pad, its curved faces), then built. Boss plates are described with
-their bosses up, as they are printed or milled, and are turned over where they are used.
+Each is described first (a ``Slab`` and, on a domed pad, its curved faces), then built. Boss plates are
+described with their bosses up, as they are printed or milled, and are turned over where they are used.
 """
 
 from __future__ import annotations
@@ -230,7 +230,8 @@ def _jacks(stack: Stack) -> list[Loop]:
 
 def turned_over(cells: Points) -> Points:
     """Cells as on a plate that lies on its back: y mirrored, still counter-clockwise."""
-    return cells[:, ::-1] * np.array([1.0, -1.0])
+    turned: Points = cells[:, ::-1] * np.array([1.0, -1.0])
+    return turned
 
 
 def _loop_turned(loop: Loop) -> Loop:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def pin_solid(diameter_mm: float, length_mm: float, chamfer_mm: float) -> Any:
         if 0 < number < len(levels) - 1:
             sheet.faces.clear()
         rings.append(builder.place(sheet, z, up=number > 0))
-    for lower, upper in zip(rings, rings[1:], strict=False):
+    for lower, upper in pairwise(rings):
         builder.walls(lower, 0, upper, 0, outward=True)
     return builder.solid()
 

@@ -1,8 +1,8 @@
 """A flat face with many holes, divided into small faces: tiles, so that every later step stays linear.
 
 A kernel checks, writes and reads a face in a time that grows with the square of its holes. So the face is cut
-by horizontal lines into strips, and every strip by short vertical cuts (uprights) into tiles of a few holes. A
-horizontal line may run through holes: it then ends at their rims. An upright keeps clear of every hole.
+by horizontal lines into strips, and every strip by short vertical cuts (uprights) into tiles of a few holes.
+A horizontal line may run through holes: it then ends at their rims. An upright keeps clear of every hole.
 
     +---------------------------+        the outer face: what lies around the box of the tiles
     |  +--------+-------+----+  |
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Sheet:
             between = on_side.get(side, [])
             between.sort(key=lambda number: float(np.hypot(*(np.array(self.points[number]) - origin))))
             ends = [start, *between, corners[(side + 1) % len(corners)]]
-            sides.append([self.edge(a, b, centre) for a, b in zip(ends, ends[1:], strict=False)])
+            sides.append([self.edge(a, b, centre) for a, b in pairwise(ends)])
         self.rims.append(sides)
         return numbers
 
@@ -273,7 +274,7 @@ class Tiler:
         for number, tile in zip(inside.tolist(), tile_of.tolist(), strict=True):
             holes[tile].append(backward(self.sheet.around(self._first_rim + number)))
         places = [-np.inf, *uprights, np.inf]
-        for tile, (left, right) in enumerate(zip(places, places[1:], strict=False)):
+        for tile, (left, right) in enumerate(pairwise(places)):
             legs = [
                 lower.path(left, right, above=True) if lower else [],
                 forward(columns[tile : tile + 1]),
@@ -296,7 +297,8 @@ class Tiler:
 
     def _end(self, step: Step, first: bool = False) -> int:
         edge, along = step
-        return self.sheet.edges[edge][0 if along == first else 1]
+        start, end, _ = self.sheet.edges[edge]
+        return start if along == first else end
 
     def _along_frame(self, start: int, end: int) -> Wire:
         """The frame's edges from one of its points to another, counter-clockwise."""

@@ -144,7 +144,7 @@ class ShellBuilder:
         above: list[int],
         posts: tuple[Any, Any],
     ) -> None:
-        """Curves in the (angle, length) plane of a cylinder or cone, on which every edge is a straight line."""
+        """Curves in the (angle, length) plane of a cylinder or cone: every edge is straight there."""
         from OCP.Geom2d import Geom2d_Line
         from OCP.gp import gp_Dir2d, gp_Pnt2d
         from OCP.TopLoc import TopLoc_Location

@@ -103,7 +103,8 @@ class Stack:
 
     def cells(self, color: int) -> Points:
         """(N, 3 or 4, 2) corners of a color's cells in plan, counter-clockwise."""
-        return self.marker_xy_mm[self.layout.cell_corners[self.layout.cell_color == color]]
+        corners: Points = self.marker_xy_mm[self.layout.cell_corners[self.layout.cell_color == color]]
+        return corners
 
     @cached_property
     def block(self) -> Loop:
@@ -155,7 +156,8 @@ def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, 
     slope = extent / radius if option.projection == "equidistant" else np.arcsin(min(1.0, extent / radius))
     if np.degrees(slope) > STEEPEST_DEG:
         raise DesignError(
-            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm: at the pattern's edge, {extent / scale:.3g} mm "
+            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm: at the pattern's edge, "
+            f"{extent / scale:.3g} mm "
             f"from the apex, the dome is {np.degrees(slope):.3g} deg steep, limit {STEEPEST_DEG:g} deg; "
             "make the radius larger or the pattern smaller"
         )

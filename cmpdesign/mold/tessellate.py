@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmpdesign.mold.loops import Loop, Points, chorded_pair
 from cmpdesign.mold.shells import Feature, Slab
@@ -74,7 +75,7 @@ def _add_face(
         corners.append((first + a, first + c, first + b) if turned else (first + a, first + b, first + c))
 
 
-def merged(name: str, color: str, points: Points, corners: np.ndarray) -> Mesh:  # type: ignore[type-arg]
+def merged(name: str, color: str, points: Points, corners: NDArray[np.int64]) -> Mesh:
     """Points within ``SAME_MM`` are one vertex; triangles that this makes flat are left out."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -7,8 +7,6 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from cmpdesign.writers.meshes import Mesh
 
 _FLOAT, _UINT = 5126, 5125

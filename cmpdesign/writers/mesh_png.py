@@ -50,6 +50,8 @@ def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) ->
     """(height, width, 3) uint8 BGR."""
     import cv2
 
+    from cmpdesign.writers.mesh_raster import rasterize
+
     width, height = (OVERSAMPLING * side for side in size_px)
     seen = [mesh.points @ view.axes().T for mesh in meshes]
     corners = np.concatenate([points[mesh.triangles] for points, mesh in zip(seen, meshes, strict=True)])
@@ -58,7 +60,7 @@ def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) ->
     shades = _shades(corners, view)
     depth = np.full((height, width), -np.inf)
     number = np.full((height, width), -1, dtype=np.int64)
-    _kernel()(scaled, depth, number)
+    rasterize(scaled, depth, number)
     picture = np.full((height, width, 3), 255.0)
     hit = number >= 0
     picture[hit] = colors[number[hit]] * shades[number[hit]][:, None]
@@ -100,10 +102,3 @@ def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats) -> NDArr
         index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
         lines[index] |= jump
     return lines
-
-
-def _kernel():  # type: ignore[no-untyped-def]
-    """The depth buffer, compiled; imported late because numba loads slowly."""
-    from cmpdesign.writers.mesh_raster import rasterize
-
-    return rasterize

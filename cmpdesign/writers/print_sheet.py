@@ -1,7 +1,6 @@
-"""The product "print": several pads on a page, to be cut out, with everything that tells how true the print is."""
+"""The product "print": several pads on a page, with all that tells how true the print is."""
 
 from __future__ import annotations
-
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,13 +59,16 @@ def _places(option: SheetOptions, layout: Layout, width: float, height: float) -
     columns, rows = (int(n) for n in np.floor(room / step + 1e-9))
     if columns < 1 or rows < 1:
         raise DesignError(
-            f"a pad of {layout.size_mm[0]:.4g} x {layout.size_mm[1]:.4g} mm with bleed and crop marks does not fit into "
-            f"{room[0]:.4g} x {room[1]:.4g} mm on {option.page}; choose a larger sheet.page or a smaller pattern"
+            f"a pad of {layout.size_mm[0]:.4g} x {layout.size_mm[1]:.4g} mm with bleed and crop marks "
+            "does not fit into "
+            f"{room[0]:.4g} x {room[1]:.4g} mm on {option.page}; choose a larger sheet.page or a "
+            "smaller pattern"
         )
     wanted = option.pads or columns * rows
     if wanted > columns * rows:
         raise DesignError(
-            f"sheet.pads = {wanted}: only {columns * rows} fit on {option.page}; ask for fewer or choose a larger page"
+            f"sheet.pads = {wanted}: only {columns * rows} fit on {option.page}; ask for fewer or "
+            "choose a larger page"
         )
     corner = np.array([left, MARGIN_MM]) + around / 2
     return [corner + step * (n % columns, n // columns) for n in range(wanted)]
