@@ -63,14 +63,19 @@ def read_sheet(image: Image, dpi: float | None = None) -> SheetReading | str:
         dpi: the scan's resolution; without it only the ratio of the scales is known.
     """
     grey = _grey(image)
-    found = _find_code(grey)
-    if found is None:
-        return "no print sheet's code was found; scan the whole sheet, lying straight, at 150 dpi or more"
-    key, corners = found
-    bars = [_measure_bar(grey, corners, *bar) for bar in (X_BAR, Y_BAR)]
-    if bars[0] is None or bars[1] is None:
-        return "the code was read, but a scale bar beside it is covered, cut off or too pale"
-    x, y = bars[0][1] - bars[0][0], bars[1][1] - bars[1][0]
+    reason = "no print sheet's code was found; scan the whole sheet, lying straight, at 150 dpi or more"
+    for key, corners in _codes(grey):
+        x_bar, y_bar = (_measure_bar(grey, corners, *bar) for bar in (X_BAR, Y_BAR))
+        if x_bar is not None and y_bar is not None:
+            return _reading(key, x_bar, y_bar, dpi)
+        reason = "the code was read, but a scale bar beside it is covered, cut off or too pale"
+    return reason
+
+
+def _reading(
+    key: SheetKey, x_bar: tuple[Points, Points], y_bar: tuple[Points, Points], dpi: float | None
+) -> SheetReading:
+    x, y = x_bar[1] - x_bar[0], y_bar[1] - y_bar[0]
     length_x, length_y = float(np.hypot(*x)), float(np.hypot(*y))
     # The y bar runs up the page, against the image's y.
     between = np.degrees(np.arctan2(x[1] * y[0] - x[0] * y[1], x @ y))
@@ -94,11 +99,11 @@ def _grey(image: Image) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(eight, cv2.COLOR_BGR2GRAY))
 
 
-def _find_code(grey: NDArray[np.uint8]) -> tuple[SheetKey, Points] | None:
-    """The key and the code's (4, 2) corners in the picture: upper left, upper right, lower right, lower left.
+def _codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
+    """Keys and their codes' (4, 2) corners: upper left, upper right, lower right, lower left.
 
     The detector misses codes that are small in a large picture, or of a size that it dislikes: several sizes
-    are tried, and the picture's quarters.
+    are tried, and the picture's quarters; corners differ in quality, too.
     """
     import cv2
 
@@ -112,7 +117,7 @@ def _find_code(grey: NDArray[np.uint8]) -> tuple[SheetKey, Points] | None:
             key = parse_key(text) if text else None
             if key is not None and corners is not None:
                 # From the reduced picture's pixel centres to the whole one's.
-                return key, (corners.reshape(4, 2).astype(np.float64) + 0.5) / factor - 0.5 + (left, top)
+                yield key, (corners.reshape(4, 2).astype(np.float64) + 0.5) / factor - 0.5 + (left, top)
     return None
 
 

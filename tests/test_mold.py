@@ -288,4 +288,4 @@ def test_build123d_reads_names_colors_and_places(tmp_path: Path) -> None:
     assert tuple(plate.color)[:3] != (0, 0, 0)
     assembly = import_step(tmp_path / "assembly.step")
     assert [child.label for child in assembly.children][:2] == ["1-base", "2-emboss-red"]
-    assert [part.label for part in assembly.children[0].children][:2] == ["1-base-base", "1-base-lid"]
+    assert [part.label for part in assembly.children[0].children][:2] == ["base", "lid"]

@@ -35,7 +35,7 @@ def measure(shape: Any) -> Measured:
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    valid = bool(BRepCheck_Analyzer(shape).IsValid())
+    valid = bool(BRepCheck_Analyzer(shape, True, True).IsValid())
     faces = len(of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE))
     return Measured(valid, is_closed(shape), faces, volume_mm3(shape))
 
