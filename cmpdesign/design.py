@@ -15,8 +15,10 @@ from cmpdesign.errors import DesignError
 from cmpdesign.fiducials import Fiducials
 from cmpdesign.graphs import MAX_LAYERS
 from cmpdesign.laser.options import LaserOptions
+from cmpdesign.mold.options import MoldOptions
 from cmpdesign.patterns import patterns
 from cmpdesign.quantities import Angle, Color, Length, LengthOrZero
+from cmpdesign.writers.sheet_options import SheetOptions
 
 # An ellipse flatter than 4 : 1 brings cells with corners below 15 degrees, which neither print nor read.
 ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
@@ -108,6 +110,14 @@ class Design(_Strict):
     laser: LaserOptions = Field(
         default_factory=lambda: LaserOptions.model_validate({}),
         description="How a laser carves the cells; for --only laser.",
+    )
+    mold: MoldOptions = Field(
+        default_factory=lambda: MoldOptions.model_validate({}),
+        description="How the elastomer is cast in layers; for --only mold,mesh.",
+    )
+    sheet: SheetOptions = Field(
+        default_factory=lambda: SheetOptions.model_validate({}),
+        description="The page that pads are printed on; for --only print.",
     )
 
     print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")

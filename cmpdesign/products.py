@@ -61,6 +61,9 @@ PRODUCTS: Mapping[str, Product] = {
     "layout": Product("cmpdesign.products:_layout", "layout.json", usual=True),
     "preview": Product("cmpdesign.products:_preview", "preview.png", usual=True),
     "laser": Product("cmpdesign.writers.laser.product:product", "laser/"),
+    "mold": Product("cmpdesign.mold.make:make_mold", "mold/"),
+    "mesh": Product("cmpdesign.mold.meshes:make_meshes", "mesh/"),
+    "print": Product("cmpdesign.writers.print_sheet:make_print_sheet", "print/"),
     # The report comes last and is no ``Maker``: it is written from what the others measured.
     REPORT: Product("cmpdesign.report:report_to_json", "report.json", usual=True),
 }
@@ -102,7 +105,8 @@ def make_products(
         from cmpdesign.report import report_to_json
 
         files[PRODUCTS[REPORT].where] = report_to_json(report, figures)
-    return files, tuple(finding for product in made.values() for finding in product.findings)
+    findings = dict.fromkeys(finding for product in made.values() for finding in product.findings)
+    return files, tuple(findings)
 
 
 def _maker(name: str) -> Maker:

@@ -53,10 +53,18 @@ def verify(
     min_share: Annotated[
         float, typer.Option(min=0, max=1, help="Share of the visible markers that must be measured.")
     ] = 0.9,
+    sheet_dpi: Annotated[
+        float | None,
+        typer.Option(min=0, help="The pictures are print sheets scanned at this resolution (0: unknown)."),
+    ] = None,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from extractor import Extractor, load_layout
 
+    if sheet_dpi is not None:
+        from cmpdesign.cli.verify_sheet import verify_sheets
+
+        verify_sheets(layout, images, sheet_dpi, output, as_json)
     reference = load_layout(layout)
     extractor = Extractor(reference)
     names = _distinct([path.stem for path in images])

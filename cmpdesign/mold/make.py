@@ -1,0 +1,131 @@
+"""The product "mold": a STEP file for every part and one of all steps, each part checked first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cmpdesign.design import Design
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.layout import COLORS, Layout
+from cmpdesign.mold.checks import boss_volume_mm3, check_mold, moat_to_pin_mm, plate_web_mm, refuse_impossible
+from cmpdesign.mold.measure import drafts_deg, measure
+from cmpdesign.mold.parts import Part, parts_of
+from cmpdesign.mold.stack import LAYERS, Stack, stack_of
+from cmpdesign.products import Made
+from cmpdesign.writers.step import Assembly, Place, Solid, assembly_to_step, solid_to_step
+
+FOLDER = "mold"
+# Free space between the steps of the assembly, and the share by which a volume may differ from its formula.
+STEP_APART_MM = 10.0
+BASE_STEP = "1-base"
+VOLUME_TOLERANCE = 1e-9
+
+
+class MoldError(CmpDesignError):
+    """A part did not come out as computed; nothing was written."""
+
+
+def make_mold(design: Design, layout: Layout) -> Made:
+    """Every part's STEP file and the assembly's.
+
+    Raises:
+        DesignError: what cannot be made, before any solid is built.
+        MoldError: a solid that is open, invalid or of another volume than computed.
+    """
+    stack = stack_of(design, layout)
+    findings = check_mold(stack)
+    refuse_impossible(findings)
+    parts = parts_of(stack)
+    figures = {part.name: checked(part) for part in parts}
+    solids = {part.name: Solid(part.name, part.color, part.solid) for part in parts}
+    files: dict[str, str | bytes] = {
+        f"{FOLDER}/{part.name}.step": solid_to_step(solids[part.name]) for part in parts
+    }
+    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts, solids))
+    summary = {"parts": figures, **mold_figures(stack)}
+    return Made(files, summary, tuple(findings))
+
+
+def checked(part: Part) -> dict[str, Any]:
+    """A part's figures as measured on its solid.
+
+    Raises:
+        MoldError: open, invalid, or of another volume than its closed form.
+    """
+    found = measure(part.solid)
+    error = abs(found.volume_mm3 / part.volume_mm3 - 1)
+    if not found.valid or not found.closed or error > VOLUME_TOLERANCE:
+        state = "closed" if found.closed else "open"
+        raise MoldError(
+            f"mold: {part.name} came out {'valid' if found.valid else 'invalid'}, {state}, with a "
+            "volume off by "
+            f"{error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of cmpdesign, "
+            "please report it"
+        )
+    drafts = drafts_deg(part.solid, *part.pulled)
+    return {
+        "faces": found.faces,
+        "volume_mm3": round(found.volume_mm3, 6),
+        "draft_min_deg": round(drafts[0], 6) if drafts[0] == drafts[0] else None,
+        "draft_max_deg": round(drafts[1], 6) if drafts[1] == drafts[1] else None,
+    }
+
+
+def mold_figures(stack: Stack) -> dict[str, Any]:
+    """What is mixed and poured, and the clearances."""
+    pad = [_frustum(stack, layer) for layer in range(3)]
+    fillings = {COLORS[color]: boss_volume_mm3(stack, color) for color in stack.colors}
+    pours = {LAYERS[0]: pad[0], "black": pad[1] - sum(fillings.values()), **fillings, LAYERS[2]: pad[2]}
+    web, plate = plate_web_mm(stack)
+    return {
+        "scale": {layer: round(s.scale, 9) for layer, s in zip(LAYERS, stack.silicones, strict=True)},
+        "thickness_mm": {layer: round(t, 6) for layer, t in zip(LAYERS, stack.thickness_mm, strict=True)},
+        "parting_z_mm": [round(z, 6) for z in (stack.z_base_mm, stack.z_marker_mm, stack.z_cover_mm)],
+        "pour_mm3": {name: round(volume, 3) for name, volume in pours.items()},
+        "clearance_mm": {
+            "pin to hole, each side": stack.options.clearance_mm / 2,
+            "stencil to cavity, each side": stack.options.clearance_mm,
+            "moat to pin hole": round(moat_to_pin_mm(stack), 6),
+            f"between bosses of one plate ({plate})": round(web, 6),
+        },
+    }
+
+
+def _frustum(stack: Stack, layer: int) -> float:
+    from cmpdesign.mold.loops import frustum_volume_mm3
+
+    volume = frustum_volume_mm3(*stack.edges(layer), stack.thickness_mm[layer])
+    return volume
+
+
+def assembly_of(stack: Stack, parts: Sequence[Part], solids: dict[str, Solid]) -> Assembly:
+    """One group a step of the work, side by side along x; in each, the parts lie where they are used."""
+    by_name = {part.name: part for part in parts}
+    width = float(stack.block.points[:, 0].max() - stack.block.points[:, 0].min()) + STEP_APART_MM
+    groups = []
+    for number, (name, members) in enumerate(steps_of(stack).items()):
+        x = number * width
+        places = [_place(by_name[member], solids, x, name) for member in members]
+        for index, (pin_x, pin_y) in enumerate(stack.pins_mm.tolist(), start=1):
+            pin = by_name["pin"]
+            places.append(Place(solids["pin"], f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
+        groups.append(Assembly(name, places))
+    return Assembly("assembly", (), groups)
+
+
+def _place(part: Part, solids: dict[str, Solid], x: float, step: str) -> Place:
+    # Over the base alone, the lid lies a frame and a cover lower than over the finished pad.
+    z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_STEP) else part.z_mm
+    return Place(solids[part.name], f"{step}-{part.name}", (x, 0.0, z), part.turned)
+
+
+def steps_of(stack: Stack) -> dict[str, tuple[str, ...]]:
+    """The steps of the work, and the parts that lie on each other in each."""
+    steps: dict[str, tuple[str, ...]] = {BASE_STEP: ("base", "lid")}
+    for color in stack.colors:
+        name = COLORS[color]
+        steps[f"{len(steps) + 1}-emboss-{name}"] = ("base", "frame", f"boss-{name}")
+        steps[f"{len(steps) + 1}-fill-{name}"] = ("base", "frame", f"stencil-{name}")
+    steps[f"{len(steps) + 1}-cover"] = ("base", "frame", "cover", "lid")
+    return steps

@@ -1,0 +1,126 @@
+"""What a built solid measures: asked of the kernel, not of the numbers that it was built from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+# A wall that stands within this of the pull direction has no draft; a face within it of level is no wall.
+LEVEL_DEG = 45.0 - 1e-6
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One solid's check.
+
+    Attributes:
+        valid: BRepCheck finds nothing.
+        closed: every edge is shared by two faces.
+        faces: their number.
+        volume_mm3: by integration over faces.
+    """
+
+    valid: bool
+    closed: bool
+    faces: int
+    volume_mm3: float
+
+
+def measure(shape: Any) -> Measured:
+    """Validity, closure and volume of a solid."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    valid = bool(BRepCheck_Analyzer(shape, True, True).IsValid())
+    faces = len(of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE))
+    return Measured(valid, is_closed(shape), faces, volume_mm3(shape))
+
+
+def volume_mm3(shape: Any) -> float:
+    """By integration over the faces; exact for flat faces, to 1e-12 for round ones."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    return float(properties.Mass())
+
+
+def is_closed(shape: Any) -> bool:
+    """True when every edge of every shell is used twice, once in each direction."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    shells = of_kind(shape, TopAbs_ShapeEnum.TopAbs_SHELL)
+    return bool(shells) and all(BRep_Tool.IsClosed_s(shell) for shell in shells)
+
+
+def of_kind(shape: Any, kind: Any) -> list[Any]:
+    """Sub-shapes of a kind, in order; shared ones once for every use."""
+    from OCP.TopExp import TopExp_Explorer
+
+    found = []
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found
+
+
+def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]:
+    """Least and largest lean against z of the walls that lie wholly within a box.
+
+    A wall is a plane steeper than ``LEVEL_DEG``, a cone, or a cylinder along z (lean 0).
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopoDS import TopoDS
+
+    leans = []
+    for face in of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+        surface = BRepAdaptor_Surface(TopoDS.Face(face), False)
+        kind, lean = surface.GetType(), LEVEL_DEG
+        if kind == GeomAbs_SurfaceType.GeomAbs_Plane:
+            lean = float(np.degrees(np.arcsin(min(1.0, abs(surface.Plane().Axis().Direction().Z())))))
+        elif kind == GeomAbs_SurfaceType.GeomAbs_Cone:
+            lean = float(np.degrees(abs(surface.Cone().SemiAngle())))
+        elif kind == GeomAbs_SurfaceType.GeomAbs_Cylinder:
+            lean = 90.0 - float(
+                np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z()))))
+            )
+        if lean < LEVEL_DEG and _within(face, low_mm, high_mm):
+            leans.append(lean)
+    return (min(leans), max(leans)) if leans else (float("nan"), float("nan"))
+
+
+def _within(face: Any, low_mm: Point, high_mm: Point) -> bool:
+    """True when every corner of the face lies in the box, a micrometre of tolerance around it."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopoDS import TopoDS
+
+    for vertex in of_kind(face, TopAbs_ShapeEnum.TopAbs_VERTEX):
+        point = BRep_Tool.Pnt_s(TopoDS.Vertex(vertex))
+        place = (point.X(), point.Y(), point.Z())
+        if any(c < a - 1e-3 or c > b + 1e-3 for a, c, b in zip(low_mm, place, high_mm, strict=True)):
+            return False
+    return True
+
+
+def distance_mm(first: Any, second: Any) -> float:
+    """The least distance between two solids; 0 where they touch or overlap."""
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+
+    return float(BRepExtrema_DistShapeShape(first, second).Value())
+
+
+def overlap_mm3(first: Any, second: Any) -> float:
+    """The volume that two solids share."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+
+    return volume_mm3(BRepAlgoAPI_Common(first, second).Shape())

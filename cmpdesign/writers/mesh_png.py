@@ -1,0 +1,104 @@
+"""Meshes drawn to a PNG without a graphics card: parallel projection, depth buffer, dark outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.writers.meshes import Mesh
+
+Floats = NDArray[np.float64]
+OVERSAMPLING = 2
+MARGIN = 0.04
+# Faces that turn away from the light keep this much of their color.
+AMBIENT = 0.35
+LIGHT = np.array([0.35, 0.5, 0.8]) / np.linalg.norm([0.35, 0.5, 0.8])
+OUTLINE = 0.35
+# A step in depth is an outline when it exceeds this share of the picture's height; in shade, this difference.
+DEPTH_STEP, SHADE_STEP = 0.004, 0.07
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the picture is taken from: around z from the x axis, and above (below: negative) the plan."""
+
+    azimuth_deg: float
+    elevation_deg: float
+
+    def axes(self) -> Floats:
+        """(3, 3) rows: right, up and towards the viewer."""
+        a, e = np.radians([self.azimuth_deg, self.elevation_deg])
+        towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        return np.stack([right, np.cross(towards, right), towards])
+
+
+ABOVE, BELOW = View(-60.0, 35.0), View(-60.0, -35.0)
+
+
+def meshes_to_png(meshes: Sequence[Mesh], view: View = ABOVE, size_px: tuple[int, int] = (800, 600)) -> bytes:
+    """The picture, framed to the meshes, on white."""
+    from cmpdesign.images import to_png
+
+    return to_png(draw_meshes(meshes, view, size_px))
+
+
+def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """(height, width, 3) uint8 BGR."""
+    import cv2
+
+    from cmpdesign.writers.mesh_raster import rasterize
+
+    width, height = (OVERSAMPLING * side for side in size_px)
+    seen = [mesh.points @ view.axes().T for mesh in meshes]
+    corners = np.concatenate([points[mesh.triangles] for points, mesh in zip(seen, meshes, strict=True)])
+    colors = np.concatenate([np.tile(_bgr(mesh.color), (len(mesh.triangles), 1)) for mesh in meshes])
+    scaled = _framed(corners, width, height)
+    shades = _shades(corners, view)
+    depth = np.full((height, width), -np.inf)
+    number = np.full((height, width), -1, dtype=np.int64)
+    rasterize(scaled, depth, number)
+    picture = np.full((height, width, 3), 255.0)
+    hit = number >= 0
+    picture[hit] = colors[number[hit]] * shades[number[hit]][:, None]
+    lines = _outlines(depth, number, shades)
+    picture[lines] *= OUTLINE
+    small = cv2.resize(picture.astype(np.float32), size_px, interpolation=cv2.INTER_AREA)
+    return np.clip(np.rint(small), 0, 255).astype(np.uint8)
+
+
+def _bgr(color: str) -> Floats:
+    return np.array([int(color[i : i + 2], 16) for i in (5, 3, 1)], dtype=np.float64)
+
+
+def _framed(corners: Floats, width: int, height: int) -> Floats:
+    """Corners in pixels, y down; z grows towards the viewer in the same unit."""
+    flat = corners.reshape(-1, 3)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    scale = (1 - 2 * MARGIN) * min(width / (high[0] - low[0]), height / (high[1] - low[1]))
+    middle = (low + high) / 2
+    moved = (corners - middle) * scale
+    return np.stack([width / 2 + moved[..., 0], height / 2 - moved[..., 1], moved[..., 2]], axis=-1)
+
+
+def _shades(corners: Floats, view: View) -> Floats:
+    """(T,) brightness of each triangle; the light stands behind the viewer's shoulder."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return np.asarray(AMBIENT + (1 - AMBIENT) * np.clip(normals @ LIGHT, 0, 1))
+
+
+def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats) -> NDArray[np.bool_]:
+    """Pixels where depth or shade jumps to the right or lower neighbour."""
+    shade = np.where(number >= 0, shades[number], 2.0)
+    far = np.where(np.isfinite(depth), depth, -1e6)
+    step = DEPTH_STEP * depth.shape[0]
+    lines = np.zeros(depth.shape, dtype=np.bool_)
+    for axis in (0, 1):
+        jump = (np.abs(np.diff(far, axis=axis)) > step) | (np.abs(np.diff(shade, axis=axis)) > SHADE_STEP)
+        index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+        lines[index] |= jump
+    return lines

@@ -1,0 +1,34 @@
+"""The depth buffer's loop over triangles and pixels."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def rasterize(corners, depth, number):  # type: ignore[no-untyped-def]
+    """Draw triangles (T, 3, 3: x, y in pixels, z towards the viewer) into depth and triangle number."""
+    height, width = depth.shape
+    for t in range(corners.shape[0]):
+        ax, ay, az = corners[t, 0]
+        bx, by, bz = corners[t, 1]
+        cx, cy, cz = corners[t, 2]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        # With y down, what faces the viewer runs clockwise.
+        if area >= 0.0:
+            continue
+        top = max(int(np.ceil(min(ay, by, cy))), 0)
+        bottom = min(int(np.floor(max(ay, by, cy))), height - 1)
+        left = max(int(np.ceil(min(ax, bx, cx))), 0)
+        right = min(int(np.floor(max(ax, bx, cx))), width - 1)
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                u = ((bx - x) * (cy - y) - (cx - x) * (by - y)) / area
+                v = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / area
+                w = 1.0 - u - v
+                if u >= 0.0 and v >= 0.0 and w >= 0.0:
+                    z = u * az + v * bz + w * cz
+                    if z > depth[y, x]:
+                        depth[y, x] = z
+                        number[y, x] = t

@@ -1,0 +1,119 @@
+"""A printed page as a list of shapes in mm (y down), and its two formats: SVG and PDF."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+DECIMALS = 6
+POINTS_PER_MM = 72 / 25.4
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Filled polygons of one color."""
+
+    polygons: Sequence[NDArray[np.float64]]
+    color: str
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Text:
+    """One line of text, its left end on the base line; ``turned``: it runs upwards."""
+
+    text: str
+    x_mm: float
+    y_mm: float
+    size_mm: float
+    turned: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """A page and what is on it, in the order of drawing."""
+
+    width_mm: float
+    height_mm: float
+    title: str
+    items: Sequence[Shapes | Text]
+
+
+def box(left: float, top: float, width: float, height: float) -> NDArray[np.float64]:
+    """An upright rectangle's corners."""
+    right, bottom = left + width, top + height
+    return np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
+
+
+def page_to_svg(page: Page) -> str:
+    """The page with width, height and viewBox in mm."""
+    import svgwrite
+
+    drawing = svgwrite.Drawing(
+        size=(f"{page.width_mm:g}mm", f"{page.height_mm:g}mm"),
+        viewBox=f"0 0 {page.width_mm:g} {page.height_mm:g}",
+        debug=False,
+    )
+    drawing.set_desc(title=page.title)
+    for item in page.items:
+        if isinstance(item, Text):
+            drawing.add(_svg_text(drawing, item))
+            continue
+        group = drawing.g(fill=item.color, **({"id": item.name} if item.name else {}))
+        for polygon in item.polygons:
+            points = (np.round(polygon, DECIMALS) + 0.0).tolist()
+            group.add(drawing.path(d="M" + "L".join(f"{x!r} {y!r}" for x, y in points) + "Z"))
+        drawing.add(group)
+    return f'<?xml version="1.0" encoding="utf-8" ?>\n{drawing.tostring()}\n'
+
+
+def _svg_text(drawing: Any, item: Text) -> Any:
+    style = {"font_size": item.size_mm, "font_family": "Helvetica, Arial, sans-serif", "fill": "#000000"}
+    if not item.turned:
+        return drawing.text(item.text, insert=(item.x_mm, item.y_mm), **style)
+    return drawing.text(item.text, transform=f"translate({item.x_mm} {item.y_mm}) rotate(-90)", **style)
+
+
+def page_to_pdf(page: Page) -> bytes:
+    """The page as PDF, true to size; no date, the same bytes for the same page."""
+    from reportlab.lib.colors import HexColor
+    from reportlab.pdfgen.canvas import Canvas
+
+    result = io.BytesIO()
+    size = (page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM)
+    canvas = Canvas(result, pagesize=size, invariant=1)
+    canvas.setTitle(page.title)
+    # From here on in mm, y still up.
+    canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
+    for item in page.items:
+        if isinstance(item, Text):
+            _pdf_text(canvas, item, page.height_mm)
+            continue
+        canvas.setFillColor(HexColor(item.color))
+        path = canvas.beginPath()
+        for polygon in item.polygons:
+            (x, y), *others = polygon.tolist()
+            path.moveTo(x, page.height_mm - y)
+            for x, y in others:
+                path.lineTo(x, page.height_mm - y)
+            path.close()
+        canvas.drawPath(path, stroke=0, fill=1)
+    canvas.showPage()
+    canvas.save()
+    return result.getvalue()
+
+
+def _pdf_text(canvas: Any, item: Text, height_mm: float) -> None:
+    canvas.saveState()
+    canvas.setFillGray(0)
+    canvas.translate(item.x_mm, height_mm - item.y_mm)
+    if item.turned:
+        canvas.rotate(90)
+    canvas.setFont("Helvetica", item.size_mm)
+    canvas.drawString(0, 0, item.text)
+    canvas.restoreState()

@@ -1,0 +1,291 @@
+"""Molds: every solid against its closed form, what cannot be made, clearances, and the files."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cmpdesign import build_layout, load_design
+from cmpdesign.errors import DesignError
+from cmpdesign.mold import make
+from cmpdesign.mold.checks import check_mold, refuse_impossible
+from cmpdesign.mold.loops import Loop, circle, frustum_volume_mm3, polygon, rounded
+from cmpdesign.mold.measure import distance_mm, drafts_deg, measure, overlap_mm3
+from cmpdesign.mold.parts import Part, parts_of
+from cmpdesign.mold.sheets import tiled_sheet
+from cmpdesign.mold.shells import Feature, Slab, slab_solid, slab_volume_mm3
+from cmpdesign.mold.stack import Stack, stack_of
+from cmpdesign.writers.step import Solid, read_step, solid_to_step
+
+DESIGNS = {
+    "honeycomb": {"layers": "3"},
+    "round, turned": {"layers": "4", "rotation_deg": "11", "pattern": "round"},
+    "elliptical": {"layers": "3", "pattern": "elliptical", "aspect": "0.6"},
+    "square": {"layers": "2", "pattern": "square"},
+    "clipped": {"layers": "4", "clip": "circle", "clip_diameter_mm": "11"},
+    "sharp": {"layers": "2", "mold.tip_radius_mm": "0", "mold.draft_deg": "0"},
+    "sphere": {"layers": "3", "mold.crown": "sphere", "mold.crown_radius_mm": "12"},
+    "cylinder": {
+        "layers": "3", "mold.crown": "cylinder", "mold.crown_radius_mm": "12", "mold.projection": "vertical"
+    },
+    "shrinking": {"layers": "2", "mold.marker_silicone": "sylgard-184"},
+}  # fmt: skip
+
+
+def stack(**values: str) -> Stack:
+    design = load_design("honeycomb", values)
+    return stack_of(design, build_layout(design))
+
+
+def parts(**values: str) -> dict[str, Part]:
+    return {part.name: part for part in parts_of(stack(**values))}
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_every_solid_is_valid_closed_and_of_its_volume(name: str) -> None:
+    for part in parts(**DESIGNS[name]).values():
+        found = measure(part.solid)
+        assert found.valid and found.closed, part.name
+        assert found.volume_mm3 == pytest.approx(part.volume_mm3, rel=1e-9), part.name
+
+
+@pytest.mark.parametrize("name", ["honeycomb", "sphere"])
+def test_solids_read_back_from_step_are_equal(name: str) -> None:
+    found = parts(**DESIGNS[name])
+    for part in (found[name] for name in ("base", "boss-red", "stencil-red", "lid", "pin")):
+        again = measure(read_step(solid_to_step(Solid(part.name, part.color, part.solid))))
+        before = measure(part.solid)
+        assert again.valid and again.closed and again.faces == before.faces, part.name
+        assert again.volume_mm3 == pytest.approx(part.volume_mm3, rel=1e-9), part.name
+
+
+def test_volume_check_can_fail() -> None:
+    part = parts(layers="2")["boss-red"]
+    assert part.slab is not None
+    lost = Slab(
+        part.slab.outer, part.slab.bottom_mm, part.slab.top_mm, part.slab.through, (), part.slab.many[1:]
+    )
+    assert abs(measure(slab_solid(lost)).volume_mm3 / part.volume_mm3 - 1) > 1e-5
+
+
+@pytest.mark.parametrize(("draft", "lean"), [("2", 2.0), ("5", 5.0), ("0", 0.0)])
+def test_draft_is_measured_on_the_faces(draft: str, lean: float) -> None:
+    values = {"layers": "2", "mold.draft_deg": draft}
+    for name in ("base", "boss-red", "frame", "cover"):
+        part = parts(**values)[name]
+        assert drafts_deg(part.solid, *part.pulled) == pytest.approx((lean, lean), abs=1e-6), name
+    stencil = parts(**values)["stencil-red"]
+    assert drafts_deg(stencil.solid, *stencil.pulled) == pytest.approx((10, 10), abs=1e-6)
+
+
+def placed(part: Part, z: float | None = None) -> object:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+
+    move = gp_Trsf()
+    if part.turned:
+        move.SetRotation(gp_Ax1(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(1.0, 0.0, 0.0)), np.pi)
+    move.SetTranslationPart(gp_Vec(0.0, 0.0, part.z_mm if z is None else z))
+    return BRepBuilderAPI_Transform(part.solid, move, True).Shape()
+
+
+def test_parts_of_every_step_do_not_overlap() -> None:
+    found = parts(layers="2")
+    mold = found["base"].stack
+    for step, names in make.steps_of(mold).items():
+        members = []
+        for name in names:
+            lowered = mold.z_base_mm if (name, step) == ("lid", make.BASE_STEP) else None
+            members.append((name, placed(found[name], lowered)))
+        for (first, a), (second, b) in itertools.combinations(members, 2):
+            assert overlap_mm3(a, b) == pytest.approx(0, abs=1e-9), (step, first, second)
+
+
+def test_bosses_stand_on_the_base_layer_and_clear_of_the_frame() -> None:
+    found = parts(layers="2")
+    mold = found["base"].stack
+    plate = placed(found["boss-red"])
+    layer = slab_solid(Slab(mold.edges(0)[0], 0.0, mold.z_base_mm, outer_top=mold.edges(0)[1]))
+    assert distance_mm(plate, layer) == pytest.approx(0, abs=1e-7)
+    assert overlap_mm3(plate, layer) == pytest.approx(0, abs=1e-9)
+    assert distance_mm(placed(found["frame"]), placed(found["lid"])) > 0.4
+
+
+def test_pins_have_their_clearance() -> None:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Trsf, gp_Vec
+
+    found = parts(layers="2", **{"mold.clearance_mm": "0.16"})
+    move = gp_Trsf()
+    x, y = found["pin"].stack.pins_mm[1]
+    move.SetTranslation(gp_Vec(float(x), float(y), found["pin"].z_mm))
+    pin = BRepBuilderAPI_Transform(found["pin"].solid, move, True).Shape()
+    assert distance_mm(pin, placed(found["frame"])) == pytest.approx(0.08, abs=1e-6)
+    assert overlap_mm3(pin, placed(found["base"])) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "square"])
+def test_no_turn_or_flip_of_a_part_fits_the_pins(pattern: str) -> None:
+    mold = stack(layers="3", pattern=pattern)
+    pins = mold.pins_mm
+    half = mold.pin_diameter_mm / 2
+    for quarter, flip in itertools.product(range(4), (1, -1)):
+        if (quarter, flip) == (0, 1):
+            continue
+        c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarter]
+        turned = pins * (1, flip) @ np.array([(c, s), (-s, c)])
+        # The best that sliding can do: the middles of both sets on each other.
+        turned += (pins.min(axis=0) + pins.max(axis=0) - turned.min(axis=0) - turned.max(axis=0)) / 2
+        misses = np.hypot(*(pins[:, None] - turned[None]).transpose(2, 0, 1)).min(axis=1)
+        assert misses.max() > half
+
+
+def test_pins_are_where_the_laser_has_its_fiducials() -> None:
+    mold = stack(layers="3")
+    np.testing.assert_array_equal(mold.pins_mm[:3], mold.layout.fiducials_mm)
+
+
+def test_shrinkage_is_added_as_a_scale() -> None:
+    plain, shrinking = stack(layers="2"), stack(layers="2", **{"mold.marker_silicone": "sylgard-184"})
+    ratio = (1 - 0.001) / (1 - 0.0106)
+    np.testing.assert_allclose(shrinking.marker_xy_mm, plain.marker_xy_mm * ratio, rtol=1e-12)
+    assert shrinking.thickness_mm[1] == pytest.approx(0.5 / (1 - 0.0106))
+    np.testing.assert_array_equal(shrinking.pins_mm, plain.pins_mm)
+
+
+def test_equidistant_projection_keeps_lengths_from_the_apex() -> None:
+    mold = stack(layers="4", **{"mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+    assert mold.crown is not None
+    away = np.hypot(*mold.marker_xy_mm.T)
+    arc = mold.crown.radius_mm * np.arcsin(away / mold.crown.radius_mm)
+    flat = np.hypot(*mold.layout.marker_xy_mm.T) * mold.silicones[1].scale
+    np.testing.assert_allclose(arc, flat, atol=1e-9)
+
+
+SPHERE = {"mold.crown": "sphere"}
+IMPOSSIBLE = {
+    "gap 0": ({"mold.gap_mm": "0"}, r"mold.gap_mm: 0 mm, limit 0.05 mm; make it larger"),
+    "nozzle": ({"pitch_mm": "0.6", "mold.tool": "fdm-pla"}, r"narrowest boss at its tip: .*, limit 0.4 mm"),
+    "cutter": ({"mold.minimum_feature_mm": "1"}, r"narrowest boss at its tip: 0.7.* mm, limit 1 mm"),
+    "steep": ({**SPHERE, "mold.crown_radius_mm": "3"}, r"crown_radius_mm = 3 mm: .* limit 60 deg"),
+    "no radius": (SPHERE, "needs mold.crown_radius_mm"),
+    "undercut": ({"mold.draft_deg": "-1"}, "an undercut"),
+    "slender": ({"mold.marker_mm": "2.6", "mold.draft_deg": "0"}, "boss height over width"),
+    "thin wall": ({"mold.wall_mm": "0.2"}, "mold.wall_mm: 0.2 mm, limit"),
+    "tin": ({"mold.base_silicone": "mold-max-30"}, "tin-cured"),
+    "unknown": ({"mold.base_silicone": "solari"}, "did you mean solaris"),
+    "moat": ({"mold.moat_mm": "6"}, "wall between the moat and a pin hole"),
+    "square dome": ({"pattern": "square", **SPHERE, "mold.crown_radius_mm": "20"}, "four are in no plane"),
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_what_cannot_be_made_is_refused_before_any_solid(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    values, message = IMPOSSIBLE[name]
+    monkeypatch.setattr(make, "parts_of", lambda stack: pytest.fail("a part was described"))
+    design = load_design("honeycomb", {"layers": "3", **values})
+    with pytest.raises(DesignError, match=message):
+        make.make_mold(design, build_layout(design))
+
+
+def test_resin_that_inhibits_the_cure_is_reported() -> None:
+    subjects = [finding.subject for finding in check_mold(stack(layers="2"))]
+    assert any("Solaris" in subject and "sla-resin" in subject for subject in subjects)
+    assert check_mold(stack(layers="2", **{"mold.tool": "steel"})) == []
+
+
+def test_findings_that_warn_do_not_refuse() -> None:
+    findings = check_mold(stack(layers="2", **{"mold.draft_deg": "0", "mold.gap_mm": "0.03"}))
+    assert {finding.severity for finding in findings} == {"warning"}
+    refuse_impossible(findings)
+
+
+loops = st.builds(
+    lambda n, size, radius, turn, x, y: rounded(
+        size * np.stack([np.cos(turn + 2 * np.pi * np.arange(n) / n), np.sin(turn + 2 * np.pi * np.arange(n)
+        / n)], -1) + (x, y),
+        radius * size,
+    ),
+    st.integers(3, 5), st.floats(0.3, 0.6), st.sampled_from([0.0, 0.1, 0.3]), st.floats(0, 6.3),
+    st.floats(-0.1, 0.1), st.floats(-0.1, 0.1),
+)  # fmt: skip
+
+
+@settings(max_examples=25, deadline=None)
+@given(shapes=st.lists(loops, min_size=1, max_size=24), columns=st.integers(1, 6), framed=st.booleans())
+def test_tiles_cover_any_sheet_exactly(shapes: list[Loop], columns: int, framed: bool) -> None:
+    features = [
+        loop.shifted(1.5 * (n % columns) + 0.7 * (n // columns % 2), 1.5 * (n // columns))
+        for n, loop in enumerate(shapes)
+    ]
+    outer = polygon(np.array([(-3, -3), (14, -3), (14, 38), (-3, 38.0)]))
+    holes = [circle(np.array([12.5, 36.0]), 1.0)] if framed else []
+    slab = Slab(
+        outer, -1.0, 0.0, [(h, h) for h in holes], (), [Feature(f, f.moved(-0.01), 0.5) for f in features]
+    )
+    found = measure(slab_solid(slab))
+    assert found.valid and found.closed
+    assert found.volume_mm3 == pytest.approx(slab_volume_mm3(slab), rel=1e-11)
+
+
+def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
+    for pattern in ("honeycomb", "round", "elliptical"):
+        mold = stack(layers="12", pattern=pattern, rotation_deg="7")
+        roots = [rounded(cell, 0.01).moved(-0.05) for cell in mold.cells(0)]
+        sheet = tiled_sheet(mold.block, mold.holes(), roots, 0.05)
+        assert max(len(wires) for wires in sheet.faces) <= 20, pattern
+
+
+def test_frustum_of_circles() -> None:
+    lower, upper = circle(np.zeros(2), 4.0), circle(np.zeros(2), 2.0)
+    assert frustum_volume_mm3(lower, upper, 3.0) == pytest.approx(np.pi * 3 * (4 + 2 + 1) / 3, rel=1e-14)
+
+
+BUILD = """
+import hashlib, sys
+from cmpdesign import build_layout, load_design
+from cmpdesign.mold.make import make_mold
+design = load_design("honeycomb", {"layers": "2"})
+for name, content in make_mold(design, build_layout(design)).files.items():
+    print(name, hashlib.sha256(content).hexdigest())
+"""
+
+
+def test_the_same_bytes_in_another_process() -> None:
+    runs = [
+        subprocess.run([sys.executable, "-c", BUILD], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert runs[0] == runs[1] and runs[0].count(".step") == 14
+    design = load_design("honeycomb", {"layers": "2"})
+    files = make.make_mold(design, build_layout(design)).files
+    here = "".join(
+        f"{name} {hashlib.sha256(bytes(content)).hexdigest()}\n" for name, content in files.items()
+    )  # type: ignore[arg-type]
+    assert here == runs[0]
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_build123d_reads_names_colors_and_places(tmp_path: Path) -> None:
+    from build123d import import_step
+
+    design = load_design("honeycomb", {"layers": "2"})
+    files = make.make_mold(design, build_layout(design)).files
+    for name in ("boss-red", "assembly"):
+        content = files[f"mold/{name}.step"]
+        assert isinstance(content, bytes)
+        (tmp_path / f"{name}.step").write_bytes(content)
+    plate = import_step(tmp_path / "boss-red.step")
+    assert plate.label == "boss-red" and plate.is_valid
+    assert tuple(plate.color)[:3] != (0, 0, 0)
+    assembly = import_step(tmp_path / "assembly.step")
+    assert [child.label for child in assembly.children][:2] == ["1-base", "2-emboss-red"]
+    assert [part.label for part in assembly.children[0].children][:2] == ["base", "lid"]

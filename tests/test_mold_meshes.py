@@ -1,0 +1,127 @@
+"""Meshes of molds and pads: closed, of their volume, and read back by other readers."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from cmpdesign import build_layout, load_design
+from cmpdesign.mold import meshes as product
+from cmpdesign.mold.meshes import make_meshes, part_mesh
+from cmpdesign.mold.pad import pad_meshes
+from cmpdesign.mold.parts import parts_of
+from cmpdesign.mold.stack import stack_of
+from cmpdesign.products import Made
+from cmpdesign.writers.mesh_3mf import meshes_to_3mf, read_3mf
+from cmpdesign.writers.mesh_png import ABOVE, BELOW, draw_meshes
+from cmpdesign.writers.meshes import Mesh
+
+
+@pytest.fixture(scope="module")
+def made() -> Made:
+    design = load_design("honeycomb", {"layers": "2"})
+    return make_meshes(design, build_layout(design))
+
+
+def content(made: Made, name: str) -> bytes:
+    data = made.files[f"mesh/{name}"]
+    assert isinstance(data, bytes)
+    return data
+
+
+def trimesh_of(data: bytes, kind: str) -> Mapping[str, object]:
+    import trimesh
+
+    scene = trimesh.load(io.BytesIO(data), file_type=kind)
+    return dict(scene.geometry) if isinstance(scene, trimesh.Scene) else {"mesh": scene}
+
+
+def test_every_stl_is_watertight_and_of_its_volume(made: Made) -> None:
+    names = [name.removeprefix("mesh/") for name in made.files if name.endswith(".stl")]
+    assert len(names) == 13 + 7
+    for name in names:
+        (body,) = trimesh_of(content(made, name), "stl").values()
+        assert body.is_watertight and body.is_winding_consistent, name  # type: ignore[attr-defined]
+        figures = made.figures[name.replace("-", "/", 1).removesuffix(".stl")]
+        assert body.volume == pytest.approx(figures["volume_mm3"], rel=1e-4), name  # type: ignore[attr-defined]
+
+
+def test_volumes_are_the_analytic_ones(made: Made) -> None:
+    for name, figures in made.figures.items():
+        tolerance = 5e-3 if name == "mold/pin" else 1e-7
+        assert figures["volume_mm3"] == pytest.approx(figures["analytic_mm3"], rel=tolerance), name
+
+
+def test_layers_fill_the_pad_without_gap_or_overlap() -> None:
+    design = load_design("round", {"layers": "3"})
+    stack = stack_of(design, build_layout(design))
+    volumes = {mesh.name: mesh.volume_mm3() for mesh, _ in pad_meshes(stack)}
+    middle = sum(volumes[name] for name in ("black", "red", "green", "blue", "white"))
+    outline = stack.layout.outline_mm
+    from cmpdesign.mold.loops import frustum_volume_mm3, polygon
+
+    edge = polygon(outline).moved(stack.lean * 4.0)
+    assert middle == pytest.approx(frustum_volume_mm3(edge, edge.moved(stack.lean * 0.5), 0.5), rel=1e-9)
+
+
+def test_glb_is_in_metres_and_named(made: Made) -> None:
+    bodies = trimesh_of(content(made, "pad.glb"), "glb")
+    assert set(bodies) == {"base", "black", "red", "green", "blue", "white", "cover"}
+    height = max(float(body.bounds[1][1]) for body in bodies.values())  # type: ignore[attr-defined]
+    assert height == pytest.approx(0.005, rel=1e-6)
+
+
+def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: Made) -> None:
+    names = [name for name, _, _ in read_3mf(content(made, "pad.3mf"))]
+    assert names == ["base", "black", "red", "green", "blue", "white", "cover"]
+    assert len(read_3mf(content(made, "mold.3mf"))) == 13
+
+
+def test_an_open_mesh_is_refused() -> None:
+    points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1.0)])
+    tent = Mesh("tent", "#ff0000", points, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
+    with pytest.raises(RuntimeError, match="tent: the mesh is not closed"):
+        meshes_to_3mf([tent], "tent")
+    with pytest.raises(Exception, match="watertight False"):
+        product._checked("tent", tent, tent.volume_mm3(), 1e-9, {})
+
+
+def test_crowned_meshes_are_closed() -> None:
+    design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+    stack = stack_of(design, build_layout(design))
+    for mesh, volume in pad_meshes(stack):
+        product._checked(mesh.name, mesh, volume, 1e-9, {})
+    for part in parts_of(stack)[:4]:
+        product._checked(part.name, *part_mesh(part), {})
+
+
+def test_files_are_the_same_again(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(product, "part_pictures", lambda mold: {})
+    design = load_design("honeycomb", {"layers": "2"})
+    again = make_meshes(design, build_layout(design)).files
+    assert [name for name, data in again.items() if data != made.files[name]] == []
+
+
+def test_pictures_show_bosses_from_above_only() -> None:
+    design = load_design("honeycomb", {"layers": "2"})
+    plate = next(part for part in parts_of(stack_of(design, build_layout(design))) if part.name == "boss-red")
+    mesh = part_mesh(plate)[0]
+    above, below = (draw_meshes([mesh], view, (160, 120)) for view in (ABOVE, BELOW))
+    assert above.shape == (120, 160, 3)
+    # The middle of the back is plain; bosses throw lines and shades.
+    spread = [np.ptp(picture[50:70, 70:90].astype(int)) for picture in (above, below)]
+    assert spread[0] > spread[1] + 30
+
+
+def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
+    page = made.files["mesh/job-sheet.html"]
+    assert isinstance(page, str)
+    for word in ("boss-red", "Solaris", "ml", "exploded.png"):
+        assert word in page
+    for name in (
+        f"mesh/pictures/{part}-{side}.png" for part in ("base", "lid") for side in ("above", "below")
+    ):
+        assert name.removeprefix("mesh/") in page and name in made.files
