@@ -17,7 +17,8 @@ from .image import estimate_noise, prepare
 from .numbering import lattice_of, number
 from .placing import place
 from .reference import Reference
-from .refine import refine
+from .mesh import mesh_of
+from .refine import PRESETS, Preset, Refiner
 from .regions import find_seeds, grow
 from .triangles import Triangles, fit_triangles
 from .types import Markers, Reason, Status
@@ -55,13 +56,16 @@ class Extractor:
         LayoutError: the layout is not a triangular pattern.
     """
 
-    def __init__(self, layout: Reference) -> None:
+    def __init__(self, layout: Reference, preset: Preset = "balanced") -> None:
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
             )
         self.layout = layout
+        if preset not in PRESETS:
+            raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
+        self._refine = Refiner(mesh_of(layout), preset)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
     def extract(self, image: NDArray[Any]) -> Markers:
@@ -119,7 +123,7 @@ class Extractor:
     ) -> Markers:
         """Refinement and virtual markers of what has been numbered."""
         places = stages.done("place", place(triangles, numbering, len(self.layout.layer)))
-        refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
+        refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
         status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
         virtual, virtual_status = stages.done("virtual", interpolate(self.layout, refined.xy_px, status))
         return Markers(
