@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 
-REACH = 3.5  # a side farther away than this is not seen
+REACH = 3.3  # a side farther away than this is not seen
 STEPS = 64  # of the tables of one variable, to a unit
 WEDGE_STEPS = 8
 WEDGE_REACH = 14.0  # along a side; where both sides of a wedge of 29 degrees or more are in reach, less is needed
@@ -52,8 +52,8 @@ def normal(z):  # type: ignore[no-untyped-def]
     if z >= 4.0:
         return 1.0
     at = (z + 4.0) * STEPS
-    k = int(at)
-    return NORMAL[k] + (at - k) * (NORMAL[k + 1] - NORMAL[k])
+    k = np.uint64(at)
+    return NORMAL[k] + (at - k) * (NORMAL[k + np.uint64(1)] - NORMAL[k])
 
 
 @compiled
@@ -62,8 +62,8 @@ def density(z):  # type: ignore[no-untyped-def]
     if z <= -4.0 or z >= 4.0:
         return 0.0
     at = (z + 4.0) * STEPS
-    k = int(at)
-    return DENSITY[k] + (at - k) * (DENSITY[k + 1] - DENSITY[k])
+    k = np.uint64(at)
+    return DENSITY[k] + (at - k) * (DENSITY[k + np.uint64(1)] - DENSITY[k])
 
 
 @compiled
@@ -74,8 +74,9 @@ def side_of_wedge(d, t):  # type: ignore[no-untyped-def]
         d, sign = -d, -1.0
     t = min(max(t, -WEDGE_REACH), WEDGE_REACH)
     row, column = d * WEDGE_STEPS, (t + WEDGE_REACH) * WEDGE_STEPS
-    i, j = int(row), int(column)
+    i, j = np.uint64(row), np.uint64(column)
+    down, right = i + np.uint64(1), j + np.uint64(1)
     fi, fj = row - i, column - j
-    upper = WEDGE[i, j] + fj * (WEDGE[i, j + 1] - WEDGE[i, j])
-    lower = WEDGE[i + 1, j] + fj * (WEDGE[i + 1, j + 1] - WEDGE[i + 1, j])
+    upper = WEDGE[i, j] + fj * (WEDGE[i, right] - WEDGE[i, j])
+    lower = WEDGE[down, j] + fj * (WEDGE[down, right] - WEDGE[down, j])
     return sign * (upper + fi * (lower - upper))

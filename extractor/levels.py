@@ -21,7 +21,7 @@ BLACK, WHITE = 3, 4
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
 DISC = 0.45  # of the inscribed circle, over which a cell's level is averaged
-ROUNDS = 4  # of the robust fit
+ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
 
@@ -38,16 +38,12 @@ class Levels(NamedTuple):
     cell: (K, 3) level of the drawn cells over the black beneath, at their centroids.
     slope: (K, 3, 2) its change per px along x and y.
     black: (3, 10) the black's polynomial.
-    own: (K, 3) the drawn cells' own absolute levels, NaN where unknown.
-    own_black: (B, 3) the black cells' own levels, NaN where unknown.
     strange: (K,) bool, cells whose ink is not that of their kind.
     """
 
     cell: NDArray[np.float64]
     slope: NDArray[np.float64]
     black: NDArray[np.float64]
-    own: NDArray[np.float64]
-    own_black: NDArray[np.float64]
     strange: NDArray[np.bool_]
 
 
@@ -60,11 +56,12 @@ def monomials(x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def cell_means(image, xy, cells):  # type: ignore[no-untyped-def]
-    """(K, 4): each cell's mean over the pixels about its centroid, and their number (0: nothing to see).
+def cell_means(image, model, xy, cells):  # type: ignore[no-untyped-def]
+    """(K, 4): each cell's mean of image - model over the pixels about its centroid, and their number (0: none).
 
-    ``image`` is (H, W, 3), of any type, its residual as well.
+    ``model`` may be empty.
     """
+    bare = model.shape[0] == 0
     height, width = image.shape[0], image.shape[1]
     out = np.zeros((cells.shape[0], 4))
     for i in range(cells.shape[0]):
@@ -83,6 +80,8 @@ def cell_means(image, xy, cells):  # type: ignore[no-untyped-def]
                     count += 1
                     for channel in range(3):
                         out[i, channel] += image[y, x, channel]
+                        if not bare:
+                            out[i, channel] -= model[y, x, channel]
         if count > 0:
             for channel in range(3):
                 out[i, channel] /= count
@@ -93,75 +92,104 @@ def cell_means(image, xy, cells):  # type: ignore[no-untyped-def]
 @compiled
 def _fit(terms, values, weight, count):  # type: ignore[no-untyped-def]
     """(3, 10): the weighted least squares polynomial with the first ``count`` terms, a little held towards 0."""
-    gram, right = np.zeros((count, count)), np.zeros((count, 3))
+    gram, right = np.zeros((count, count)), np.zeros((3, TERMS))
     for i in range(terms.shape[0]):
         w = weight[i]
         if w == 0.0:
             continue
         for j in range(count):
+            v = w * terms[i, j]
             for k in range(j + 1):
-                gram[j, k] += w * terms[i, j] * terms[i, k]
+                gram[j, k] += v * terms[i, k]
             for channel in range(3):
-                right[j, channel] += w * terms[i, j] * values[i, channel]
+                right[channel, j] += v * values[i, channel]
+    if not gram[0, 0] > 0.0:
+        return np.zeros((3, TERMS))
+    for j in range(1, count):
+        gram[j, j] += 1e-6 * gram[0, 0]
+    # Cholesky, then both substitutions for the three channels
     for j in range(count):
         for k in range(j):
-            gram[k, j] = gram[j, k]
-    for j in range(1, count):
-        gram[j, j] += 1e-6 * gram[0, 0] + 1e-12
-    out = np.zeros((3, TERMS))
-    if gram[0, 0] > 0.0:
-        solved = np.linalg.solve(gram, right)
+            gram[j, j] -= gram[j, k] ** 2
+        gram[j, j] = np.sqrt(gram[j, j])
+        for i in range(j + 1, count):
+            for k in range(j):
+                gram[i, j] -= gram[i, k] * gram[j, k]
+            gram[i, j] /= gram[j, j]
+    for channel in range(3):
         for j in range(count):
-            for channel in range(3):
-                out[channel, j] = solved[j, channel]
-    return out
+            for k in range(j):
+                right[channel, j] -= gram[j, k] * right[channel, k]
+            right[channel, j] /= gram[j, j]
+        for j in range(count - 1, -1, -1):
+            for k in range(j + 1, count):
+                right[channel, j] -= gram[k, j] * right[channel, k]
+            right[channel, j] /= gram[j, j]
+    return right
 
 
 @compiled
-def _field(terms, values, samples, noise, count):  # type: ignore[no-untyped-def]
-    """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange."""
+def _misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
+    """Mean squared distance of each cell's level from the polynomial."""
+    for i in range(terms.shape[0]):
+        out[i] = 0.0
+        for channel in range(3):
+            rest = values[i, channel]
+            for k in range(TERMS):
+                rest -= terms[i, k] * field[channel, k]
+            out[i] += rest * rest / 3.0
+
+
+@compiled
+def _field(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
+    """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange.
+
+    The fourth column of ``values`` is the number of pixels.
+    """
     n = terms.shape[0]
-    weight = np.empty(n)
+    weight, misfit = np.empty(n), np.zeros(n)
     for i in range(n):
-        weight[i] = samples[i] / (1.0 + 0.1 * samples[i])
+        weight[i] = values[i, 3] / (1.0 + 0.1 * values[i, 3])
     start = weight.copy()
-    misfit, spread = np.empty(n), 0.0
-    field = np.zeros((3, TERMS))
-    for _ in range(ROUNDS):
-        field = _fit(terms, values, weight, count)
-        for i in range(n):
-            misfit[i] = 0.0
-            for channel in range(3):
-                misfit[i] += (values[i, channel] - (terms[i] * field[channel]).sum()) ** 2 / 3.0
+    field = _fit(terms, values, weight, count)
+    spread = 0.0
+    for _ in range(rounds):
+        _misfits(terms, values, field, misfit)
         # 0.79 is the median of a chi-square of 3 degrees over 3
         spread = np.median(misfit) / 0.79
         for i in range(n):
             weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * spread + 1e-9)) ** 2
-    expected = np.median(noise * noise / samples)
+        field = _fit(terms, values, weight, count)
+    _misfits(terms, values, field, misfit)
+    spread = np.median(misfit) / 0.79
+    expected = noise * noise / np.median(values[:, 3])
     strange = np.zeros(n, np.bool_)
     for i in range(n):
-        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / samples[i]) + 4.0
+        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / values[i, 3]) + 4.0
     return field, max(spread * n / max(n - count, 1) - 1.15 * expected, 0.0), strange
 
 
 @compiled
-def _shrunk(own, samples, place, color, noise, fields, spreads, strange, black, cell, slope, scale):  # type: ignore[no-untyped-def]
+def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
     """Fill in the cells' levels over black and their slopes."""
     terms = np.empty(TERMS)
     for i in range(own.shape[0]):
         x, y = place[i]
         monomials(x, y, terms)
         c = color[i]
-        known = samples[i] > 0
+        known = own[i, 3] > 0.0
         keep = 0.0
         if known:
-            keep = 1.0 if strange[i] else spreads[c] / (spreads[c] + noise * noise / samples[i])
+            keep = 1.0 if strange[i] else spreads[c] / (spreads[c] + noise * noise / own[i, 3])
         for channel in range(3):
-            f, b = fields[c, channel], black[channel]
-            level = (terms * f).sum()
+            f, b = fields[c, channel], fields[BLACK, channel]
+            level, below = 0.0, 0.0
+            for k in range(TERMS):
+                level += terms[k] * f[k]
+                below += terms[k] * b[k]
             if known:
                 level += keep * (own[i, channel] - level)
-            cell[i, channel] = level - (terms * b).sum()
+            cell[i, channel] = level - below
             for axis in range(2):
                 d = 0.0
                 if not strange[i]:
@@ -175,13 +203,62 @@ def _shrunk(own, samples, place, color, noise, fields, spreads, strange, black, 
                 slope[i, channel, axis] = d / scale
 
 
-def _places(xy: NDArray[np.float64], cells: NDArray[np.int32], frame: Frame) -> NDArray[np.float64]:
-    return (xy[cells].mean(axis=1) - (frame.x, frame.y)) / frame.scale
+@compiled
+def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
+    """Terms (n, 10), values (n, 4) and numbers (n,) of an ink's cells that can be seen."""
+    n = 0
+    for i in range(values.shape[0]):
+        if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
+            n += 1
+    terms, own, number = np.empty((n, TERMS)), np.empty((n, 4)), np.empty(n, np.int64)
+    n = 0
+    for i in range(values.shape[0]):
+        if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
+            monomials(place[i, 0], place[i, 1], terms[n])
+            own[n], number[n] = values[i], i
+            n += 1
+    return terms, own, number
 
 
-def _terms(place: NDArray[np.float64]) -> NDArray[np.float64]:
-    x, y = place.T
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3], axis=1)
+@compiled
+def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
+    out = np.empty((cells.shape[0], 2))
+    for i in range(cells.shape[0]):
+        a, b, c = cells[i]
+        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - x0) / scale
+        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - y0) / scale
+    return out
+
+
+@compiled
+def _smooth(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """Everything of ``smooth_levels``."""
+    fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
+    strange = np.zeros(drawn.shape[0], np.bool_)
+    place, place_black = _places(xy, cells, x0, y0, scale), _places(xy, black_cells, x0, y0, scale)
+    for ink in range(INKS):
+        if ink == BLACK:
+            terms, own, number = _gather(black, place_black, color, ink)
+        else:
+            terms, own, number = _gather(drawn, place, color, ink)
+        n = number.shape[0]
+        if n == 0:
+            continue
+        count = 1
+        for k in range(len(CELLS_FOR_TERMS)):
+            if n >= CELLS_FOR_TERMS[k][0]:
+                count = CELLS_FOR_TERMS[k][1]
+                break
+        field, spread, odd = _field(terms, own, noise, count, ROUNDS)
+        fields[ink], spreads[ink] = field, spread
+        if ink == WHITE:  # alone of its kind
+            spreads[ink] = 1e9
+        if ink != BLACK:
+            for i in range(n):
+                strange[number[i]] = odd[i]
+    cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
+    _shrunk(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
+    return cell, slope, fields[BLACK], strange
 
 
 def smooth_levels(
@@ -200,36 +277,16 @@ def smooth_levels(
         xy: (M, 2) the markers, NaN where unknown.
         noise: grey levels.
     """
-    fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
-    strange = np.zeros(len(drawn), np.bool_)
-    place, place_black = _places(xy, mesh.cells, frame), _places(xy, mesh.black, frame)
-    for ink in range(INKS):
-        own, at = (black, place_black) if ink == BLACK else (drawn, place)
-        members = np.flatnonzero((own[:, 3] > 0) & ((ink == BLACK) | (_color(mesh, len(own), ink) == ink)))
-        if len(members) == 0:
-            fields[ink] = fields[BLACK] if ink == WHITE else 0.0
-            continue
-        count = next(terms for cells, terms in CELLS_FOR_TERMS if len(members) >= cells)
-        field, spread, odd = _field(_terms(at[members]), own[members, :3], own[members, 3], noise, count)
-        fields[ink], spreads[ink] = field, spread if ink != WHITE else 1e9
-        if ink != BLACK:
-            strange[members] = odd
-    cell, slope = np.zeros((len(drawn), 3)), np.zeros((len(drawn), 3, 2))
-    seen = np.where(np.isfinite(place[:, 0]), drawn[:, 3], 0.0)
-    _shrunk(
-        drawn, seen, place, mesh.cell_color, noise, fields, spreads, strange, fields[BLACK], cell, slope, frame.scale
-    )
-    return Levels(cell, slope, fields[BLACK], drawn, black, strange)
+    return Levels(*_smooth(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
 
 
-def _color(mesh: Mesh, count: int, ink: int) -> NDArray[np.int32]:
-    return mesh.cell_color if ink != BLACK else np.full(count, BLACK, np.int32)
-
-
-def black_at(
-    black: NDArray[np.float64], xy: NDArray[np.float64], cells: NDArray[np.int32] | None, frame: Frame
-) -> NDArray[np.float64]:
-    """(K, 3): a polynomial at the centroids of cells; of groups of points (K, n, 2) without ``cells``."""
-    points = xy[cells] if cells is not None else xy
-    place = (points.mean(axis=1) - (frame.x, frame.y)) / frame.scale
-    return np.asarray(_terms(place) @ black.T)
+@compiled
+def black_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """(K, 3): the black's polynomial at the points (K, 2) px."""
+    out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
+    for i in range(xy.shape[0]):
+        monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
+        for channel in range(3):
+            for k in range(TERMS):
+                out[i, channel] += terms[k] * black[channel, k]
+    return out

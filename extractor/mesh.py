@@ -100,7 +100,7 @@ def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
 
 def _stencil(near: NDArray[np.int32], offset: NDArray[np.float64]) -> NDArray[np.float64]:
     x, y = offset[..., 0], offset[..., 1]
-    terms = np.stack([x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3], axis=2)
+    terms = np.stack([x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
     out = np.zeros((len(near), 2, NEAR))
     full = (near >= 0).all(axis=1)
     terms = terms[full]

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .information import assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
@@ -32,10 +33,10 @@ from .synthesis import (
     SHARE_B,
     A,
     B,
+    clear,
     draw_cells,
     edge_contrasts,
     read_gridlines,
-    start_residual,
 )
 
 Preset = Literal["fast", "balanced", "accurate"]
@@ -49,6 +50,7 @@ PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
+NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
 class Steps(NamedTuple):
@@ -117,7 +119,12 @@ class Refiner:
         noise = max(noise, MIN_NOISE)
         xy, beyond, maps = self._completed(places.xy_px)
         levels = smooth_levels(
-            cell_means(image, xy, mesh.cells), cell_means(image, xy, mesh.black), xy, mesh, noise, frame
+            cell_means(image, NO_MODEL, xy, mesh.cells),
+            cell_means(image, NO_MODEL, xy, mesh.black),
+            xy,
+            mesh,
+            noise,
+            frame,
         )
         none = np.full((len(xy), 2, 2), np.nan)
         fit = Fit(xy, beyond, 0.0, noise, levels, none, 0.0)
@@ -165,20 +172,23 @@ class Refiner:
     def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
         box = _box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape)
-        residual = self._buffer(image.shape)
+        model = self._buffer(image.shape)
         maps = local_maps(fit.xy, mesh.near, mesh.offset, mesh.stencil)
         lines = gridlines(fit.xy, maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        start_residual(image, levels.black, *frame, box, residual)
+        clear(model, box)
         draw_cells(
-            fit.xy, mesh.cells, mesh.cell_edges, mesh.edges, lines, levels.cell, levels.slope, sigma, box, residual
+            fit.xy, mesh.cells, mesh.cell_edges, mesh.edges, lines, levels.cell, levels.slope, sigma, box, model
         )
-        bettered = self._level_step(residual, fit, frame)
-        sums = read_gridlines(lines, contrasts, sigma, box, residual)
-        side = self._side_changes(levels, bettered, fit.xy, frame)
+        bettered = self._level_step(image, model, fit, frame)
+        middles = 0.5 * (fit.xy[mesh.edges[:, 0]] + fit.xy[mesh.edges[:, 1]])
+        black = black_at(levels.black, middles, *frame)
+        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
+        side = self._side_changes(levels, bettered, middles, frame)
         off = np.einsum("ec,ec->e", contrasts, side)
         to_a, to_b = sums[:, A] - off * sums[:, SHARE_A], sums[:, B] - off * sums[:, SHARE_B]
-        use, noise = _trust(sums, to_a, to_b, fit.noise)
+        use, noise = _trust(sums, to_a, to_b)
+        noise = float(noise) if np.isfinite(noise) else fit.noise
         fit = fit._replace(noise=noise, levels=bettered)
         shift, cov = self._solve(sums, to_a, to_b, use, lines, contrasts, sigma, fit)
         curvature = (use * sums[:, BLUR_CURVATURE]).sum()
@@ -187,24 +197,23 @@ class Refiner:
         moved = float(np.sqrt(np.mean(shift[~fit.beyond & np.isfinite(shift[:, 0])] ** 2)))
         return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, shift_px=moved)
 
-    def _level_step(self, residual: NDArray[np.float32], fit: Fit, frame: Frame) -> Levels:
-        """Levels corrected by what the residual shows in the middle of the cells."""
+    def _level_step(
+        self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
+    ) -> Levels:
+        """Levels corrected by what the drawing does not explain in the middle of the cells."""
         mesh, levels = self._mesh, fit.levels
-        drawn = cell_means(residual, fit.xy, mesh.cells)
-        black = cell_means(residual, fit.xy, mesh.black)
-        drawn[:, :3] += levels.cell + black_at(levels.black, fit.xy, mesh.cells, frame)
-        black[:, :3] += black_at(levels.black, fit.xy, mesh.black, frame)
+        drawn = cell_means(image, model, fit.xy, mesh.cells)
+        black = cell_means(image, model, fit.xy, mesh.black)
+        drawn[:, :3] += levels.cell
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
 
     def _side_changes(
-        self, old: Levels, new: Levels, xy: NDArray[np.float64], frame: Frame
+        self, old: Levels, new: Levels, middles: NDArray[np.float64], frame: Frame
     ) -> NDArray[np.float64]:
         """(E, 3): the change of level of a gridline's two sides together."""
-        mesh = self._mesh
-        start, end = xy[mesh.edges[:, 0]], xy[mesh.edges[:, 1]]
-        black = black_at(new.black - old.black, np.stack([start, end], axis=1), None, frame)
+        black = black_at(new.black - old.black, middles, *frame)
         change = np.concatenate([new.cell - old.cell, np.zeros((1, 3))])
-        return np.nan_to_num(2 * black + change[mesh.edge_cells].sum(axis=1))
+        return np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1))
 
     def _solve(
         self,
@@ -246,23 +255,24 @@ class Refiner:
         return Refined(xy_px=xy, cov_px2=cov, blur_px=fit.sigma, noise=fit.noise)
 
 
-def _trust(
-    sums: NDArray[np.float64], to_a: NDArray[np.float64], to_b: NDArray[np.float64], noise: float
-) -> tuple[NDArray[np.float64], float]:
+@compiled
+def _trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
     """(E,) weights, 1 for gridlines whose pixels the pattern explains once they are moved, and the noise."""
-    read = sums[:, PIXELS] > 8
-    if not read.any():
-        return np.zeros(len(sums)), noise
-    aa, ab, bb = sums[:, AA], sums[:, AB], sums[:, BB]
-    determinant = np.where(read, aa * bb - ab * ab, 1.0)
-    determinant = np.maximum(determinant, 1e-9 * (aa + bb) ** 2 + 1e-12)
-    explained = (bb * to_a**2 - 2 * ab * to_a * to_b + aa * to_b**2) / determinant
-    freedom = np.maximum(3 * sums[:, PIXELS] - 2, 1)
-    misfit = np.maximum(sums[:, MISFIT] - explained, 0) / freedom
-    usual = max(float(np.median(misfit[read])), MIN_NOISE**2)
-    limit = usual * (1.25 + 5 * np.sqrt(2 / freedom))
-    use = np.where(read, np.minimum(1.0, limit / np.maximum(misfit, 1e-12)) ** 2, 0.0)
-    return use, float(np.sqrt(usual))
+    count = sums.shape[0]
+    misfit, use = np.full(count, np.nan), np.zeros(count)
+    for e in range(count):
+        if sums[e, PIXELS] <= 8:
+            continue
+        aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
+        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
+        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
+        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (3 * sums[e, PIXELS] - 2)
+    usual = max(np.nanmedian(misfit), MIN_NOISE**2)
+    for e in range(count):
+        if np.isfinite(misfit[e]):
+            limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
+            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+    return use, np.sqrt(usual)
 
 
 def _box(xy: NDArray[np.float64], margin: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
