@@ -20,7 +20,9 @@ INKS = 5  # red, green, blue, black, white
 BLACK, WHITE = 3, 4
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
-DISC = 0.45  # of the inscribed circle, over which a cell's level is averaged
+DISC = 0.45  # of the inscribed circle, over which a cell's level is averaged at most
+CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
+MIN_RADIUS_PX = 0.75
 ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
@@ -56,10 +58,10 @@ def monomials(x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def cell_means(image, model, xy, cells):  # type: ignore[no-untyped-def]
+def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
     """(K, 4): each cell's mean of image - model over the pixels about its centroid, and their number (0: none).
 
-    ``model`` may be empty.
+    ``model`` may be empty; ``sigma`` is the blur.
     """
     bare = model.shape[0] == 0
     height, width = image.shape[0], image.shape[1]
@@ -72,7 +74,8 @@ def cell_means(image, model, xy, cells):  # type: ignore[no-untyped-def]
         area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
         around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
         around += np.hypot(a[0] - c[0], a[1] - c[1])
-        radius = max(DISC * area / max(around, 1e-9), 0.75)
+        inscribed = area / max(around, 1e-9)
+        radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
         count = 0
         for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
             for x in range(max(int(np.ceil(cx - radius)), 0), min(int(cx + radius), width - 1) + 1):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
-from .information import assemble, covariances, gradient, solve
+from .information import SMOOTH, STRAIGHT, assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
 from .mesh import Mesh
 from .placing import Places
@@ -43,6 +43,7 @@ Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
+USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 ENOUGH_PX = 0.0005  # RMS shift, below which no further step is taken
@@ -50,6 +51,10 @@ PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
+MAX_WIDEN = 0.3  # of the blur, in one step
+# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
+# normal density and N its integral.
+CONTRAST_TO_BLUR = 1.79
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
@@ -119,8 +124,8 @@ class Refiner:
         noise = max(noise, MIN_NOISE)
         xy, beyond, maps = self._completed(places.xy_px)
         levels = smooth_levels(
-            cell_means(image, NO_MODEL, xy, mesh.cells),
-            cell_means(image, NO_MODEL, xy, mesh.black),
+            cell_means(image, NO_MODEL, xy, mesh.cells, USUAL_SIGMA_PX),
+            cell_means(image, NO_MODEL, xy, mesh.black, USUAL_SIGMA_PX),
             xy,
             mesh,
             noise,
@@ -191,9 +196,7 @@ class Refiner:
         noise = float(noise) if np.isfinite(noise) else fit.noise
         fit = fit._replace(noise=noise, levels=bettered)
         shift, cov = self._solve(sums, to_a, to_b, use, lines, contrasts, sigma, fit)
-        curvature = (use * sums[:, BLUR_CURVATURE]).sum()
-        widen = (use * sums[:, BLUR]).sum() / curvature if curvature > 0 else 0.0
-        sigma = max(sigma + float(np.clip(widen, -0.3, 0.3)) * sigma, MIN_SIGMA_PX)
+        sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
         moved = float(np.sqrt(np.mean(shift[~fit.beyond & np.isfinite(shift[:, 0])] ** 2)))
         return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, shift_px=moved)
 
@@ -202,10 +205,31 @@ class Refiner:
     ) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
         mesh, levels = self._mesh, fit.levels
-        drawn = cell_means(image, model, fit.xy, mesh.cells)
-        black = cell_means(image, model, fit.xy, mesh.black)
+        drawn = cell_means(image, model, fit.xy, mesh.cells, fit.sigma)
+        black = cell_means(image, model, fit.xy, mesh.black, fit.sigma)
         drawn[:, :3] += levels.cell
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
+
+    def _blur_step(
+        self,
+        sums: NDArray[np.float64],
+        use: NDArray[np.float64],
+        contrasts: NDArray[np.float64],
+        lines: NDArray[np.float64],
+        fit: Fit,
+        sigma: float,
+    ) -> float:
+        """The blur, by how far the gridlines' pixels say that it is another, once the levels are bettered."""
+        mesh, levels = self._mesh, fit.levels
+        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
+        strength = np.maximum((contrasts * contrasts).sum(axis=1), 1e-9)
+        change = (contrasts * (now - contrasts)).sum(axis=1) / strength
+        curvature = use * sums[:, BLUR_CURVATURE]
+        total = curvature.sum()
+        if total <= 0:
+            return sigma
+        widen = ((use * sums[:, BLUR]).sum() + CONTRAST_TO_BLUR * sigma * (curvature * change).sum()) / total
+        return max(sigma + float(np.clip(widen, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
 
     def _side_changes(
         self, old: Levels, new: Levels, middles: NDArray[np.float64], frame: Frame
@@ -230,12 +254,13 @@ class Refiner:
         mesh, count, variance = self._mesh, len(fit.xy), fit.noise**2
         diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
         use = use * lines[:, KNOWN]
-        assemble(sums, use, lines, contrasts, mesh.edges, mesh.spokes, sigma, variance, diagonal, beside)
         prior = np.where(fit.beyond, PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
-        diagonal[:, 0] += prior
-        diagonal[:, 2] += prior
+        geometry = (lines, contrasts, mesh.edges, mesh.spokes, sigma, variance, prior, diagonal, beside)
+        smooth = SMOOTH if contrasts.any() else STRAIGHT
+        assemble(sums, use, smooth, *geometry)
         right = gradient(use * to_a / variance, use * to_b / variance, lines, mesh.edges, count)
         shift = solve(diagonal, beside, mesh.edges, right)
+        assemble(sums, use, 2 * smooth, *geometry)
         return shift, covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
 
     def _buffer(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
