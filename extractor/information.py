@@ -21,8 +21,7 @@ MIN_ANGLE = 0.4  # rad; the closed forms are for long gridlines, and two at a sm
 PRECISION = 1e-3  # of the solution
 # A marker that moves alone bends the gridlines around it, through the smooth map, as a cardinal cubic does: 1 - 2.5 t^2 +
 # 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that is 1.1 (.3667
-# for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour. The steps' matrix is this one, S; with
-# the votes' own matrix H the shifts' covariance is S^-1 H S^-1, which is (H + 2 (S - H))^-1 but for a hundredth.
+# for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
 STRAIGHT, SMOOTH = 0.0, 0.1
 
 

@@ -46,7 +46,6 @@ MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
-ENOUGH_PX = 0.0005  # RMS shift, below which no further step is taken
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
@@ -59,16 +58,18 @@ NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
 class Steps(NamedTuple):
-    """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most."""
+    """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most, until the
+    markers move (RMS) by less than ``enough`` of their standard deviation."""
 
     profiles: tuple[int, ...]
     synthesis: int
+    enough: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((4, 24), 0),
-    "balanced": Steps((5,), 1),
-    "accurate": Steps((5,), 5),
+    "fast": Steps((4, 24), 0, 0.0),
+    "balanced": Steps((5,), 4, 5.0),
+    "accurate": Steps((5,), 10, 0.2),
 }
 
 
@@ -90,7 +91,8 @@ class Refined:
 
 
 class Fit(NamedTuple):
-    """The current estimate. ``xy`` holds the markers beyond the known ones too (``beyond``)."""
+    """The current estimate. ``xy`` holds the markers beyond the known ones too (``beyond``); ``moved`` is by how many
+    standard deviations (RMS) the last step moved them."""
 
     xy: NDArray[np.float64]
     beyond: NDArray[np.bool_]
@@ -98,7 +100,7 @@ class Fit(NamedTuple):
     noise: float
     levels: Levels
     cov: NDArray[np.float64]
-    shift_px: float
+    moved: float
 
 
 class Refiner:
@@ -140,7 +142,7 @@ class Refiner:
             fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
         for _ in range(self._steps.synthesis):
             fit = self._synthesis_step(image, fit, frame)
-            if fit.shift_px < ENOUGH_PX:
+            if fit.moved < self._steps.enough:
                 break
         return self._result(fit, places)
 
@@ -197,8 +199,10 @@ class Refiner:
         fit = fit._replace(noise=noise, levels=bettered)
         shift, cov = self._solve(sums, to_a, to_b, use, lines, contrasts, sigma, fit)
         sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
-        moved = float(np.sqrt(np.mean(shift[~fit.beyond & np.isfinite(shift[:, 0])] ** 2)))
-        return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, shift_px=moved)
+        known = ~fit.beyond & np.isfinite(cov[:, 0, 0])
+        spread = np.mean(cov[known, 0, 0] + cov[known, 1, 1]) if known.any() else np.inf
+        moved = float(np.sqrt(np.mean(np.sum(shift[known] ** 2, axis=1)) / spread)) if known.any() else 0.0
+        return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, moved=moved)
 
     def _level_step(
         self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
@@ -260,7 +264,6 @@ class Refiner:
         assemble(sums, use, smooth, *geometry)
         right = gradient(use * to_a / variance, use * to_b / variance, lines, mesh.edges, count)
         shift = solve(diagonal, beside, mesh.edges, right)
-        assemble(sums, use, 2 * smooth, *geometry)
         return shift, covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
 
     def _buffer(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
