@@ -59,7 +59,7 @@ NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 class Steps(NamedTuple):
     """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most, until the
-    markers move (RMS) by less than ``enough`` of their standard deviation."""
+    no marker moves by more than ``enough`` of its standard deviations."""
 
     profiles: tuple[int, ...]
     synthesis: int
@@ -68,8 +68,8 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((4, 24), 0, 0.0),
-    "balanced": Steps((5,), 4, 5.0),
-    "accurate": Steps((5,), 10, 0.2),
+    "balanced": Steps((5,), 4, 15.0),
+    "accurate": Steps((5,), 10, 0.5),
 }
 
 
@@ -92,7 +92,7 @@ class Refined:
 
 class Fit(NamedTuple):
     """The current estimate. ``xy`` holds the markers beyond the known ones too (``beyond``); ``moved`` is by how many
-    standard deviations (RMS) the last step moved them."""
+    of its standard deviations the last step moved a marker at most."""
 
     xy: NDArray[np.float64]
     beyond: NDArray[np.bool_]
@@ -200,8 +200,8 @@ class Refiner:
         shift, cov = self._solve(sums, to_a, to_b, use, lines, contrasts, sigma, fit)
         sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
         known = ~fit.beyond & np.isfinite(cov[:, 0, 0])
-        spread = np.mean(cov[known, 0, 0] + cov[known, 1, 1]) if known.any() else np.inf
-        moved = float(np.sqrt(np.mean(np.sum(shift[known] ** 2, axis=1)) / spread)) if known.any() else 0.0
+        spread = cov[known, 0, 0] + cov[known, 1, 1]
+        moved = float(np.sqrt(np.max(np.sum(shift[known] ** 2, axis=1) / spread, initial=0.0)))
         return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, moved=moved)
 
     def _level_step(
@@ -209,8 +209,8 @@ class Refiner:
     ) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
         mesh, levels = self._mesh, fit.levels
-        drawn = cell_means(image, model, fit.xy, mesh.cells, fit.sigma)
-        black = cell_means(image, model, fit.xy, mesh.black, fit.sigma)
+        drawn = cell_means(image, model, fit.xy, mesh.cells, 0.0)
+        black = cell_means(image, model, fit.xy, mesh.black, 0.0)
         drawn[:, :3] += levels.cell
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
 
