@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .algebra import cholesky_solve
 from .engine import compiled
 
 # columns of a gridline
@@ -21,55 +22,63 @@ MAX_SLOPE = 0.5  # of a gridline against its chord; more is an error somewhere
 def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
     """(M, 2, 5): derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2 at each marker; NaN where unknown.
 
-    Where both rings are whole, the first derivatives are those of a cubic; elsewhere of a quadratic (bending is held
-    towards 0 where few neighbours are known), and without bending where fewer than five are.
+    Where both rings are whole, the first derivatives are those of a cubic (and the second 0: nothing asks for them);
+    elsewhere of a quadratic, bending held towards 0, and without bending where fewer than five neighbours are known.
     """
     count = xy.shape[0]
     out = np.full((count, 2, 5), np.nan)
-    gram, right, terms = np.empty((5, 5)), np.empty((5, 2)), np.empty(5)
+    gram, right = np.empty((5, 5)), np.empty((2, 5))
     for m in range(count):
         if not np.isfinite(xy[m, 0]):
             continue
-        known = 0
-        gram[:] = 0.0
-        right[:] = 0.0
-        complete = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
+        whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
+        xu, xv, yu, yv = 0.0, 0.0, 0.0, 0.0
         for k in range(near.shape[1]):
             n = near[m, k]
-            if n < 0 or not np.isfinite(xy[n, 0]):
-                complete = False
-        if complete:
-            for axis in range(2):
-                for d in range(2):
-                    total = 0.0
-                    for k in range(near.shape[1]):
-                        total += stencil[m, d, k] * (xy[near[m, k], axis] - xy[m, axis])
-                    out[m, axis, d] = total
-                    out[m, axis, 2 + d] = 0.0
-                out[m, axis, 4] = 0.0
-            continue
-        for k in range(near.shape[1]):
-            n = near[m, k]
-            if n < 0 or not np.isfinite(xy[n, 0]):
-                continue
-            known += 1
-            x, y = offset[m, k]
-            weight = 1.0 / (x * x + y * y) ** 2
-            terms[0], terms[1], terms[2], terms[3], terms[4] = x, y, 0.5 * x * x, x * y, 0.5 * y * y
-            for i in range(5):
-                for j in range(5):
-                    gram[i, j] += weight * terms[i] * terms[j]
-                for axis in range(2):
-                    right[i, axis] += weight * terms[i] * (xy[n, axis] - xy[m, axis])
-        if known < 2 or gram[0, 0] * gram[1, 1] - gram[0, 1] ** 2 < 0.05 * gram[0, 0] * gram[1, 1]:
-            continue
-        for i in range(2, 5):
-            gram[i, i] += 0.02 if known >= 5 else 1e9
-        solved = np.linalg.solve(gram, right)
-        for axis in range(2):
-            for i in range(5):
-                out[m, axis, i] = solved[i, axis]
+            if not whole or n < 0:
+                whole = False
+                break
+            dx, dy = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
+            u, v = stencil[m, 0, k], stencil[m, 1, k]
+            xu += u * dx
+            xv += v * dx
+            yu += u * dy
+            yv += v * dy
+        if whole and np.isfinite(xu):
+            out[m, :, 2:] = 0.0
+            out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
+        elif _quadratic(xy, m, near[m], offset[m], gram, right):
+            out[m] = right
     return out
+
+
+@compiled
+def _quadratic(xy, m, near, offset, gram, right):  # type: ignore[no-untyped-def]
+    """Write the five derivatives at marker m into ``right``; False where its neighbours do not tell them."""
+    terms = np.empty(5)
+    gram[:] = 0.0
+    right[:] = 0.0
+    known = 0
+    for k in range(near.shape[0]):
+        n = near[k]
+        if n < 0 or not np.isfinite(xy[n, 0]):
+            continue
+        known += 1
+        x, y = offset[k]
+        weight = 1.0 / (x * x + y * y) ** 2
+        terms[0], terms[1], terms[2], terms[3], terms[4] = x, y, 0.5 * x * x, x * y, 0.5 * y * y
+        for i in range(5):
+            v = weight * terms[i]
+            for j in range(i + 1):
+                gram[i, j] += v * terms[j]
+            for axis in range(2):
+                right[axis, i] += v * (xy[n, axis] - xy[m, axis])
+    if known < 2 or gram[0, 0] * gram[1, 1] - gram[1, 0] ** 2 < 0.05 * gram[0, 0] * gram[1, 1]:
+        return False
+    for i in range(2, 5):
+        gram[i, i] += 0.02 if known >= 5 else 1e9
+    cholesky_solve(gram, right, 5)
+    return True
 
 
 @compiled

@@ -22,7 +22,7 @@ PRECISION = 1e-3  # of the solution
 # A marker that moves alone bends the gridlines around it, through the smooth map, as a cardinal cubic does: 1 - 2.5 t^2 +
 # 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that is 1.1 (.3667
 # for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
-STRAIGHT, SMOOTH = 0.0, 0.1
+SMOOTH = 0.1
 
 
 class Information(NamedTuple):
@@ -37,12 +37,11 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
     """How much two gridlines of these lengths from one marker overlap there: near with near end, near with far end
     of the second, near with far end of the first."""
     cosine = min(cosine, np.cos(MIN_ANGLE))
-    angle = np.arccos(max(cosine, -1.0))
-    rest = np.pi - angle
+    rest = np.pi - np.arccos(max(cosine, -1.0))
     if rest < 0.05:
         a, b = 1.0, 1.0 / 3.0
     else:
-        sine = np.sin(angle)
+        sine = np.sqrt(1.0 - cosine * cosine)
         a = rest / sine
         b = (sine + rest * cosine) / sine**3
     zeroth = a / (2.0 * np.pi)
@@ -53,10 +52,10 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def assemble(sums, weight, smooth, lines, contrasts, edges, spokes, sigma, variance, prior, diagonal, beside):  # type: ignore[no-untyped-def]
+def assemble(sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, variance, prior, diagonal, beside):  # type: ignore[no-untyped-def]
     """Fill the matrix's blocks from what was read along the gridlines, in units of the noise's variance.
 
-    ``smooth``: by how much (relatively) the smooth map raises the sums AA and BB and lowers AB, see ``SMOOTH``.
+    ``overlapping``: the sums were taken up to the gridlines' ends, where they share their pixels.
     """
     beside[:] = 0.0
     for m in range(diagonal.shape[0]):
@@ -67,62 +66,63 @@ def assemble(sums, weight, smooth, lines, contrasts, edges, spokes, sigma, varia
             continue
         nx, ny = -lines[e, UY], lines[e, UX]
         for side in range(2):
-            m, value = edges[e, side], w * (1.0 + smooth) * (sums[e, AA] if side == 0 else sums[e, BB])
+            m, value = edges[e, side], w * (1.0 + SMOOTH) * (sums[e, AA] if side == 0 else sums[e, BB])
             diagonal[m, 0] += value * nx * nx
             diagonal[m, 1] += value * nx * ny
             diagonal[m, 2] += value * ny * ny
-        value = w * (1.0 - smooth) * sums[e, AB]
+        value = w * (1.0 - SMOOTH) * sums[e, AB]
         beside[e, 0] += value * nx * nx
         beside[e, 1] += value * nx * ny
         beside[e, 2] += value * ny * nx
         beside[e, 3] += value * ny * ny
+    if not overlapping:
+        return
+    away = np.empty((6, 2))
     for m in range(spokes.shape[0]):
-        for i in range(spokes.shape[1]):
+        for i in range(6):
             e = spokes[m, i]
             if e < 0 or weight[e] == 0.0:
                 continue
+            # the direction in which the curved gridline leaves the marker
+            out = 1.0 if edges[e, 0] == m else -1.0
+            slope = lines[e, LEAVE] if out > 0.0 else lines[e, ARRIVE]
+            size = out / np.sqrt(1.0 + slope * slope)
+            away[i, 0] = size * (lines[e, UX] - slope * lines[e, UY])
+            away[i, 1] = size * (lines[e, UY] + slope * lines[e, UX])
             for j in range(i):
                 f = spokes[m, j]
                 if f < 0 or weight[f] == 0.0:
                     continue
-                dot = 0.0
-                for channel in range(3):
-                    dot += contrasts[e, channel] * contrasts[f, channel]
-                dot *= min(weight[e], weight[f]) / variance
+                dot = contrasts[e, 0] * contrasts[f, 0] + contrasts[e, 1] * contrasts[f, 1]
+                dot = (dot + contrasts[e, 2] * contrasts[f, 2]) * min(weight[e], weight[f]) / variance
                 if dot != 0.0:
-                    _couple(m, e, f, dot, lines, edges, sigma, diagonal, beside)
+                    cosine = away[i, 0] * away[j, 0] + away[i, 1] * away[j, 1]
+                    near, far_f, far_e = overlap(cosine, lines[e, LENGTH], lines[f, LENGTH], sigma)
+                    _couple(m, e, f, dot * near, dot * far_f, dot * far_e, lines, edges, diagonal, beside)
 
 
 @compiled
-def _couple(m, e, f, dot, lines, edges, sigma, diagonal, beside):  # type: ignore[no-untyped-def]
+def _couple(m, e, f, near, far_f, far_e, lines, edges, diagonal, beside):  # type: ignore[no-untyped-def]
     """Add what two gridlines that meet at marker m share."""
-    out_e = 1.0 if edges[e, 0] == m else -1.0
-    out_f = 1.0 if edges[f, 0] == m else -1.0
-    slope_e = lines[e, LEAVE] if out_e > 0.0 else lines[e, ARRIVE]
-    slope_f = lines[f, LEAVE] if out_f > 0.0 else lines[f, ARRIVE]
-    ex, ey, fx, fy = lines[e, UX], lines[e, UY], lines[f, UX], lines[f, UY]
-    # directions in which the curved gridlines leave the marker
-    px, py = out_e * (ex - slope_e * ey), out_e * (ey + slope_e * ex)
-    qx, qy = out_f * (fx - slope_f * fy), out_f * (fy + slope_f * fx)
-    cosine = (px * qx + py * qy) / (np.hypot(px, py) * np.hypot(qx, qy))
-    near, far_f, far_e = overlap(cosine, lines[e, LENGTH], lines[f, LENGTH], sigma)
-    enx, eny, fnx, fny = -ey, ex, -fy, fx
-    diagonal[m, 0] += 2.0 * dot * near * enx * fnx
-    diagonal[m, 1] += dot * near * (enx * fny + eny * fnx)
-    diagonal[m, 2] += 2.0 * dot * near * eny * fny
-    for turn in range(2):
-        if turn == 0:
-            g, value, nx, ny, ox, oy, out = f, dot * far_f, enx, eny, fnx, fny, out_f
-        else:
-            g, value, nx, ny, ox, oy, out = e, dot * far_e, fnx, fny, enx, eny, out_e
-        beside[g, 0] += value * nx * ox
-        beside[g, 3] += value * ny * oy
-        if out > 0.0:
-            beside[g, 1] += value * nx * oy
-            beside[g, 2] += value * ny * ox
-        else:
-            beside[g, 1] += value * ny * ox
-            beside[g, 2] += value * nx * oy
+    enx, eny, fnx, fny = -lines[e, UY], lines[e, UX], -lines[f, UY], lines[f, UX]
+    diagonal[m, 0] += 2.0 * near * enx * fnx
+    diagonal[m, 1] += near * (enx * fny + eny * fnx)
+    diagonal[m, 2] += 2.0 * near * eny * fny
+    _couple_far(m, f, far_f, enx, eny, fnx, fny, edges, beside)
+    _couple_far(m, e, far_e, fnx, fny, enx, eny, edges, beside)
+
+
+@compiled
+def _couple_far(m, g, value, nx, ny, ox, oy, edges, beside):  # type: ignore[no-untyped-def]
+    """Add the overlap of another gridline's near end (normal n) at m with the far end of gridline g (normal o)."""
+    beside[g, 0] += value * nx * ox
+    beside[g, 3] += value * ny * oy
+    if edges[g, 0] == m:
+        beside[g, 1] += value * nx * oy
+        beside[g, 2] += value * ny * ox
+    else:
+        beside[g, 1] += value * ny * ox
+        beside[g, 2] += value * nx * oy
 
 
 @compiled
@@ -204,14 +204,12 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
 
 @compiled
 def _put(matrix, i, j, beside, forward):  # type: ignore[no-untyped-def]
-    """Place an edge's block at block (i, j) of a small matrix, and its transpose at (j, i)."""
+    """Place an edge's block at block (i, j) of a small symmetric matrix, i < j."""
     b0, b1, b2, b3 = beside
     if not forward:
         b1, b2 = b2, b1
     matrix[2 * i, 2 * j], matrix[2 * i, 2 * j + 1] = b0, b1
     matrix[2 * i + 1, 2 * j], matrix[2 * i + 1, 2 * j + 1] = b2, b3
-    matrix[2 * j, 2 * i], matrix[2 * j + 1, 2 * i] = b0, b1
-    matrix[2 * j, 2 * i + 1], matrix[2 * j + 1, 2 * i + 1] = b2, b3
 
 
 @compiled
@@ -262,21 +260,20 @@ def covariances(diagonal, beside, edges, spokes, weak):  # type: ignore[no-untyp
                 xx -= (py * b0 * b0 - 2 * pxy * b0 * b1 + px * b1 * b1) / determinant
                 xy -= (py * b0 * b2 - pxy * (b0 * b3 + b1 * b2) + px * b1 * b3) / determinant
                 yy -= (py * b2 * b2 - 2 * pxy * b2 * b3 + px * b3 * b3) / determinant
-            matrix[2 * i, 2 * i], matrix[2 * i, 2 * i + 1] = xx, xy
-            matrix[2 * i + 1, 2 * i], matrix[2 * i + 1, 2 * i + 1] = xy, yy
+            matrix[2 * i, 2 * i], matrix[2 * i, 2 * i + 1], matrix[2 * i + 1, 2 * i + 1] = xx, xy, yy
         # eliminate the neighbours in turn; what is left at the end is the marker's own block
         last_xx, last_xy, last_yy = diagonal[m]
-        matrix[12, 12], matrix[12, 13], matrix[13, 12], matrix[13, 13] = last_xx, last_xy, last_xy, last_yy
+        matrix[12, 12], matrix[12, 13], matrix[13, 13] = last_xx, last_xy, last_yy
         for c in range(2 * k):
             pivot = matrix[c, c]
             if not pivot > 0.0:
                 continue
             for r in range(c + 1, 14):
-                factor = matrix[r, c] / pivot
+                factor = matrix[c, r] / pivot
                 if factor != 0.0:
-                    for j in range(c, 14):
+                    for j in range(r, 14):
                         matrix[r, j] -= factor * matrix[c, j]
-        xx, xy, yy = matrix[12, 12], 0.5 * (matrix[12, 13] + matrix[13, 12]), matrix[13, 13]
+        xx, xy, yy = matrix[12, 12], matrix[12, 13], matrix[13, 13]
         determinant = xx * yy - xy * xy
         if xx > 0.0 and determinant > 1e-6 * (xx + yy) ** 2 and xx + yy > weak:
             out[m, 0, 0], out[m, 1, 1] = yy / determinant, xx / determinant

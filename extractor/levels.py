@@ -13,14 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .algebra import cholesky_solve
 from .engine import compiled
-from .mesh import Mesh
+from .topology import Topology
 
 INKS = 5  # red, green, blue, black, white
 BLACK, WHITE = 3, 4
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
-DISC = 0.7  # of the inscribed circle, over which a cell's level is averaged at most
+DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
 ROUNDS = 2  # of the robust fit
@@ -64,6 +65,8 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
     ``model`` may be empty; ``sigma`` is the blur.
     """
     bare = model.shape[0] == 0
+    seen, drawn = image.reshape(-1), model.reshape(-1)
+    one, two = np.uint64(1), np.uint64(2)
     height, width = image.shape[0], image.shape[1]
     out = np.zeros((cells.shape[0], 4))
     for i in range(cells.shape[0]):
@@ -76,19 +79,23 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         around += np.hypot(a[0] - c[0], a[1] - c[1])
         inscribed = area / max(around, 1e-9)
         radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
-        count = 0
+        count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
         for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
-            for x in range(max(int(np.ceil(cx - radius)), 0), min(int(cx + radius), width - 1) + 1):
-                if (x - cx) ** 2 + (y - cy) ** 2 <= radius * radius:
-                    count += 1
-                    for channel in range(3):
-                        out[i, channel] += image[y, x, channel]
-                        if not bare:
-                            out[i, channel] -= model[y, x, channel]
+            half = np.sqrt(max(radius * radius - (y - cy) ** 2, 0.0))
+            first, last = max(int(np.ceil(cx - half)), 0), min(int(cx + half), width - 1)
+            at = np.uint64((y * width + first) * 3)
+            for _ in range(first, last + 1):
+                s0 += seen[at]
+                s1 += seen[at + one]
+                s2 += seen[at + two]
+                if not bare:
+                    s0 -= drawn[at]
+                    s1 -= drawn[at + one]
+                    s2 -= drawn[at + two]
+                at += np.uint64(3)
+            count += max(last - first + 1, 0)
         if count > 0:
-            for channel in range(3):
-                out[i, channel] /= count
-            out[i, 3] = count
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = s0 / count, s1 / count, s2 / count, count
     return out
 
 
@@ -110,24 +117,7 @@ def _fit(terms, values, weight, count):  # type: ignore[no-untyped-def]
         return np.zeros((3, TERMS))
     for j in range(1, count):
         gram[j, j] += 1e-6 * gram[0, 0]
-    # Cholesky, then both substitutions for the three channels
-    for j in range(count):
-        for k in range(j):
-            gram[j, j] -= gram[j, k] ** 2
-        gram[j, j] = np.sqrt(gram[j, j])
-        for i in range(j + 1, count):
-            for k in range(j):
-                gram[i, j] -= gram[i, k] * gram[j, k]
-            gram[i, j] /= gram[j, j]
-    for channel in range(3):
-        for j in range(count):
-            for k in range(j):
-                right[channel, j] -= gram[j, k] * right[channel, k]
-            right[channel, j] /= gram[j, j]
-        for j in range(count - 1, -1, -1):
-            for k in range(j + 1, count):
-                right[channel, j] -= gram[k, j] * right[channel, k]
-            right[channel, j] /= gram[j, j]
+    cholesky_solve(gram, right, count)
     return right
 
 
@@ -268,7 +258,7 @@ def smooth_levels(
     drawn: NDArray[np.float64],
     black: NDArray[np.float64],
     xy: NDArray[np.float64],
-    mesh: Mesh,
+    mesh: Topology,
     noise: float,
     frame: Frame,
 ) -> Levels:

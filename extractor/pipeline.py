@@ -17,7 +17,7 @@ from .image import estimate_noise, prepare
 from .numbering import lattice_of, number
 from .placing import place
 from .reference import Reference
-from .mesh import mesh_of
+from .topology import topology_of
 from .refine import PRESETS, Preset, Refiner
 from .regions import find_seeds, grow
 from .triangles import Triangles, fit_triangles
@@ -65,7 +65,7 @@ class Extractor:
         if preset not in PRESETS:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
-        self._refine = Refiner(mesh_of(layout), preset)
+        self._refine = Refiner(topology_of(layout), preset)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
     def extract(self, image: NDArray[Any]) -> Markers:

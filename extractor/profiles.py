@@ -16,7 +16,7 @@ from .sampling import clamp, sample_dot
 from .synthesis import AA, AB, BB, A, B
 
 SAMPLES = 7  # at most, on each side of a gridline
-REACH_SIGMA = 2.5  # how far a profile reaches, in units of the blur
+REACH_SIGMA = 2.0  # how far a profile reaches, in units of the blur
 CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0

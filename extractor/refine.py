@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
-from .information import SMOOTH, STRAIGHT, assemble, covariances, gradient, solve
+from .information import Information, assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
-from .mesh import Mesh
+from .topology import Topology
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
 from .synthesis import (
@@ -67,9 +67,9 @@ class Steps(NamedTuple):
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((4, 24), 0, 0.0),
-    "balanced": Steps((5,), 4, 15.0),
-    "accurate": Steps((5,), 10, 0.5),
+    "fast": Steps((3, 4, 24), 0, 0.0),
+    "balanced": Steps((3, 4), 4, 20.0),
+    "accurate": Steps((3, 4), 10, 0.7),
 }
 
 
@@ -96,17 +96,18 @@ class Fit(NamedTuple):
 
     xy: NDArray[np.float64]
     beyond: NDArray[np.bool_]
+    maps: NDArray[np.float64]
     sigma: float
     noise: float
     levels: Levels
-    cov: NDArray[np.float64]
+    information: Information
     moved: float
 
 
 class Refiner:
     """Refines the markers of one layout; its buffers are kept from image to image, one set a thread."""
 
-    def __init__(self, mesh: Mesh, preset: Preset) -> None:
+    def __init__(self, mesh: Topology, preset: Preset) -> None:
         self._mesh = mesh
         self._steps = STEPS[preset]
         self._kept = threading.local()
@@ -133,11 +134,10 @@ class Refiner:
             noise,
             frame,
         )
-        none = np.full((len(xy), 2, 2), np.nan)
-        fit = Fit(xy, beyond, 0.0, noise, levels, none, 0.0)
+        nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
+        fit = Fit(xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
         for stations in self._steps.profiles:
-            fit = self._profile_step(image, fit, maps, frame, stations)
-            maps = local_maps(fit.xy, mesh.near, mesh.offset, mesh.stencil)
+            fit = self._profile_step(image, fit, frame, stations)
         if self._steps.synthesis:
             fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
         for _ in range(self._steps.synthesis):
@@ -158,10 +158,10 @@ class Refiner:
         return xy, beyond, maps
 
     def _profile_step(
-        self, image: NDArray[np.uint8], fit: Fit, maps: NDArray[np.float64], frame: Frame, stations: int
+        self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int
     ) -> Fit:
         mesh, levels = self._mesh, fit.levels
-        lines = gridlines(fit.xy, maps, mesh.edges, mesh.near, mesh.offset)
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         weights, room = unmixing(
             lines, contrasts, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.black, *frame
@@ -173,15 +173,15 @@ class Refiner:
             sigma = max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
         sums = read_profiles(image, lines, weights, room, sigma, stations)
         use = (sums[:, AA] > 0).astype(np.float64)
-        shift, cov = self._solve(sums, sums[:, A], sums[:, B], use, lines, np.zeros_like(contrasts), sigma, fit)
-        return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov)
+        fit = fit._replace(sigma=sigma)
+        shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
+        return self._moved(fit, shift, information)
 
     def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
         box = _box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape)
         model = self._buffer(image.shape)
-        maps = local_maps(fit.xy, mesh.near, mesh.offset, mesh.stencil)
-        lines = gridlines(fit.xy, maps, mesh.edges, mesh.near, mesh.offset)
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         clear(model, box)
         draw_cells(
@@ -197,12 +197,18 @@ class Refiner:
         use, noise = _trust(sums, to_a, to_b)
         noise = float(noise) if np.isfinite(noise) else fit.noise
         fit = fit._replace(noise=noise, levels=bettered)
-        shift, cov = self._solve(sums, to_a, to_b, use, lines, contrasts, sigma, fit)
+        shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
         sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
-        known = ~fit.beyond & np.isfinite(cov[:, 0, 0])
-        spread = cov[known, 0, 0] + cov[known, 1, 1]
-        moved = float(np.sqrt(np.max(np.sum(shift[known] ** 2, axis=1) / spread, initial=0.0)))
-        return fit._replace(xy=fit.xy + shift, sigma=sigma, cov=cov, moved=moved)
+        return self._moved(fit._replace(sigma=sigma), shift, information)
+
+    def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
+        """The fit after a step; the deviations of ``moved`` are those with all other markers known."""
+        xx, xy, yy = information.diagonal.T
+        x, y = np.where(fit.beyond, 0.0, shift.T)
+        moved = float(np.sqrt(np.max(x * x * xx + 2 * x * y * xy + y * y * yy, initial=0.0)))
+        xy_px = fit.xy + shift
+        maps = local_maps(xy_px, self._mesh.near, self._mesh.offset, self._mesh.stencil)
+        return fit._replace(xy=xy_px, maps=maps, information=information, moved=moved)
 
     def _level_step(
         self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
@@ -251,20 +257,18 @@ class Refiner:
         use: NDArray[np.float64],
         lines: NDArray[np.float64],
         contrasts: NDArray[np.float64],
-        sigma: float,
+        overlapping: bool,
         fit: Fit,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The shifts (M, 2) and covariances (M, 2, 2) of all markers."""
+    ) -> tuple[NDArray[np.float64], Information]:
+        """The shifts (M, 2) of all markers and the matrix that gave them. At their ends gridlines overlap, unless they were read in their middles only."""
         mesh, count, variance = self._mesh, len(fit.xy), fit.noise**2
         diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
         use = use * lines[:, KNOWN]
         prior = np.where(fit.beyond, PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
-        geometry = (lines, contrasts, mesh.edges, mesh.spokes, sigma, variance, prior, diagonal, beside)
-        smooth = SMOOTH if contrasts.any() else STRAIGHT
-        assemble(sums, use, smooth, *geometry)
+        geometry = (lines, contrasts, mesh.edges, mesh.spokes, fit.sigma, variance, prior)
+        assemble(sums, use, overlapping, *geometry, diagonal, beside)
         right = gradient(use * to_a / variance, use * to_b / variance, lines, mesh.edges, count)
-        shift = solve(diagonal, beside, mesh.edges, right)
-        return shift, covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
+        return solve(diagonal, beside, mesh.edges, right), Information(diagonal, beside)
 
     def _buffer(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
         kept: Any = getattr(self._kept, "residual", None)
@@ -273,7 +277,9 @@ class Refiner:
         return kept  # type: ignore[no-any-return]
 
     def _result(self, fit: Fit, places: Places) -> Refined:
-        xy, cov = fit.xy.copy(), fit.cov.copy()
+        mesh, information = self._mesh, fit.information
+        xy = fit.xy.copy()
+        cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         with np.errstate(invalid="ignore"):
             near = np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px
             sure = np.einsum("mii->m", cov) < (MAX_SHIFT * places.edge_px) ** 2

@@ -14,7 +14,7 @@ NEAR = 18  # in its two rings at most
 MONOMIALS = 9  # of a cubic without its constant, in two variables
 
 
-class Mesh(NamedTuple):
+class Topology(NamedTuple):
     """Indices only; -1 stands for none. K cells are drawn, colored ones and the white; B are black.
 
     Attributes:
@@ -43,8 +43,8 @@ class Mesh(NamedTuple):
     stencil: NDArray[np.float64]
 
 
-def mesh_of(layout: Reference) -> Mesh:
-    """The mesh of a triangular layout."""
+def topology_of(layout: Reference) -> Topology:
+    """The topology of a triangular layout."""
     count, edges = len(layout.layer), layout.edges.astype(np.int64)
     drawn = layout.cell_color != BLACK
     cells = layout.cell_corners[drawn].astype(np.int64)
@@ -59,7 +59,7 @@ def mesh_of(layout: Reference) -> Mesh:
     xy = layout.xy_mm
     length = np.linalg.norm(xy[edges[:, 1]] - xy[edges[:, 0]], axis=1)
     offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
-    return Mesh(
+    return Topology(
         edges=layout.edges.astype(np.int32),
         cells=cells.astype(np.int32),
         cell_color=layout.cell_color[drawn].astype(np.int32),
