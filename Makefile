@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test test-all lint bench clean
+.PHONY: help setup demo test test-all lint bench figures clean
 
 help:
 	@echo "make demo      build a design, render a pressed sample, read it back, print the figures (out/)"
@@ -12,6 +12,7 @@ help:
 	@echo "make test-all  every test"
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     every figure that the documentation states"
+	@echo "make figures   every picture and generated page of docs/"
 	@echo "make setup     .venv with everything (the others call it)"
 
 setup: $(READY)
@@ -41,7 +42,10 @@ lint: $(READY)
 	@$(BIN)/mypy
 
 bench: $(READY)
-	@set -e; for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script; done
+	@set -e; for name in startup extraction stress; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+
+figures: $(READY)
+	@$(BIN)/python -m docs.figures
 
 clean:
 	@rm -rf .venv out

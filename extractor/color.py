@@ -17,6 +17,9 @@ TILE_PX = 32
 SHRINK = 8  # pixels per side of a tile of the target area
 MIN_CHROMA = 12  # below this, 8-bit hue is noise
 OPENCV_HUE_DEG = 2.0
+HUE_WIDTH_DEG = 40.0  # pixels farther from every center tell nothing about it
+ROUNDS = 8
+STRONG_SHARE = 0.98  # of the colored pixels are less saturated than what counts as strong
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,33 +170,44 @@ def find_target(colors: Colors) -> Target:
     return Target(mask=(water[1:-1, 1:-1] != 2).astype(np.uint8), shrink=SHRINK)
 
 
+@compiled
+def _centers(weight, nominal_deg):  # type: ignore[no-untyped-def]
+    """Circular 3-means of a hue histogram, held within reach of the nominal hues; False when an ink has no pixels."""
+    shift = np.zeros(3)
+    for _ in range(ROUNDS):
+        total, moment = np.zeros(3), np.zeros(3)
+        for hue in range(HUES):
+            best, nearest = 360.0, 0
+            for ink in range(3):
+                away = (hue * OPENCV_HUE_DEG - nominal_deg[ink] - shift[ink] + 180.0) % 360.0 - 180.0
+                if abs(away) < abs(best):
+                    best, nearest = away, ink
+            if abs(best) < HUE_WIDTH_DEG:
+                total[nearest] += weight[hue]
+                moment[nearest] += weight[hue] * best
+        for ink in range(3):
+            if total[ink] == 0.0:
+                return shift, False
+            moved = shift[ink] + moment[ink] / total[ink]
+            shift[ink] = min(max(moved, -HUE_REACH_DEG), HUE_REACH_DEG)
+    return shift, True
+
+
 def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """(3,) hues in degrees around which the image's saturated pixels gather, or None without such pixels.
 
     Circular 3-means from the nominal hues on the chroma-weighted histogram. White balance and colored light move
     hues; a shift past ``HUE_REACH_DEG`` could rename the inks and is refused.
     """
-    chroma = np.arange(256)
-    counts = histogram[:, MIN_CHROMA:].sum()
-    if counts == 0:
+    of_chroma = histogram.sum(axis=0)
+    of_chroma[:MIN_CHROMA] = 0
+    if not of_chroma.any():
         return None
-    cumulated = np.cumsum(histogram[:, MIN_CHROMA:].sum(axis=0)) / counts
-    strong = MIN_CHROMA + int(np.searchsorted(cumulated, 0.98))
+    strong = int(np.searchsorted(np.cumsum(of_chroma), STRONG_SHARE * of_chroma.sum()))
     floor = max(MIN_CHROMA, strong // 4)
-    weight = (histogram[:, floor:] * chroma[floor:]).sum(axis=1).astype(np.float64)
-    hue = np.arange(HUES) * OPENCV_HUE_DEG
-    centers = nominal_deg.copy()
-    for _ in range(8):
-        away = (hue[:, None] - centers + 180) % 360 - 180
-        nearest = np.abs(away).argmin(axis=1)
-        mine = (nearest[:, None] == np.arange(3)) & (np.abs(away) < 40) * True
-        total = (weight[:, None] * mine).sum(axis=0)
-        if np.any(total == 0):
-            return None
-        centers = centers + (weight[:, None] * mine * away).sum(axis=0) / total
-        shift = (centers - nominal_deg + 180) % 360 - 180
-        centers = nominal_deg + np.clip(shift, -HUE_REACH_DEG, HUE_REACH_DEG)
-    return centers % 360
+    weight = histogram[:, floor:] @ np.arange(floor, 256, dtype=np.float64)
+    shift, found = _centers(weight, nominal_deg)
+    return (nominal_deg + shift) % 360 if found else None
 
 
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:

@@ -68,8 +68,8 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
         pictures["grow"] = _draw_regions(base, scale, results["grow"])
     if "triangles" in results:
         pictures["triangles"] = _draw_triangles(base, scale, results["triangles"])
-    if "connect" in results:
-        pictures["connect"] = _draw_graph(base, scale, results["connect"])
+    if results.get("mesh") is not None:
+        pictures["mesh"] = _draw_mesh(base, scale, results["cells"], results["mesh"])
     if "place" in results:
         pictures["number"] = _draw_spiral(base, scale, reference, results["place"].xy_px)
         pictures["markers"] = draw_markers(image, reference, markers)
@@ -192,21 +192,29 @@ def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
     return float(scale * round(base.shape[1] / work.shape[1]))
 
 
+def _bright(ink: int) -> tuple[int, int, int]:
+    blue, green, red = (min(int(level) + 60, 255) for level in INK_BGR[ink])
+    return blue, green, red
+
+
 def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
     canvas = _enlarged(base, scale, 0.4)
     for ink in (1, 2, 3):
-        color = tuple(int(c) for c in np.minimum(INK_BGR[ink].astype(int) + 60, 255))
-        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), color, 2)  # type: ignore[arg-type]
+        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), _bright(ink), 2)
     return canvas
 
 
-def _draw_graph(base: Picture, scale: int, graph: Any) -> Picture:
-    """Nodes by the number of triangles that meet: three are yellow, two orange, one grey."""
+def _draw_mesh(base: Picture, scale: int, cells: Any, mesh: Any) -> Picture:
+    """Markers and black cells as triangles between three centers: those that turn clockwise are yellow."""
     canvas = _enlarged(base, scale, 0.4)
-    members = (graph.corner_of_node >= 0).sum(axis=1)
-    for count, color in ((1, (160, 160, 160)), (2, (0, 160, 255)), (3, (80, 255, 255))):
-        for x, y in _at(graph.xy_px[members == count], scale):
-            _dot(canvas, x, y, 3.0 + count, color)
+    centers = _at(cells.center_px, scale)
+    for turn, color in ((-1, (150, 150, 150)), (1, (80, 255, 255))):
+        corners = centers[mesh.faces[mesh.turn == turn]]
+        middle = corners.mean(axis=1, keepdims=True)
+        _lines(canvas, middle + 0.8 * (corners - middle), color)
+    for ink in (1, 2, 3):
+        for x, y in centers[cells.ink == ink]:
+            _dot(canvas, x, y, 4.0, _bright(ink))
     return canvas
 
 

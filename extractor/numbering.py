@@ -1,29 +1,54 @@
-"""Stage 7: the spin-search algorithm (SSA) numbers the graph from the white cell, clockwise, layer by layer."""
+"""Stage 7: every cell gets its place in the lattice, and the white cell says where that lattice begins.
+
+The spin search walks from face to face of the mesh, the inks checking every step: across an edge of two cells lies
+the fourth of a rhombus, d = a + b - c, of the ink of c. So it numbers all that hangs together, from wherever it
+starts, and finds another way around damage. What it finds so is right up to the turns by 120 degrees and the shifts
+that carry every ink onto itself. The white cell then fixes turn and origin: it stands between one red, one green
+and one blue cell, and these have their places.
+"""
 
 from __future__ import annotations
 
-import heapq
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import Cells
 from .engine import compiled
-from .graph import Graph
 from .lattice import axial, layer_of, marker_id
+from .mesh import Mesh
+from .neighbourhood import neighbour_table
 from .reference import BLACK, WHITE, Reference
 from .sampling import sample_patch
-from .triangles import Triangles
 
-# The interior of the white cell against the inks of the cells beside it, both as sums over the channels.
-# Black stays below a quarter; the white of a dim print is still brighter than any ink.
+# The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
+# Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
 WHITE_RATIO = 0.75
-MAX_ROUNDS = 8
+# Between the inks it must be darker than they are, even in haze: in pictures of anything else it is not.
+BLACK_RATIO = 0.95
+BLACK_SHARE = 0.8  # of the places between inks; the white cell and glare are among them
+SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
+MIN_LEAD = 2  # cells by which the best reference must explain more than the next
 MAX_WHITES = 8
-
-# Clockwise around a marker the inks turn red, green, blue, with black in the gaps between. Where the white cell
-# lies in the gap after blue, red or green, the marker is the white cell's corner (0, 0), (0, 1) or (-1, 1).
-GAP_AXIAL = np.array([[0, 1], [-1, 1], [0, 0]], np.int32)
+MAX_PARTS = 4
+# A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
+MIN_EVIDENCE = 0.06
+MIN_CELLS = 9  # or all, in a layout that has fewer
+MAX_OUTSIDE = 0.02
+MAX_ROUNDS = 8
+UNKNOWN = -(1 << 20)
+WITNESSES = 150  # faces that say which turn is that of the markers
+KEY = 1 << 16  # q KEY + r is one number for an axial place
+# The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
+STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
+# From a cell's center to theirs, in axial steps, and in edges of an equilateral lattice.
+OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
+DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
+# How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
+WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
+SIX = np.array([[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +57,30 @@ class Lattice:
 
     Attributes:
         layers: the layout's layers.
+        marker_mm: (M, 2) float64.
         cell_of: (M,) int32, the colored cell whose axial (q, r) is this marker's ("up-cell"), or -1.
+        corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
+        ink: (U,) uint8, 1 red, 2 green, 3 blue.
+        axial: (U, 2) int32, the cells' (q, r).
+        layer: (M,) int32, the markers' layers.
+        neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
+        present: (M,) bool, the markers that touch a colored or white cell.
     """
 
     layers: int
+    marker_mm: NDArray[np.float64]
     cell_of: NDArray[np.int32]
+    corner_ids: NDArray[np.int32]
+    ink: NDArray[np.uint8]
+    axial: NDArray[np.int32]
+    layer: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+    present: NDArray[np.bool_]
+
+    @cached_property
+    def center_mm(self) -> NDArray[np.float64]:
+        """(U, 2) the centers of the colored cells."""
+        return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,210 +88,350 @@ class Numbering:
     """Stage 7.
 
     Attributes:
-        marker_of_corner: (T, 3) int32, the marker at each corner of each triangle, or -1.
-        cell_of_triangle: (T,) int32, the layout's cell that each triangle shows, or -1.
-        white_px: (2,) the center of the white cell, or NaN.
-        conflicts: nodes that were taken apart because their neighbours disagreed about them.
+        cell: (N,) int32, the lattice's colored cell that each cell of the image is, or -1.
+        mirrored: the pattern is seen from its back.
+        white_px: (2,) the middle of the white cell.
+        conflicts: cells left out because their neighbours disagreed about them.
         ambiguous: two white cells could be the reference and nothing tells them apart.
     """
 
-    marker_of_corner: NDArray[np.int32]
-    cell_of_triangle: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    mirrored: bool
     white_px: NDArray[np.float64]
     conflicts: int
-    ambiguous: bool
+    ambiguous: bool = False
 
 
 def lattice_of(reference: Reference) -> Lattice:
     """The tables of a triangular layout."""
-    q, r = axial(reference.layer, reference.index).T
-    cell_of = np.full(len(q), -1, np.int32)
+    coordinates = axial(reference.layer, reference.index)
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
-    lower_left = np.argmin((q + r)[corners], axis=1)
-    cell_of[corners[np.arange(len(inked)), lower_left]] = inked
-    return Lattice(layers=int(reference.layer.max()), cell_of=cell_of)
+    lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
+    cell_of = np.full(len(coordinates), -1, np.int32)
+    cell_of[lower_left] = np.arange(len(inked))
+    return Lattice(
+        layers=int(reference.layer.max()),
+        marker_mm=reference.xy_mm,
+        cell_of=cell_of,
+        corner_ids=marker_ids(coordinates[lower_left]),
+        ink=(reference.cell_color[inked] + 1).astype(np.uint8),
+        axial=coordinates[lower_left],
+        layer=reference.layer,
+        neighbours=neighbour_table(coordinates, int(reference.layer.max())),
+        present=reference.present,
+    )
 
 
 @compiled
-def _gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ignore[no-untyped-def]
-    """Brightness of the gap after each ink of each node, relative to the inks beside it, and its center.
-
-    Clockwise from the triangle of one ink to that of the next, the gap's corners are the node, the first
-    triangle's corner before the node and the second one's after it.
-    """
-    nodes = corner_of_node.shape[0]
-    ratio = np.zeros((nodes, 3))
-    center = np.full((nodes, 3, 2), np.nan)
+def _colors_at(image, point, radius, out):  # type: ignore[no-untyped-def]
+    """Write the mean color around each point, NaN outside the image."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    beyond, one, other = np.zeros(3), np.zeros(3), np.zeros(3)
-    for n in range(nodes):
-        for ink in range(3):
-            a, b = corner_of_node[n, ink], corner_of_node[n, (ink + 1) % 3]
-            if a < 0 or b < 0:
-                continue
-            ta, ka, tb, kb = a // 3, a % 3, b // 3, b % 3
-            pa = corner_px[ta, (ka - sense) % 3]
-            pb = corner_px[tb, (kb + sense) % 3]
-            x = (corner_px[ta, ka, 0] + corner_px[tb, kb, 0]) / 6 + (pa[0] + pb[0]) / 3
-            y = (corner_px[ta, ka, 1] + corner_px[tb, kb, 1]) / 6 + (pa[1] + pb[1]) / 3
-            radius = 0.2 * np.hypot(pa[0] - x, pa[1] - y)
-            inside = sample_patch(flat, height, width, x, y, radius, beyond)
-            inside &= sample_patch(
-                flat, height, width, corner_px[ta, :, 0].mean(), corner_px[ta, :, 1].mean(), radius, one
-            )
-            inside &= sample_patch(
-                flat, height, width, corner_px[tb, :, 0].mean(), corner_px[tb, :, 1].mean(), radius, other
-            )
-            if inside:
-                ratio[n, ink] = 2.0 * beyond.sum() / max(one.sum() + other.sum(), 1.0)
-                center[n, ink, 0] = x
-                center[n, ink, 1] = y
-    return ratio, center
+    for i in range(point.shape[0]):
+        if not sample_patch(flat, height, width, point[i, 0], point[i, 1], radius[i], out[i]):
+            out[i] = np.nan
+
+
+def colors_at(
+    image: NDArray[np.uint8], point: NDArray[np.float64], radius: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(N, 3) the mean B, G, R around each of (N, 2) points; NaN outside the image or where a point is NaN."""
+    out = np.empty((len(point), 3))
+    _colors_at(image, np.ascontiguousarray(point), radius, out)
+    return out
 
 
 @compiled
-def _spin(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell_of, layers):  # type: ignore[no-untyped-def]
-    """Number triangles from one node outwards, the smallest id first; who contradicts whom.
+def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignore[no-untyped-def]
+    """Axial coordinates of all cells that hang together with one face, up to the lattice's own translations.
 
-    At a marker with the color phase (q - r) mod 3 the ink of a triangle says which of the three cells around it
-    that is; its clockwise neighbours then give the other two corners. Every corner that is reached twice must be
-    reached as the same marker.
+    ``front`` is the turn of the faces that are markers. Returns the coordinates and the cells contradicted.
     """
-    triangles, nodes = ink.shape[0], corner_of_node.shape[0]
-    unknown = -(1 << 20)
-    node_q = np.full(nodes, unknown, np.int32)
-    node_r = np.full(nodes, unknown, np.int32)
-    marker = np.full((triangles, 3), -1, np.int32)
-    cell = np.full(triangles, -1, np.int32)
-    holder = np.full(cell_of.shape[0], -1, np.int32)  # up-cell -> triangle
-    named = np.full(cell_of.shape[0], -1, np.int32)  # marker -> node
-    bad = np.zeros(nodes, np.bool_)
-    outside = 0
-    node_q[start], node_r[start] = q0, r0
-    first = marker_id(q0, r0)
-    named[first] = start
-    heap = [first * nodes + start]  # the smallest marker id first
-    while len(heap) > 0:
-        n = heapq.heappop(heap) % nodes
-        q, r = node_q[n], node_r[n]
-        phase = (q - r) % 3
-        for turn in range(3):
-            hue = (phase + turn) % 3
-            c = corner_of_node[n, hue]
-            if c < 0:
+    count = blocked.shape[0]
+    at = np.full((count, 2), UNKNOWN, np.int32)
+    bad = np.zeros(count, np.bool_)
+    side = 2 * reach + 1
+    holder = np.full((side, side), -1, np.int32)
+    queue = np.empty(faces.shape[0], np.int32)
+    seen = np.zeros(faces.shape[0], np.bool_)
+    # around marker (0, 0) red is (0, 0), green (0, -1), blue (-1, 0); around the white cell green is (-1, 1)
+    for k in range(3):
+        i = faces[start, k]
+        at[i, 0] = 0 if k == 0 or (k == 1 and turn[start] == front) else -1
+        at[i, 1] = 0 if k != 1 else (-1 if turn[start] == front else 1)
+        holder[at[i, 0] + reach, at[i, 1] + reach] = i
+    queue[0] = start
+    seen[start] = True
+    begin, end = 0, 1
+    while begin < end:
+        f = queue[begin]
+        begin += 1
+        for k in range(3):
+            g = neighbours[f, k]
+            if g < 0:
                 continue
-            t, k = c // 3, c % 3
-            # roles 0, 1, 2: the node is the cell's corner (0, 0), (1, 0), (0, 1)
-            role = 0 if turn == 0 else 1 if turn == 2 else 2
-            cq = q - 1 if role == 1 else q
-            cr = r - 1 if role == 2 else r
-            known = layer_of(cq, cr) <= layers
-            up = marker_id(cq, cr) if known else -1
-            if not known or cell_of[up] < 0:
-                outside += 1
+            a, b, c, d = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], faces[f, k], faces[g, k]
+            if blocked[d]:
                 continue
-            if cell[t] >= 0 or holder[up] >= 0:
-                if cell[t] != cell_of[up] or holder[up] != t:
-                    bad[n] = True
-                    if cell[t] >= 0:
-                        for j in range(3):
-                            bad[node_of_corner[t, j]] = True
-                continue
-            cell[t] = cell_of[up]
-            holder[up] = t
-            for j in range(3):
-                # clockwise the roles run 0, 2, 1
-                at = (role - sense * j) % 3
-                corner = (k + j) % 3
-                mq = cq + 1 if at == 1 else cq
-                mr = cr + 1 if at == 2 else cr
-                m = marker_id(mq, mr)
-                marker[t, corner] = m
-                other = node_of_corner[t, corner]
-                if node_q[other] == unknown:
-                    node_q[other], node_r[other] = mq, mr
-                    if named[m] < 0:
-                        named[m] = other
-                    heapq.heappush(heap, m * nodes + other)
-                elif node_q[other] != mq or node_r[other] != mr:
+            q = at[a, 0] + at[b, 0] - at[c, 0]
+            r = at[a, 1] + at[b, 1] - at[c, 1]
+            if at[d, 0] == UNKNOWN:
+                if abs(q) > reach or abs(r) > reach:
+                    continue
+                other = holder[q + reach, r + reach]
+                if other >= 0:
+                    bad[d] = True
                     bad[other] = True
-    return marker, cell, bad, outside
+                    continue
+                at[d, 0], at[d, 1] = q, r
+                holder[q + reach, r + reach] = d
+            elif at[d, 0] != q or at[d, 1] != r:
+                bad[d] = True
+                continue
+            if not seen[g]:
+                seen[g] = True
+                queue[end] = g
+                end += 1
+    return at, bad
 
 
-def _dissolve(graph: Graph, bad: NDArray[np.bool_]) -> Graph:
-    """The graph with the bad nodes taken apart: each of their corners becomes a node of its own."""
-    corner_of_node = graph.corner_of_node.copy()
-    loose = corner_of_node[bad]
-    loose = loose[loose >= 0]
-    corner_of_node[bad] = -1
-    node_of_corner = graph.node_of_corner.copy()
-    node_of_corner.reshape(-1)[loose] = -1
-    count = len(corner_of_node)
-    node_of_corner.reshape(-1)[loose] = count + np.arange(len(loose))
-    alone = np.full((len(loose), 3), -1, np.int32)
-    hue = np.zeros(node_of_corner.size, np.int64)
-    at, ink = np.nonzero(graph.corner_of_node >= 0)
-    hue[graph.corner_of_node[at, ink]] = ink
-    alone[np.arange(len(loose)), hue[loose]] = loose
-    xy = np.concatenate([graph.xy_px, np.full((len(loose), 2), np.nan)])
-    return Graph(node_of_corner, np.concatenate([corner_of_node, alone]).astype(np.int32), xy, graph.mirrored)
-
-
-def _number_from(
-    graph: Graph, triangles: Triangles, lattice: Lattice, node: int, coordinate: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], int, int]:
-    """Spin from one node; nodes that are contradicted are taken apart and the search is run again."""
-    sense = -1 if graph.mirrored else 1
-    conflicts = 0
+def _number_part(
+    mesh: Mesh, part: NDArray[np.intp], front: int, reach: int, cells: int
+) -> tuple[NDArray[np.int32], int]:
+    """Walk a part of the mesh from its first face; cells that are contradicted are left out and it is walked again."""
+    blocked = np.zeros(cells, np.bool_)
     for _ in range(MAX_ROUNDS):
-        marker, cell, bad, outside = _spin(
-            node, int(coordinate[0]), int(coordinate[1]), sense, triangles.ink,
-            graph.node_of_corner, graph.corner_of_node, lattice.cell_of, lattice.layers,
-        )  # fmt: skip
-        if not bad.any():
-            return marker, cell, outside, conflicts
-        conflicts += int(bad.sum())
-        graph = _dissolve(graph, bad)
-        if bad[node]:
+        sound = part[~blocked[mesh.faces[part]].any(axis=1)]
+        if len(sound) == 0:
             break
-    return np.full_like(marker, -1), np.full_like(cell, -1), outside, conflicts
+        at, bad = _walk(sound[0], mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
+        if not bad.any():
+            return at, int(blocked.sum())
+        blocked |= bad
+    return np.full((cells, 2), UNKNOWN, np.int32), int(blocked.sum())
 
 
-def number(
-    image: NDArray[np.uint8], triangles: Triangles, graph: Graph, lattice: Lattice
-) -> Numbering | None:
-    """Stage 7: number every triangle that is connected with the white cell; None without a white cell.
-
-    A bright gap between cells is the white cell; where several are bright, the one that puts the most cells
-    inside the layout's outline and the fewest outside is, unless two do so equally well.
-    """
-    sense = -1 if graph.mirrored else 1
-    ratio, center = _gaps(image, triangles.corner_px, graph.node_of_corner, graph.corner_of_node, sense)
-    bright = np.argwhere(ratio > WHITE_RATIO)
-    bright = bright[np.argsort(-ratio[bright[:, 0], bright[:, 1]], kind="stable")][: 3 * MAX_WHITES]
-    best: tuple[int, Numbering] | None = None
-    tie = False
-    tried: list[NDArray[np.float64]] = []
-    for node, ink in bright:
-        where = center[node, ink]
-        reach = 0.5 * np.hypot(*(where - graph.xy_px[node]))
-        if any(np.hypot(*(where - other)) < reach for other in tried):
+@compiled
+def _bases(center, at, reach):  # type: ignore[no-untyped-def]
+    """(N, 2, 2) image step per axial step, by least squares over the six neighbours of each cell."""
+    side = 2 * reach + 1
+    holder = np.full((side, side), -1, np.int32)
+    for i in range(center.shape[0]):
+        if at[i, 0] != UNKNOWN:
+            holder[at[i, 0] + reach, at[i, 1] + reach] = i
+    basis = np.full((center.shape[0], 2, 2), np.nan)
+    for i in range(center.shape[0]):
+        if at[i, 0] == UNKNOWN:
             continue
-        tried.append(where)
-        marker, cell, outside, conflicts = _number_from(graph, triangles, lattice, int(node), GAP_AXIAL[ink])
-        score = int((cell >= 0).sum()) - 3 * outside - conflicts
-        found = Numbering(marker, cell, where, conflicts, False)
-        if best is None or score > best[0]:
-            tie = best is not None and score - best[0] < 2
-            best = (score, found)
-        elif best[0] - score < 2:
-            tie = True
-    if best is None:
+        nqq, nqr, nrr = 0.0, 0.0, 0.0
+        xq, xr, yq, yr = 0.0, 0.0, 0.0, 0.0
+        for k in range(6):
+            dq, dr = SIX[k, 0], SIX[k, 1]
+            q, r = at[i, 0] + dq + reach, at[i, 1] + dr + reach
+            if q < 0 or r < 0 or q >= side or r >= side or holder[q, r] < 0:
+                continue
+            dx = center[holder[q, r], 0] - center[i, 0]
+            dy = center[holder[q, r], 1] - center[i, 1]
+            nqq += dq * dq
+            nqr += dq * dr
+            nrr += dr * dr
+            xq += dx * dq
+            xr += dx * dr
+            yq += dy * dq
+            yr += dy * dr
+        determinant = nqq * nrr - nqr * nqr
+        if determinant > 0.5:
+            basis[i, 0, 0] = (xq * nrr - xr * nqr) / determinant
+            basis[i, 0, 1] = (xr * nqq - xq * nqr) / determinant
+            basis[i, 1, 0] = (yq * nrr - yr * nqr) / determinant
+            basis[i, 1, 1] = (yr * nqq - yq * nqr) / determinant
+    return basis
+
+
+def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice) -> Numbering | None:
+    """Stage 7: number the largest part of the mesh that holds a white cell; None without one.
+
+    Where several cells are as bright as white, the one that puts the most cells inside the layout and the fewest
+    outside is the reference, unless two do so equally well: then nothing is reported.
+    """
+    found: list[tuple[int, Numbering]] = []
+    parts = _largest_parts(cells, mesh)
+    for front in _fronts(image, cells, mesh):
+        for part in parts:
+            at, conflicts = _number_part(mesh, part, front, 2 * lattice.layers + 2, len(cells.ink))
+            found += _with_white(image, cells, lattice, at, front, conflicts)
+    if not found:
         return None
-    if tie:
-        nothing = np.full_like(best[1].marker_of_corner, -1)
-        return Numbering(
-            nothing, np.full_like(best[1].cell_of_triangle, -1), best[1].white_px, best[1].conflicts, True
-        )
-    return best[1]
+    found.sort(key=lambda pair: -pair[0])
+    score, best = found[0]
+    reach = 0.5 * cells.edge_px
+    rivals = [other for other, way in found if np.hypot(*(way.white_px - best.white_px)) > reach]
+    return replace(best, ambiguous=bool(rivals) and score - max(rivals) < MIN_LEAD)
+
+
+def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
+    """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
+    faces = np.flatnonzero(mesh.turn)
+    faces = faces[:: max(1, len(faces) // WITNESSES)]
+    corner = cells.center_px[mesh.faces[faces]]
+    middle = corner.mean(axis=1)
+    radius = 0.12 * np.linalg.norm(corner - middle[:, None], axis=2).min(axis=1)
+    ratio = colors_at(image, middle, radius).sum(axis=1)
+    plus, minus = (ratio[(mesh.turn[faces] == turn) & np.isfinite(ratio)] for turn in (1, -1))
+    if len(plus) < 4 or len(minus) < 4:
+        return [1, -1]
+    return [1] if np.median(plus) > np.median(minus) else [-1]
+
+
+@compiled
+def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
+    """(F,) the connected part of the mesh that each face belongs to, counted from 0; -1 for no face."""
+    part = np.full(turn.shape[0], -1, np.int32)
+    stack = np.empty(turn.shape[0], np.int32)
+    count = 0
+    for first in range(turn.shape[0]):
+        if turn[first] == 0 or part[first] >= 0:
+            continue
+        part[first] = count
+        stack[0], height = first, 1
+        while height > 0:
+            height -= 1
+            f = stack[height]
+            for k in range(3):
+                g = neighbours[f, k]
+                if g >= 0 and part[g] < 0:
+                    part[g] = count
+                    stack[height] = g
+                    height += 1
+        count += 1
+    return part
+
+
+def _largest_parts(cells: Cells, mesh: Mesh) -> list[NDArray[np.intp]]:
+    """The faces of each of the largest connected parts of the mesh, the innermost first: rims are often damaged."""
+    part = _parts(mesh.neighbours, mesh.turn)
+    sizes = np.bincount(part[part >= 0])
+    found = []
+    for number_of in np.argsort(-sizes, kind="stable")[:MAX_PARTS]:
+        faces = np.flatnonzero(part == number_of)
+        middle = cells.center_px[mesh.faces[faces]].mean(axis=1)
+        distance = np.linalg.norm(middle - np.median(middle, axis=0), axis=1)
+        found.append(faces[np.argsort(distance, kind="stable")])
+    return found
+
+
+def _with_white(
+    image: NDArray[np.uint8],
+    cells: Cells,
+    lattice: Lattice,
+    at: NDArray[np.int32],
+    front: int,
+    conflicts: int,
+) -> list[tuple[int, Numbering]]:
+    """Every way to put the origin at a bright cell, with the number of cells that it explains."""
+    known = np.flatnonzero(at[:, 0] != UNKNOWN)
+    basis = _bases(cells.center_px, at, 2 * lattice.layers + 2)[known]
+    known = known[np.isfinite(basis[:, 0, 0])]
+    basis = basis[np.isfinite(basis[:, 0, 0])]
+    if len(known) == 0:
+        return []
+    for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
+        steps = (low < DISTANCES) & (high >= DISTANCES)
+        places, where, mean = _whiteness(image, cells, at, known, basis, steps)
+        if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
+            return []
+        bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
+        if len(bright):
+            break
+    least = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
+    found = []
+    for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
+        moved = np.full_like(at, UNKNOWN)
+        moved[known] = _from_white(at[known], places[place])
+        cell = cells_at(moved, lattice)
+        inside = int((cell >= 0).sum())
+        if inside < least or len(known) - inside > MAX_OUTSIDE * len(known):
+            continue
+        score = inside - 3 * (len(known) - inside) - conflicts
+        found.append((score, Numbering(cell, front < 0, where[place], conflicts)))
+    return found
+
+
+def _whiteness(
+    image: NDArray[np.uint8],
+    cells: Cells,
+    at: NDArray[np.int32],
+    known: NDArray[np.intp],
+    basis: NDArray[np.float64],
+    steps: NDArray[np.bool_],
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, and brightness against the inks.
+
+    Far from the next cell a prediction may hit a colored cell. So there all three channels must be as strong as in
+    the ink that has most of each: white is, in light of any color, and no ink is.
+    """
+    center, radius = cells.center_px[known], 0.1 * np.sqrt(cells.area_px[known])
+    own = colors_at(image, center, radius)
+    around = center[:, None] + np.einsum("nij,kj->nki", basis, OFFSETS[steps])
+    count = around.shape[1]
+    keys, place_of = np.unique(((at[known, None] + STEPS[steps]) @ (KEY, 1)).reshape(-1), return_inverse=True)
+    places = np.stack([(keys + KEY // 2) // KEY, (keys + KEY // 2) % KEY - KEY // 2], axis=1)
+    votes = np.bincount(place_of)
+    columns = (around[..., 0], around[..., 1], np.repeat(radius, count), np.repeat(own.sum(axis=1), count))
+    x, y, reach, level = (np.bincount(place_of, weights=v.reshape(-1)) / votes for v in columns)
+    where = np.stack([x, y], axis=1)
+    color = colors_at(image, where, reach)
+    if DISTANCES[steps].min() < WHITE_REACHES[0]:
+        ratio = color.sum(axis=1) / np.maximum(level, 1.0)
+    else:
+        inks = [
+            np.median(own[cells.ink[known] == ink], axis=0)
+            for ink in (1, 2, 3)
+            if (cells.ink[known] == ink).any()
+        ]
+        ratio = (color / np.maximum(np.max(inks, axis=0), 1.0)).min(axis=1)
+    return places.astype(np.int32), where, np.where(np.isfinite(ratio), ratio, 0.0)
+
+
+def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Axial coordinates turned and shifted so that a down-cell becomes (0, 0) with red to its right.
+
+    The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
+    the right, to the left or above, and a turn by 0, 120 or 240 degrees brings it to the right.
+    """
+    q, r = (at - white).T
+    turn = int(white[0] - white[1]) % 3
+    turned = ((q, r), (-q - r - 1, q + 1), (r - 1, -q - r))[turn]
+    return np.stack(turned, axis=1).astype(np.int32)
+
+
+@compiled
+def _cells_at(at, cell_of, layers, out):  # type: ignore[no-untyped-def]
+    """Write the layout's cell at each axial place, or -1."""
+    for i in range(at.shape[0]):
+        q, r = at[i, 0], at[i, 1]
+        out[i] = -1
+        if q != UNKNOWN and layer_of(q, r) <= layers:
+            out[i] = cell_of[marker_id(q, r)]
+
+
+def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
+    """(N,) int32, the layout's cell at each axial (q, r), or -1."""
+    out = np.empty(len(at), np.int32)
+    _cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_of, lattice.layers, out)
+    return out
+
+
+@compiled
+def _marker_ids(at, out):  # type: ignore[no-untyped-def]
+    """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
+    for i in range(at.shape[0]):
+        q, r = at[i, 0], at[i, 1]
+        out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
+
+
+def marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1) at the corners of the cells (q, r)."""
+    out = np.empty((len(at), 3), np.int32)
+    _marker_ids(np.ascontiguousarray(at, dtype=np.int32), out)
+    return out

@@ -10,23 +10,26 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .attach import attach
+from .cells import Cells, find_cells
 from .color import find_target, nominal_hues_deg, segment, to_colors
 from .errors import LayoutError
-from .graph import Graph, connect
 from .image import estimate_noise, prepare
-from .numbering import lattice_of, number
+from .mesh import build_mesh
+from .numbering import Numbering, lattice_of, number
 from .placing import place
 from .reference import Reference
-from .topology import topology_of
 from .refine import PRESETS, Preset, Refiner
 from .regions import find_seeds, grow
-from .triangles import Triangles, fit_triangles
-from .types import Markers, Reason, Status
+from .repair import repair
+from .topology import topology_of
+from .triangles import fit_triangles
+from .types import Markers, Reason
 from .virtual import interpolate
 
 WORK_PIXELS = 1_400_000  # larger images are recognised at a reduced scale first
 MIN_WORK_EDGE_PX = 11.0  # shorter edges at the reduced scale need the full one
-MIN_NODES = 3  # markers with all three inks around them, below which there is no pattern
+MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
 
 
 class Stages:
@@ -82,28 +85,28 @@ class Extractor:
         bgr = stages.done("image", prepare(image))
         if bgr is None:
             return self._nothing(Reason.NO_COLOR, stages)
-        triangles = self._recognise(bgr, stages)
-        if triangles is None:
+        cells = self._recognise(bgr, stages)
+        if cells is None:
             return self._nothing(Reason.NO_COLOR, stages)
-        graph = stages.done("connect", connect(triangles))
-        if int((graph.corner_of_node >= 0).all(axis=1).sum()) < min(MIN_NODES, self._lattice.layers):
+        mesh = stages.done("mesh", build_mesh(cells))
+        if mesh is None or int((mesh.turn != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
             return self._nothing(Reason.NO_PATTERN, stages)
-        numbering = stages.done("number", number(bgr, triangles, graph, self._lattice))
+        numbering = stages.done("number", number(bgr, cells, mesh, self._lattice))
         if numbering is None:
             return self._nothing(Reason.REFERENCE_LOST, stages)
         if numbering.ambiguous:
             return self._nothing(Reason.AMBIGUOUS, stages)
-        return self._measure(bgr, triangles, graph, numbering, stages)
+        return self._measure(bgr, cells, numbering, stages)
 
-    def _recognise(self, bgr: NDArray[np.uint8], stages: Stages) -> Triangles | None:
+    def _recognise(self, bgr: NDArray[np.uint8], stages: Stages) -> Cells | None:
         """Stages 1 to 5, at a reduced scale where the image is large and its cells are too."""
         scale = int(np.ceil(np.sqrt(bgr.shape[0] * bgr.shape[1] / WORK_PIXELS)))
-        triangles = self._recognise_at(bgr, scale, stages)
-        if scale > 1 and (triangles is None or triangles.edge_px < MIN_WORK_EDGE_PX * scale):
-            triangles = self._recognise_at(bgr, 1, stages)
-        return triangles
+        cells = self._recognise_at(bgr, scale, stages)
+        if scale > 1 and (cells is None or cells.edge_px < MIN_WORK_EDGE_PX * scale):
+            cells = self._recognise_at(bgr, 1, stages)
+        return cells
 
-    def _recognise_at(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Triangles | None:
+    def _recognise_at(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Cells | None:
         work = bgr
         if scale > 1:
             height, width = bgr.shape[0] // scale, bgr.shape[1] // scale
@@ -116,23 +119,28 @@ class Extractor:
             return None
         seeds = stages.done("seeds", find_seeds(segmentation))
         regions = stages.done("grow", grow(segmentation, seeds))
-        return stages.done("triangles", fit_triangles(bgr, regions, scale))  # type: ignore[no-any-return]
+        triangles = stages.done("triangles", fit_triangles(bgr, regions, scale))
+        return stages.done("cells", find_cells(seeds, triangles, scale))  # type: ignore[no-any-return]
 
-    def _measure(
-        self, bgr: NDArray[np.uint8], triangles: Triangles, graph: Graph, numbering: Any, stages: Stages
-    ) -> Markers:
+    def _measure(self, bgr: NDArray[np.uint8], cells: Cells, numbering: Numbering, stages: Stages) -> Markers:
         """Refinement and virtual markers of what has been numbered."""
-        places = stages.done("place", place(triangles, numbering, len(self.layout.layer)))
+        numbering = stages.done("attach", attach(cells, numbering, self._lattice))
+        size = (bgr.shape[1], bgr.shape[0])
+        places = stages.done("place", place(cells, numbering, self._lattice, size))
         refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
-        status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
-        virtual, virtual_status = stages.done("virtual", interpolate(self.layout, refined.xy_px, status))
+        repaired = stages.done(
+            "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
+        )
+        virtual, virtual_status = stages.done(
+            "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
+        )
         return Markers(
-            xy_px=refined.xy_px,
-            cov_px2=refined.cov_px2,
-            status=status,
+            xy_px=repaired.xy_px,
+            cov_px2=repaired.cov_px2,
+            status=repaired.status,
             virtual_xy_px=virtual,
             virtual_status=virtual_status,
-            mirrored=graph.mirrored,
+            mirrored=numbering.mirrored,
             reason=None,
             timings_ms=MappingProxyType(stages.timings_ms),
             stages=MappingProxyType(stages.results),

@@ -17,9 +17,17 @@ MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Stage 3. ``xy`` (N, 2) int32 pixels, ``ink`` (N,) uint8 1..3, ``area_px`` (N,) of the domains they stand for."""
+    """Stage 3: one seed per domain.
+
+    Attributes:
+        xy: (N, 2) int32, the pixel to grow from.
+        center: (N, 2) float64, the domain's geometric center.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        area_px: (N,) int64, the domain's area.
+    """
 
     xy: NDArray[np.int32]
+    center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
 
@@ -110,7 +118,7 @@ def _runs(label):  # type: ignore[no-untyped-def]
 
 @compiled
 def _seeds(runs, root):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, its ink and its area."""
+    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
     number = np.full(runs.shape[0], -1, np.int32)
     domains = 0
     for i in range(runs.shape[0]):
@@ -138,7 +146,9 @@ def _seeds(runs, root):  # type: ignore[no-untyped-def]
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    return xy, ink, area
+    for d in range(domains):
+        sums[d] /= area[d]
+    return xy, sums, ink, area
 
 
 def find_seeds(segmentation: Segmentation) -> Seeds:
@@ -146,9 +156,9 @@ def find_seeds(segmentation: Segmentation) -> Seeds:
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
     """
-    xy, ink, area = _seeds(*_runs(segmentation.label))
+    xy, center, ink, area = _seeds(*_runs(segmentation.label))
     keep = area >= MIN_DOMAIN_PX
-    return Seeds(xy=xy[keep], ink=ink[keep], area_px=area[keep])
+    return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
 
 
 @compiled
@@ -156,7 +166,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it."""
     height, width = label.shape
     owner = np.zeros((height, width), np.int32)
-    queue = np.empty((height * width, 2), np.int32)
+    queue = np.empty((limit_px + 2, 2), np.int32)
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
     half = HUES // 2
@@ -179,7 +189,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                     y = queue[i, 1] + (1 if side == 2 else -1 if side == 3 else 0)
                     if x < 0 or y < 0 or x >= width or y >= height or owner[y, x] != 0:
                         continue
-                    if label[y, x] != ink and label[y, x] != 0:
+                    if end > limit_px or (label[y, x] != ink and label[y, x] != 0):
                         continue
                     s, v = float(hsv[y, x, 1]), float(hsv[y, x, 2])
                     # circular: the pixel's hue is unwrapped to the side of the mean on which it lies

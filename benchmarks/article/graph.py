@@ -1,4 +1,7 @@
-"""Stage 6: triangles whose corners meet are joined into a graph of markers (the article's eqs. 4-5)."""
+"""The article's own connection: triangles whose corners meet are joined into a graph of markers (eqs. 4-5).
+
+The extractor numbers the mesh of cell centers instead; this is what it is compared with.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
-from .triangles import Triangles
+from extractor.engine import compiled
+from extractor.triangles import Triangles
 
 # L of eq. 5 in units of the shortest edge that leaves either corner. Corners that do not belong together are at
 # least such an edge apart.

@@ -1,0 +1,1 @@
+"""Every figure that the documentation states: one command each, conditions printed with it."""

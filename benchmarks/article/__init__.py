@@ -1,0 +1,1 @@
+"""The article's way from triangles to numbers, as a rival to the extractor's."""

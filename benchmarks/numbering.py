@@ -1,0 +1,148 @@
+"""Two ways to number the same cells: the article's graph of corners, and the extractor's mesh of centers.
+
+    python -m benchmarks.numbering
+
+Both start from the same triangles or centers of the same images. A cell is right when it gets the layout's number,
+wrong when it gets another's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.article.graph import connect
+from benchmarks.article.numbering import lattice_of as article_lattice
+from benchmarks.article.numbering import number as article_number
+from cmpdesign.scene import (
+    Camera,
+    Damage,
+    Optics,
+    Press,
+    Scene,
+    Scratch,
+    Sensor,
+    Surface,
+    Truth,
+    Twist,
+    render,
+    standard_layout,
+    standard_scene,
+)
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, parse_layout
+from extractor.reference import Reference
+
+PATTERNS = ("honeycomb", "round", "elliptical")
+SEEDS = (1, 2, 3)
+LAYERS = 10
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One kind of image; ``pitch_px``, ``blur_px``, ``noise`` as a camera gives them."""
+
+    name: str
+    damage: Damage | None = None
+    surface: Surface | None = None
+    pitch_px: float = 20.0
+    tilt_deg: float = 0.0
+    blur_px: float = 1.0
+    noise: float = 2.0
+
+
+CONDITIONS = (
+    Condition("plain"),
+    *(
+        Condition(f"{share:.0%} of the cells missing", Damage(missing_share=share))
+        for share in (0.01, 0.05, 0.1, 0.2)
+    ),
+    Condition("a scratch, half an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 0.75),))),
+    Condition("a scratch, an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 1.5),))),
+    Condition("twist by 30 degrees", surface=Surface((Twist(6.0, 30.0),))),
+    Condition("pinch", surface=Surface((Press(4.0, -1.5),))),
+    Condition("tilt 60 degrees", tilt_deg=60.0),
+    Condition("blur of a tenth of an edge", blur_px=2.0),
+    Condition("blur of a fifth of an edge", blur_px=4.0),
+    Condition("pitch 8 px", pitch_px=8.0),
+    Condition("noise 20/255", noise=20.0),
+)
+
+
+@dataclass
+class Count:
+    """Cells over all images of a condition."""
+
+    visible: int = 0
+    right: int = 0
+    wrong: int = 0
+
+    def add(
+        self, cell: NDArray[np.int32], center_px: NDArray[np.float64], reference: Reference, truth: Truth
+    ) -> None:
+        """Count the cells that were numbered: each belongs to the layout's cell whose true center is nearest."""
+        inked = np.flatnonzero(reference.cell_color < 3)
+        true_px = truth.marker_xy_px[reference.cell_corners[inked]].mean(axis=1)
+        self.visible += int(truth.cell_visible[inked].sum())
+        for found, at in zip(cell[cell >= 0], center_px[cell >= 0], strict=True):
+            right = inked[np.linalg.norm(true_px - at, axis=1).argmin()] == found
+            # a damaged cell is not owed, but its number must be right too
+            self.right += int(right and truth.cell_visible[found])
+            self.wrong += int(not right)
+
+
+def compare(condition: Condition) -> tuple[Count, Count]:
+    """The article's way and the extractor's on the same images."""
+    article, mesh = Count(), Count()
+    inks = standard_scene().inks
+    for pattern in PATTERNS:
+        layout = standard_layout(pattern, LAYERS)
+        reference = parse_layout(layout_to_json(layout))
+        extractor, lattice = Extractor(reference), article_lattice(reference)
+        colored = np.flatnonzero(reference.cell_color < 3)
+        for seed in SEEDS:
+            scene = Scene(
+                layout,
+                Camera(pitch_px=condition.pitch_px, rotation_deg=47.0 * seed, tilt_deg=condition.tilt_deg),
+                surface=condition.surface,
+                optics=Optics(condition.blur_px),
+                sensor=Sensor(noise=condition.noise),
+                damage=condition.damage,
+                inks=inks,
+                seed=seed,
+            )
+            rendered = render(scene)
+            image, truth = np.asarray(rendered.image, np.uint8), rendered.truth
+            stages = extractor.extract(image).stages
+            triangles = stages["triangles"]
+            numbering = article_number(image, triangles, connect(triangles), lattice)
+            found = np.full(len(triangles.ink), -1) if numbering is None else numbering.cell_of_triangle
+            article.add(found, triangles.corner_px.mean(axis=1), reference, truth)
+            attached = stages.get("attach")
+            if attached is None:
+                mesh.visible += int((truth.cell_visible & (reference.cell_color < 3)).sum())
+                continue
+            ours = np.where(attached.cell >= 0, colored[attached.cell], -1)
+            mesh.add(ours, stages["cells"].center_px, reference, truth)
+    return article, mesh
+
+
+def main() -> None:
+    table = Table(title=f"cells numbered, {len(PATTERNS)} patterns x {len(SEEDS)} images, {LAYERS} layers")
+    for name in ("condition", "visible", "corners: right", "wrong", "centers: right", "wrong"):
+        table.add_column(name, justify="left" if name == "condition" else "right")
+    for condition in CONDITIONS:
+        article, mesh = compare(condition)
+        row = [f"{article.visible}"]
+        for count in (article, mesh):
+            row += [f"{100 * count.right / count.visible:.2f} %", f"{count.wrong}"]
+        table.add_row(condition.name, *row)
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

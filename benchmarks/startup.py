@@ -1,0 +1,146 @@
+"""Whole processes: what a command costs from the shell, and how long and how large the largest pattern builds.
+
+python -m benchmarks.startup [--quick] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.machine import sentence, write_json
+
+ROOT = Path(__file__).resolve().parent.parent
+CLI = "from cmpdesign.cli import main; main()"
+COMMANDS = {
+    "python -c pass": None,
+    "cmpdesign --help": ["--help"],
+    "cmpdesign templates": ["templates"],
+    "cmpdesign build honeycomb --only svg,layout": [
+        "build",
+        "honeycomb",
+        "--only",
+        "svg,layout",
+        "-o",
+        "made",
+    ],
+    "cmpdesign build honeycomb": ["build", "honeycomb", "-o", "made"],
+}
+# The child reports what it needed itself: peak memory of the whole process, in the system's unit of kB.
+LARGEST = """
+import json, resource, sys, time
+from cmpdesign import build_layout
+from cmpdesign.design import Design
+design = Design(pattern=sys.argv[1], layers=200, pitch_mm=1.0)
+start = time.perf_counter()
+layout = build_layout(design)
+seconds = time.perf_counter() - start
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(json.dumps({"markers": len(layout.marker_xy_mm), "seconds": seconds, "peak_mb": peak / 1024}))
+"""
+
+
+@dataclass(frozen=True)
+class Process:
+    """Wall-clock seconds of one command over several runs."""
+
+    command: str
+    median_s: float
+    best_s: float
+
+
+@dataclass(frozen=True)
+class Largest:
+    """Building 200 layers: the fastest run, and the process's peak memory."""
+
+    pattern: str
+    markers: int
+    seconds: float
+    peak_mb: float
+
+
+def python(code: str, arguments: Sequence[str], folder: Path) -> str:
+    """Run code in a process of its own; its output."""
+    start = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+    command = [sys.executable, "-c", start + code, *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def process(command: str, runs: int, folder: Path) -> Process:
+    """Time a command; the first run, which reads the files from disk, is not counted."""
+    arguments = COMMANDS[command]
+    seconds = []
+    for _ in range(runs + 1):
+        start = time.perf_counter()
+        python("pass" if arguments is None else CLI, arguments or [], folder)
+        seconds.append(time.perf_counter() - start)
+    return Process(command, float(np.median(seconds[1:])), min(seconds[1:]))
+
+
+def largest(pattern: str, runs: int, folder: Path) -> Largest:
+    results = [json.loads(python(LARGEST, [pattern], folder)) for _ in range(runs)]
+    best = min(results, key=lambda result: float(result["seconds"]))
+    return Largest(pattern, best["markers"], best["seconds"], best["peak_mb"])
+
+
+def process_table(results: Sequence[Process]) -> Table:
+    table = Table(title="Whole processes", box=SIMPLE_HEAD, title_justify="left")
+    table.add_column("command", no_wrap=True)
+    for name in ("median s", "best s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for result in results:
+        table.add_row(result.command, f"{result.median_s:.3f}", f"{result.best_s:.3f}")
+    return table
+
+
+def largest_table(results: Sequence[Largest]) -> Table:
+    table = Table(title="200 layers in a fresh process", box=SIMPLE_HEAD, title_justify="left")
+    table.add_column("pattern", no_wrap=True)
+    for name in ("markers", "best s", "peak MB"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for result in results:
+        table.add_row(result.pattern, f"{result.markers}", f"{result.seconds:.2f}", f"{result.peak_mb:.0f}")
+    return table
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run, print the tables, write the JSON file if asked."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.startup", description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="few runs: a look, no figures to quote")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
+    options = parser.parse_args(arguments)
+    runs = 3 if options.quick else 15
+    with tempfile.TemporaryDirectory() as folder:
+        processes = [process(command, runs, Path(folder)) for command in COMMANDS]
+        layouts = [
+            largest(pattern, max(1, runs // 5), Path(folder))
+            for pattern in ("honeycomb", "round", "elliptical")
+        ]
+    console = Console()
+    console.print(process_table(processes))
+    console.print(largest_table(layouts))
+    console.print(sentence(), style="dim", soft_wrap=True)
+    if options.json:
+        write_json(
+            options.json,
+            {"processes": [asdict(r) for r in processes], "largest": [asdict(r) for r in layouts]},
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

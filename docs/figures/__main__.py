@@ -1,0 +1,21 @@
+"""``python -m docs.figures``: write every picture and generated page of the documentation."""
+
+from __future__ import annotations
+
+from cmpdesign.writers.atomic import write_file
+
+from .everything import IMAGES, pages, pictures
+
+
+def main() -> None:
+    """Write them and say so."""
+    for name, data in pictures().items():
+        write_file(IMAGES / name, data)
+        print(f"docs/images/{name}: {len(data) / 1000:.0f} kB")
+    for path, text in pages().items():
+        write_file(path, text)
+        print(f"docs/{path.name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""The tables of docs/design-files.md, from the model that reads the files."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cmpdesign.design import Design, Palette, design_schema
+from cmpdesign.patterns import patterns
+from cmpdesign.units import ANGLES_DEG, LENGTHS_MM
+
+BEGIN, END = "<!-- {}: written by python -m docs.figures -->", "<!-- end of {} -->"
+
+
+def filled(text: str) -> str:
+    """The page with its tables written anew."""
+    for name, table in (("fields", fields()), ("palette", palette()), ("units", units())):
+        begin, end = BEGIN.format(name), END.format(name)
+        before, _, rest = text.partition(begin)
+        _, found, after = rest.partition(end)
+        if not found:
+            raise ValueError(f"docs/design-files.md has no place for the table of {name}")
+        text = f"{before}{begin}\n\n{table}\n{end}{after}"
+    return text
+
+
+def fields() -> str:
+    """Every field of a design: what it takes, its default, what it means."""
+    rows = ["| field | takes | default | meaning |", "|---|---|---|---|"]
+    properties = design_schema()["properties"]
+    for name, field in Design.model_fields.items():
+        default = (
+            "required" if field.is_required() else _default(field.get_default(call_default_factory=True))
+        )
+        rows.append(f"| `{name}` | {_takes(name, properties[name])} | {default} | {field.description} |")
+    return "\n".join(rows) + "\n"
+
+
+def palette() -> str:
+    """The inks and their defaults."""
+    rows = ["| ink | default |", "|---|---|"]
+    rows += [f"| `{name}` | `{field.default}` |" for name, field in Palette.model_fields.items()]
+    return "\n".join(rows) + "\n"
+
+
+def units() -> str:
+    """The units of lengths and angles."""
+    lengths = ", ".join(f"`{unit}`" for unit in LENGTHS_MM)
+    angles = ", ".join(f"`{unit}`" for unit in ANGLES_DEG)
+    return f"- lengths: {lengths}; a plain number is mm\n- angles: {angles}; a plain number is degrees\n"
+
+
+def _default(value: Any) -> str:
+    if isinstance(value, Palette):
+        return "below"
+    if value is None:
+        return "none"
+    shown = (
+        str(value).lower()
+        if isinstance(value, bool)
+        else f'"{value}"'
+        if isinstance(value, str)
+        else f"{value:g}"
+    )
+    return f"`{shown}`"
+
+
+def _takes(name: str, schema: dict[str, Any]) -> str:
+    if name == "palette":
+        return "a table"
+    if name == "pattern":
+        return ", ".join(f'`"{pattern}"`' for pattern in patterns())
+    options = [option for option in schema.get("anyOf", [schema]) if option.get("type") != "null"]
+    nested = [inner for option in options for inner in option.get("anyOf", [option])]
+    words = [_kind(name, inner) for inner in nested]
+    return " or ".join(dict.fromkeys(words))
+
+
+def _kind(name: str, schema: dict[str, Any]) -> str:
+    if "enum" in schema:
+        return ", ".join(f'`"{choice}"`' for choice in schema["enum"])
+    if name.endswith(("_mm", "_deg")):
+        return "a length" if name.endswith("_mm") else "an angle"
+    kind = {"boolean": "true or false", "integer": "an integer", "number": "a number", "string": "a text"}
+    low, high = schema.get("minimum"), schema.get("maximum")
+    return kind[schema["type"]] + (
+        f" from {low:g} to {high:g}" if low is not None and high is not None else ""
+    )

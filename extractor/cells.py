@@ -1,0 +1,57 @@
+"""Between recognition and numbering: the colored cells, as centers that no blur moves, with their triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .regions import Seeds
+from .triangles import Triangles
+
+NEIGHBOURS = 8
+MIN_AREA_SHARE = 0.2  # of the median around it; smaller domains are dirt
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The image's colored cells.
+
+    Attributes:
+        center_px: (N, 2) float64 in the image frame.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        area_px: (N,) float64.
+        corner_px: (N, 3, 2) float64, the corners clockwise in the image, NaN where the region is no triangle.
+    """
+
+    center_px: NDArray[np.float64]
+    ink: NDArray[np.uint8]
+    area_px: NDArray[np.float64]
+    corner_px: NDArray[np.float64]
+
+    @property
+    def edge_px(self) -> float:
+        """The median edge of an equilateral triangle of the cells' areas; 0 without cells."""
+        return float(np.sqrt(np.median(self.area_px) * 4 / np.sqrt(3))) if len(self.area_px) else 0.0
+
+
+def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
+    """The domains that are large enough for cells, at full scale.
+
+    Args:
+        scale: full-scale pixels per pixel of the seeds.
+    """
+    from scipy.spatial import cKDTree
+
+    corners = np.full((len(seeds.ink), 3, 2), np.nan)
+    corners[triangles.region] = triangles.corner_px
+    center = (seeds.center + 0.5) * scale - 0.5
+    center[triangles.region] = triangles.corner_px.mean(axis=1)
+    area = seeds.area_px.astype(np.float64)
+    if len(center) > NEIGHBOURS:
+        _, near = cKDTree(center).query(center, NEIGHBOURS)
+        keep = area >= MIN_AREA_SHARE * np.sort(area[near], axis=1)[:, NEIGHBOURS // 2]
+    else:
+        keep = np.ones(len(center), np.bool_)
+    return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])

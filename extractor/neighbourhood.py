@@ -1,0 +1,146 @@
+"""Where a marker must lie as its neighbours see it: a local quadratic map from layout to image."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .engine import compiled
+from .lattice import layer_of, marker_id
+
+RING = np.array(
+    [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
+)
+TERMS = 6  # 1, x, y, x^2, xy, y^2 in units of the local edge
+MIN_QUADRATIC = 9  # neighbours for the quadratic; fewer get the linear map
+MIN_LINEAR = 4
+PIVOT = 1e-7
+
+
+@compiled
+def _neighbours(axial, layers):  # type: ignore[no-untyped-def]
+    out = np.full((axial.shape[0], RING.shape[0]), -1, np.int32)
+    for m in range(axial.shape[0]):
+        for k in range(RING.shape[0]):
+            q, r = axial[m, 0] + RING[k, 0], axial[m, 1] + RING[k, 1]
+            if layer_of(q, r) <= layers:
+                out[m, k] = marker_id(q, r)
+    return out
+
+
+def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
+    """(M, 18) int32 ids of the markers in the two rings around each one; -1 beyond the pattern."""
+    return np.asarray(_neighbours(axial, layers))
+
+
+@compiled
+def _factor(matrix, terms):  # type: ignore[no-untyped-def]
+    """Cholesky factor in place; False when the neighbours do not determine the map."""
+    for i in range(terms):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            if i == j:
+                if not total > PIVOT:
+                    return False
+                matrix[i, i] = np.sqrt(total)
+            else:
+                matrix[i, j] = total / matrix[j, j]
+    return True
+
+
+@compiled
+def _solve(factor, terms, vector):  # type: ignore[no-untyped-def]
+    """Solve in place with a Cholesky factor."""
+    for i in range(terms):
+        for k in range(i):
+            vector[i] -= factor[i, k] * vector[k]
+        vector[i] /= factor[i, i]
+    for i in range(terms - 1, -1, -1):
+        for k in range(i + 1, terms):
+            vector[i] -= factor[k, i] * vector[k]
+        vector[i] /= factor[i, i]
+
+
+@compiled
+def _predict(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
+    """Predicted places, residual variances, leverages and numbers of neighbours of the wanted markers."""
+    count = xy_px.shape[0]
+    place = np.full((count, 2), np.nan)
+    variance = np.full(count, np.nan)
+    leverage = np.full(count, np.nan)
+    support = np.zeros(count, np.int32)
+    normal, sides = np.zeros((TERMS, TERMS)), np.zeros((2, TERMS))
+    rows, unit = np.zeros((RING.shape[0], TERMS)), np.zeros(TERMS)
+    for m in range(count):
+        if not wanted[m]:
+            continue
+        scale, n = 0.0, 0
+        for k in range(table.shape[1]):
+            j = table[m, k]
+            if j >= 0 and not np.isnan(xy_px[j, 0]):
+                scale += np.hypot(marker_mm[j, 0] - marker_mm[m, 0], marker_mm[j, 1] - marker_mm[m, 1])
+                n += 1
+        support[m] = n
+        if n < MIN_LINEAR:
+            continue
+        terms = TERMS if n >= MIN_QUADRATIC else 3
+        scale /= n
+        normal[:] = 0.0
+        sides[:] = 0.0
+        n = 0
+        for k in range(table.shape[1]):
+            j = table[m, k]
+            if j < 0 or np.isnan(xy_px[j, 0]):
+                continue
+            x, y = (marker_mm[j, 0] - marker_mm[m, 0]) / scale, (marker_mm[j, 1] - marker_mm[m, 1]) / scale
+            rows[n, 0], rows[n, 1], rows[n, 2] = 1.0, x, y
+            rows[n, 3], rows[n, 4], rows[n, 5] = x * x, x * y, y * y
+            for a in range(terms):
+                sides[0, a] += rows[n, a] * xy_px[j, 0]
+                sides[1, a] += rows[n, a] * xy_px[j, 1]
+                for b in range(a + 1):
+                    normal[a, b] += rows[n, a] * rows[n, b]
+            n += 1
+        if not _factor(normal, terms):
+            continue
+        _solve(normal, terms, sides[0])
+        _solve(normal, terms, sides[1])
+        place[m, 0], place[m, 1] = sides[0, 0], sides[1, 0]
+        squares, n = 0.0, 0
+        for k in range(table.shape[1]):
+            j = table[m, k]
+            if j < 0 or np.isnan(xy_px[j, 0]):
+                continue
+            dx, dy = xy_px[j, 0], xy_px[j, 1]
+            for a in range(terms):
+                dx -= sides[0, a] * rows[n, a]
+                dy -= sides[1, a] * rows[n, a]
+            squares += dx * dx + dy * dy
+            n += 1
+        unit[:] = 0.0
+        unit[0] = 1.0
+        _solve(normal, terms, unit)
+        leverage[m] = unit[0]
+        variance[m] = squares / (2.0 * max(n - terms, 1))
+    return place, variance, leverage, support
+
+
+def predict(
+    xy_px: NDArray[np.float64],
+    wanted: NDArray[np.bool_],
+    marker_mm: NDArray[np.float64],
+    table: NDArray[np.int32],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    """Where the wanted markers lie by their neighbours in two rings, themselves not counted.
+
+    Returns:
+        (M, 2) places in px; (M,) the variance per axis that the fit leaves in its neighbours, px^2; (M,) the
+        leverage, by which the neighbours' own errors are multiplied; (M,) the number of neighbours. NaN where
+        the neighbours are too few or on a line.
+    """
+    result: tuple[Any, Any, Any, Any] = _predict(np.ascontiguousarray(xy_px), wanted, marker_mm, table)
+    return result

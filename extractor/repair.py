@@ -1,0 +1,159 @@
+"""Stage 8: markers that contradict their neighbours are dropped, and lost ones are repaired where that is safe.
+
+Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
+do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
+sextant, read at equidistant places. What neither can tell within a tenth of an edge stays lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .neighbourhood import predict
+from .numbering import Lattice
+from .types import Status
+
+ROUNDS = 4
+MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
+MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
+SIGMAS = 6.0  # standard deviations of the prediction are more than that
+MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
+MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
+MAX_LEVERAGE = 1.2
+MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
+MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """Markers after repair: (M, 2) places, (M, 2, 2) covariances, (M,) status; NaN and 0 where lost."""
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+def repair(
+    xy_px: NDArray[np.float64],
+    cov_px2: NDArray[np.float64],
+    edge_px: NDArray[np.float64],
+    lattice: Lattice,
+    size: tuple[int, int],
+) -> Repaired:
+    """Drop what contradicts its neighbours and repair what they imply.
+
+    Args:
+        xy_px, cov_px2: (M, 2), (M, 2, 2) as measured, NaN where lost.
+        edge_px: (M,) the edges at each marker, NaN where unknown.
+        size: width and height of the image; nothing is reported outside.
+    """
+    xy, cov = xy_px.copy(), cov_px2.copy()
+    outside = ~_inside(xy, size)
+    xy[outside], cov[outside] = np.nan, np.nan
+    _drop_outliers(xy, cov, edge_px, lattice)
+    status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
+    if status[lattice.present].all():
+        return Repaired(xy, cov, status)
+    edge = _filled(edge_px, lattice)
+    measured = xy.copy()
+    for place, sigma, kind in (
+        (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
+        (*_by_layer(measured, edge, lattice), Status.FITTED),
+    ):
+        use = (status == Status.LOST) & _inside(place, size) & (sigma < MAX_SIGMA * edge) & lattice.present
+        xy[use] = place[use]
+        cov[use] = np.eye(2) * (sigma[use] ** 2)[:, None, None]
+        status[use] = kind
+    return Repaired(xy, cov, status)
+
+
+def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Places within the image, NaN not."""
+    return np.asarray((xy >= 0).all(axis=1) & (xy <= np.array(size) - 1).all(axis=1))
+
+
+def _drop_outliers(
+    xy: NDArray[np.float64], cov: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
+) -> None:
+    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot."""
+    table = lattice.neighbours
+    for _ in range(ROUNDS):
+        known = np.isfinite(xy[:, 0])
+        place, variance, leverage, support = predict(xy, known, lattice.marker_mm, table)
+        sigma = np.sqrt(variance * (1 + leverage))
+        deviation = np.linalg.norm(xy - place, axis=1)
+        with np.errstate(invalid="ignore"):
+            allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
+            excess = deviation / (edge * np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE))
+        excess[~np.isfinite(excess)] = 0.0
+        around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
+        bad = (excess > 1.0) & (excess >= around)
+        if not bad.any():
+            break
+        xy[bad] = np.nan
+        cov[bad] = np.nan
+
+
+def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
+    """The edges at each marker; where none was seen, the mean of its neighbours'."""
+    around = np.where(lattice.neighbours >= 0, edge[lattice.neighbours], np.nan)
+    count = np.isfinite(around).sum(axis=1)
+    mean = np.nansum(around, axis=1) / np.maximum(count, 1)
+    return np.where(np.isfinite(edge), edge, np.where(count > 0, mean, np.nan))
+
+
+def _by_neighbours(
+    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(M, 2) places by the two rings around each lost marker, and their (M,) sigma; infinite where not safe."""
+    place, variance, leverage, support = predict(
+        xy, np.isnan(xy[:, 0]), lattice.marker_mm, lattice.neighbours
+    )
+    safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE)
+    with np.errstate(invalid="ignore"):
+        sigma = np.sqrt(variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2)
+    return place, np.where(safe & np.isfinite(sigma), sigma, np.inf)
+
+
+def _by_layer(
+    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(M, 2) places on the quadratic through each lost marker's layer and sextant, between known markers."""
+    place, sigma = np.full_like(xy, np.nan), np.full(len(xy), np.inf)
+    for layer in np.unique(lattice.layer[np.isnan(xy[:, 0]) & (lattice.layer > 0)]):
+        first = 3 * layer * (layer - 1) + 1
+        for sextant in range(6):
+            index = np.arange(sextant * layer, (sextant + 1) * layer + 1)
+            ids = first + index % (6 * layer)
+            known = np.isfinite(xy[ids, 0])
+            if known.all() or known.sum() < MIN_LAYER_MARKERS:
+                continue
+            _interpolate(xy, edge, ids, known, place, sigma)
+    return place, sigma
+
+
+def _interpolate(
+    xy: NDArray[np.float64],
+    edge: NDArray[np.float64],
+    ids: NDArray[np.intp],
+    known: NDArray[np.bool_],
+    place: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+) -> None:
+    """Fit x and y as quadratics of the place within the sextant and read them at the lost places in between."""
+    step = np.linspace(-1.0, 1.0, len(ids))
+    rows = np.vander(step, 3)
+    inverse = np.linalg.pinv(rows[known])
+    terms = inverse @ xy[ids[known]]
+    residual = xy[ids[known]] - rows[known] @ terms
+    variance = (residual**2).sum() / (2 * (known.sum() - 3))
+    spread = ((rows @ inverse) ** 2).sum(axis=1)
+    between = np.flatnonzero(known)
+    lost = ~known
+    lost[: between[0]] = False
+    lost[between[-1] + 1 :] = False
+    place[ids[lost]] = (rows @ terms)[lost]
+    sigma[ids[lost]] = np.sqrt(variance * (1 + spread[lost]) + (3 * MODEL_SIGMA * edge[ids[lost]]) ** 2)

@@ -1,0 +1,161 @@
+"""A cut of the stress suite: no marker is ever wrong, nothing is read where nothing is, and the promise is kept.
+
+The whole suite is ``python -m benchmarks.stress``; it runs here, too, marked slow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.stress import main
+from benchmarks.stress_suite.conditions import BY_NAME, KINDS, cases
+from benchmarks.stress_suite.frames import PATTERNS, Shot, plain
+from benchmarks.stress_suite.kinds import Case, Kind
+from benchmarks.stress_suite.reading import Result, extractor_of, read
+from benchmarks.stress_suite.report import PROMISED_SHARE, failures, rows_of
+from benchmarks.stress_suite.score import score, smallest_contrast
+from extractor import Markers, Status
+
+STANDARD_STEPS = ("megapixels", "small cells", "medium cells", "large cells")  # whose later steps are large
+EMPTY_IMAGES = 4  # of every kind
+LESS_KEPT = {"overflowing": 0.98}  # two of 183: large cells, and corners 3 px from the image's rim are lost
+
+
+def hard_but_promised(kind: Kind) -> float:
+    """The step in the middle: hard enough to tell, mild enough for the promise."""
+    return kind.steps[0] if kind.name in STANDARD_STEPS else kind.steps[len(kind.steps) // 2]
+
+
+def cut() -> list[Case]:
+    """One image of every kind of condition, the patterns in turn."""
+    chosen = []
+    for number, kind in enumerate(kind for kind in KINDS if kind.group != "nothing"):
+        turn = number % len(PATTERNS)
+        chosen.append(Case(kind.name, hard_but_promised(kind), PATTERNS[turn], 100 * turn))
+    return chosen
+
+
+def result_of(case: Case) -> Result:
+    return read(case, runs=1, timing=False)[0]
+
+
+@pytest.mark.parametrize("case", cut(), ids=lambda case: case.name)
+def test_no_marker_is_wrong_and_the_promise_is_kept(case: Case) -> None:
+    figures = result_of(case).score
+    assert figures.wrong == 0
+    assert figures.outside == 0
+    assert not figures.promised or figures.kept >= LESS_KEPT.get(case.kind, PROMISED_SHARE) * figures.sure
+
+
+@pytest.mark.parametrize("kind", [kind.name for kind in KINDS if kind.group == "nothing"])
+def test_nothing_is_read_where_nothing_is(kind: str) -> None:
+    steps = BY_NAME[kind].steps
+    for image in range(EMPTY_IMAGES):
+        # Odd seeds make small images.
+        case = Case(kind, steps[image % len(steps)], PATTERNS[image % len(PATTERNS)], 1001 + 2 * image)
+        assert result_of(case).score.reported == 0, case.name
+
+
+def test_the_suite_is_as_large_as_it_says() -> None:
+    full = cases(quick=False)
+    assert len(KINDS) == len(BY_NAME) >= 60
+    assert len(set(full)) == len(full)
+    assert {case.pattern for case in full} == set(PATTERNS)
+    assert sum(BY_NAME[case.kind].group == "nothing" for case in full) >= 1000
+
+
+def perfect() -> tuple[Markers, Shot]:
+    """The plain frame, and markers made from its truth."""
+    shot = plain("honeycomb", 0).shoot()
+    found = extractor_of("honeycomb", 11).extract(np.zeros_like(shot.image))
+    visible = shot.truths[0].visible
+    xy_px = np.where(visible[:, None], shot.truths[0].marker_xy_px, np.nan)
+    return replace(found, xy_px=xy_px, status=visible.astype(np.uint8)), shot
+
+
+def test_the_score_sees_swapped_shifted_and_lost_markers() -> None:
+    markers, shot = perfect()
+    good = score(markers, shot, promised=True)
+    assert (good.wrong, good.lost, good.outside, good.hidden) == (0, 0, 0, 0)
+    assert good.promised and good.kept == good.sure == good.measured == good.visible
+    assert good.rms_px == 0
+
+    swapped = markers.xy_px.copy()
+    swapped[[3, 4]] = swapped[[4, 3]]
+    assert score(replace(markers, xy_px=swapped), shot, promised=True).wrong == 2
+    for share, wrong in ((0.29, 0), (0.31, 1)):
+        moved = markers.xy_px.copy()
+        moved[7] += [20 * share, 0]
+        assert score(replace(markers, xy_px=moved), shot, promised=True).wrong == wrong
+    status = markers.status.copy()
+    status[:5] = Status.LOST
+    status[5] = Status.FITTED
+    some = score(replace(markers, status=status), shot, promised=True)
+    assert (some.lost, some.fitted, some.kept) == (5, 1, good.kept - 6)
+
+
+def test_a_reported_marker_without_a_place_is_wrong() -> None:
+    markers, shot = perfect()
+    xy_px = markers.xy_px.copy()
+    xy_px[0] = np.nan
+    assert score(replace(markers, xy_px=xy_px), shot, promised=True).wrong == 1
+
+
+def test_markers_on_an_empty_image_are_wrong_and_reported_as_such() -> None:
+    markers, shot = perfect()
+    figures = score(markers, Shot(shot.image, (), None), promised=False)
+    assert figures.wrong == figures.reported == int((markers.status > 0).sum())
+    case = Case("nothing: noise", 1, "honeycomb", 0)
+    rows = rows_of([Result(case, figures, 10.0, 1.0, "", False)], KINDS)
+    assert failures(rows)[0].startswith("WRONG")
+
+
+def test_two_patterns_may_be_read_as_either_but_not_mixed() -> None:
+    markers, shot = perfect()
+    far = replace(shot.truths[0], marker_xy_px=shot.truths[0].marker_xy_px + 700.0)
+    both = replace(shot, truths=(far, shot.truths[0]))
+    assert score(markers, both, promised=True).wrong == 0
+    mixed = markers.xy_px.copy()
+    mixed[:10] += 700
+    assert score(replace(markers, xy_px=mixed), both, promised=True).wrong == 10
+
+
+@pytest.mark.parametrize(
+    ("kind", "step", "promised"),
+    [
+        ("pitch", 6, False),
+        ("pitch", 10, True),
+        ("blur", 4, True),
+        ("blur small edge", 1.5, True),
+        ("blur large edge", 8, True),
+        ("contrast and noise", 60, False),
+        ("contrast and noise", 80, True),
+        ("contrast and noise", 120, True),
+        ("white cell missing", 0, False),
+        ("two alike", 20, False),
+    ],
+)
+def test_the_promise_applies_as_stated(kind: str, step: float, promised: bool) -> None:
+    assert result_of(Case(kind, step, "honeycomb", 0)).score.promised is promised
+
+
+def test_contrast_is_the_weakest_cells_under_its_light() -> None:
+    shot = plain("honeycomb", 0).shoot()
+    assert shot.scene is not None
+    size = (shot.image.shape[1], shot.image.shape[0])
+    assert smallest_contrast(shot.scene, shot.truths[0], size) == 130  # green: 150 on 20
+    dim = plain("honeycomb", 0).lit(rgb=(0.5, 0.5, 0.5))
+    assert smallest_contrast(dim.scene, shot.truths[0], size) == 65
+
+
+def test_a_condition_is_saved_with_its_overlay(tmp_path: object, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--only", "plain=0/round/100", "--save", str(tmp_path)]) == 0
+    assert "397" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_whole_suite() -> None:
+    assert main(["--table"]) == 0
