@@ -100,7 +100,7 @@ def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
             y += xy[n, 1] + u * maps[n, 1, 0] + v * maps[n, 1, 1]
             y += 0.5 * u * u * maps[n, 1, 2] + u * v * maps[n, 1, 3] + 0.5 * v * v * maps[n, 1, 4]
             count += 1
-        if count >= 2:
+        if count > 0:
             out[m, 0], out[m, 1] = x / count, y / count
             put[m] = True
     return out, put
@@ -122,14 +122,19 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
         ux, uy = dx / length, dy / length
         out[e, X], out[e, Y], out[e, UX], out[e, UY], out[e, LENGTH] = xy[a, 0], xy[a, 1], ux, uy, length
         out[e, KNOWN] = 1.0
-        for k in range(near.shape[1]):
+        leave, arrive = np.nan, np.nan
+        for k in range(FIRST_RING):
             if near[a, k] == b:
-                out[e, LEAVE] = _slope(maps[a], offset[a, k, 0], offset[a, k, 1], ux, uy)
-                break
-        for k in range(near.shape[1]):
+                leave = _slope(maps[a], offset[a, k, 0], offset[a, k, 1], ux, uy)
             if near[b, k] == a:
-                out[e, ARRIVE] = _slope(maps[b], -offset[b, k, 0], -offset[b, k, 1], ux, uy)
-                break
+                arrive = _slope(maps[b], -offset[b, k, 0], -offset[b, k, 1], ux, uy)
+        # where one end's direction is unknown the gridline is a parabola, where both are, straight
+        if not np.isfinite(arrive):
+            arrive = -leave
+        if not np.isfinite(leave):
+            leave = -arrive
+        if np.isfinite(leave):
+            out[e, LEAVE], out[e, ARRIVE] = leave, arrive
     return out
 
 
@@ -140,7 +145,7 @@ def _slope(derivatives, u, v, ux, uy):  # type: ignore[no-untyped-def]
     along = tx * ux + ty * uy
     slope = (ty * ux - tx * uy) / along
     if not (along > 0.0 and abs(slope) < MAX_SLOPE):
-        return 0.0
+        return np.nan
     return slope
 
 

@@ -50,6 +50,7 @@ PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
+WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
 MAX_WIDEN = 0.3  # of the blur, in one step
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
 # normal density and N its integral.
@@ -91,10 +92,12 @@ class Refined:
 
 
 class Fit(NamedTuple):
-    """The current estimate. ``xy`` holds the markers beyond the known ones too (``beyond``); ``moved`` is by how many
+    """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
+    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them; ``moved`` is by how many
     of its standard deviations the last step moved a marker at most."""
 
     xy: NDArray[np.float64]
+    measured: NDArray[np.float64]
     beyond: NDArray[np.bool_]
     maps: NDArray[np.float64]
     sigma: float
@@ -135,7 +138,7 @@ class Refiner:
             frame,
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
-        fit = Fit(xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
+        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
         for stations in self._steps.profiles:
             fit = self._profile_step(image, fit, frame, stations)
         if self._steps.synthesis:
@@ -153,8 +156,6 @@ class Refiner:
         mesh = self._mesh
         maps = local_maps(xy, mesh.near, mesh.offset, mesh.stencil)
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
-        if beyond.any():
-            maps = local_maps(xy, mesh.near, mesh.offset, mesh.stencil)
         return xy, beyond, maps
 
     def _profile_step(
@@ -206,9 +207,11 @@ class Refiner:
         xx, xy, yy = information.diagonal.T
         x, y = np.where(fit.beyond, 0.0, shift.T)
         moved = float(np.sqrt(np.max(x * x * xx + 2 * x * y * xy + y * y * yy, initial=0.0)))
-        xy_px = fit.xy + shift
-        maps = local_maps(xy_px, self._mesh.near, self._mesh.offset, self._mesh.stencil)
-        return fit._replace(xy=xy_px, maps=maps, information=information, moved=moved)
+        measured = fit.xy + shift
+        xy_px, beyond, maps = self._completed(np.where(_weak(information)[:, None], np.nan, measured))
+        return fit._replace(
+            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=moved
+        )
 
     def _level_step(
         self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
@@ -278,7 +281,7 @@ class Refiner:
 
     def _result(self, fit: Fit, places: Places) -> Refined:
         mesh, information = self._mesh, fit.information
-        xy = fit.xy.copy()
+        xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         with np.errstate(invalid="ignore"):
             near = np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px
@@ -307,6 +310,14 @@ def _trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
             limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
     return use, np.sqrt(usual)
+
+
+def _weak(information: Information) -> NDArray[np.bool_]:
+    """(M,) markers that the image says far less about than about most, in one direction at least."""
+    xx, xy, yy = information.diagonal.T
+    least = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
+    shown = least > 4 * PRIOR_BEYOND_PX**-2
+    return np.asarray(least < WEAK * np.median(least[shown])) if shown.any() else ~shown
 
 
 def _box(xy: NDArray[np.float64], margin: float, shape: tuple[int, ...]) -> NDArray[np.int64]:

@@ -68,6 +68,18 @@ def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-de
 
 
 @compiled
+def _sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
+    """Fill in a cell's three sides; how far they can lie off their chords."""
+    bulge = 0.0
+    for k in range(3):
+        e = cell_edges[k]
+        forward = edges[e, 0] == cell[k]
+        _side(lines, e, forward, turn if forward else -turn, inverse, side[k])
+        bulge = max(bulge, (0.25 * side[k, 6] + REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
+    return bulge
+
+
+@compiled
 def _opening(side, other):  # type: ignore[no-untyped-def]
     """The angle at the corner between a side's end and the next one's start, over 2 pi."""
     ax, ay = -side[4] , -side[5]
@@ -96,12 +108,7 @@ def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, 
             continue
         a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
         turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
-        bulge = 0.0
-        for k in range(3):
-            e = cell_edges[i, k]
-            forward = edges[e, 0] == cells[i, k]
-            _side(lines, e, forward, turn if forward else -turn, inverse, side[k])
-            bulge = max(bulge, (0.25 * side[k, 6] + REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
+        bulge = _sides(cells[i], cell_edges[i], edges, lines, turn, inverse, side)
         angle0, angle1, angle2 = _opening(side[2], side[0]), _opening(side[0], side[1]), _opening(side[1], side[2])
         length0, length1, length2 = side[0, 6], side[1, 6], side[2, 6]
         leave0, leave1, leave2 = side[0, 7], side[1, 7], side[2, 7]
