@@ -17,7 +17,9 @@ from .engine import compiled
 REACH = 3.3  # a side farther away than this is not seen
 STEPS = 64  # of the tables of one variable, to a unit
 WEDGE_STEPS = 8
-WEDGE_REACH = 14.0  # along a side; where both sides of a wedge of 29 degrees or more are in reach, less is needed
+WEDGE_REACH = (
+    14.0  # along a side; where both sides of a wedge of 29 degrees or more are in reach, less is needed
+)
 
 
 def _normal_tables() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -19,10 +19,11 @@ from .synthesis import AA, AB, BB
 MAX_STEPS = 80  # of the conjugate gradients
 MIN_ANGLE = 0.4  # rad; the closed forms are for long gridlines, and two at a smaller angle are not
 PRECISION = 1e-3  # of the solution
-# A marker that moves alone bends the gridlines around it, through the smooth map, as a cardinal cubic does: 1 - 2.5 t^2 +
-# 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that is 1.1 (.3667
-# for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
+# A marker that moves alone bends the gridlines around it, through the smooth map, as a cardinal cubic does:
+# 1 - 2.5 t^2 + 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that
+# is 1.1 (.3667 for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
 SMOOTH = 0.1
+ENDS = 0.75  # of a gridline's information is left at least where its ends are blurred
 
 
 class Information(NamedTuple):
@@ -48,11 +49,17 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
     linear = sigma * np.sqrt(np.pi) / (2.0 * np.pi * (1.0 - cosine))
     square = sigma * sigma * b / np.pi
     near = zeroth - linear / first - linear / second + square / (first * second)
-    return max(near, 0.0), linear / second - square / (first * second), linear / first - square / (first * second)
+    return (
+        max(near, 0.0),
+        linear / second - square / (first * second),
+        linear / first - square / (first * second),
+    )
 
 
 @compiled
-def assemble(sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, variance, prior, diagonal, beside):  # type: ignore[no-untyped-def]
+def assemble(  # type: ignore[no-untyped-def]
+    sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, variance, prior, diagonal, beside
+):
     """Fill the matrix's blocks from what was read along the gridlines, in units of the noise's variance.
 
     ``overlapping``: the sums were taken up to the gridlines' ends, where they share their pixels.
@@ -77,7 +84,7 @@ def assemble(sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, 
         beside[e, 3] += value * ny * ny
     if not overlapping:
         return
-    away = np.empty((6, 2))
+    away, seen = np.empty((6, 2)), np.empty(6)
     for m in range(spokes.shape[0]):
         for i in range(6):
             e = spokes[m, i]
@@ -89,12 +96,17 @@ def assemble(sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, 
             size = out / np.sqrt(1.0 + slope * slope)
             away[i, 0] = size * (lines[e, UX] - slope * lines[e, UY])
             away[i, 1] = size * (lines[e, UY] + slope * lines[e, UX])
+            # a gridline that the image's border cuts shares the less the less of it was read
+            strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
+            whole = strength * lines[e, LENGTH] / (6.0 * np.sqrt(np.pi) * sigma)
+            seen[i] = min((sums[e, AA] if out > 0.0 else sums[e, BB]) / max(ENDS * whole, 1e-12), 1.0)
             for j in range(i):
                 f = spokes[m, j]
                 if f < 0 or weight[f] == 0.0:
                     continue
                 dot = contrasts[e, 0] * contrasts[f, 0] + contrasts[e, 1] * contrasts[f, 1]
                 dot = (dot + contrasts[e, 2] * contrasts[f, 2]) * min(weight[e], weight[f]) / variance
+                dot *= seen[i] * seen[j]
                 if dot != 0.0:
                     cosine = away[i, 0] * away[j, 0] + away[i, 1] * away[j, 1]
                     near, far_f, far_e = overlap(cosine, lines[e, LENGTH], lines[f, LENGTH], sigma)

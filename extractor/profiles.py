@@ -36,7 +36,9 @@ def unmixing(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, fr
             continue
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         x0, y0 = lines[e, X], lines[e, Y]
-        monomials((x0 + 0.5 * length * ux - frame_x) / scale, (y0 + 0.5 * length * uy - frame_y) / scale, terms)
+        monomials(
+            (x0 + 0.5 * length * ux - frame_x) / scale, (y0 + 0.5 * length * uy - frame_y) / scale, terms
+        )
         height, at_a, at_b = length, 1.0, 1.0
         for channel in range(3):
             weights[e, channel] = contrasts[e, channel] / strength

@@ -18,7 +18,6 @@ from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
-from .topology import Topology
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
 from .synthesis import (
@@ -38,6 +37,7 @@ from .synthesis import (
     edge_contrasts,
     read_gridlines,
 )
+from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
@@ -93,8 +93,8 @@ class Refined:
 
 class Fit(NamedTuple):
     """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
-    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them; ``moved`` is by how many
-    of its standard deviations the last step moved a marker at most."""
+    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
+    ``moved`` is by how many of its standard deviations the last step moved a marker at most."""
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
@@ -158,9 +158,7 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
-    def _profile_step(
-        self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int
-    ) -> Fit:
+    def _profile_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int) -> Fit:
         mesh, levels = self._mesh, fit.levels
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
@@ -186,7 +184,16 @@ class Refiner:
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         clear(model, box)
         draw_cells(
-            fit.xy, mesh.cells, mesh.cell_edges, mesh.edges, lines, levels.cell, levels.slope, sigma, box, model
+            fit.xy,
+            mesh.cells,
+            mesh.cell_edges,
+            mesh.edges,
+            lines,
+            levels.cell,
+            levels.slope,
+            sigma,
+            box,
+            model,
         )
         bettered = self._level_step(image, model, fit, frame)
         middles = 0.5 * (fit.xy[mesh.edges[:, 0]] + fit.xy[mesh.edges[:, 1]])
@@ -250,7 +257,7 @@ class Refiner:
         """(E, 3): the change of level of a gridline's two sides together."""
         black = black_at(new.black - old.black, middles, *frame)
         change = np.concatenate([new.cell - old.cell, np.zeros((1, 3))])
-        return np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1))
+        return np.asarray(np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1)))
 
     def _solve(
         self,
@@ -263,7 +270,10 @@ class Refiner:
         overlapping: bool,
         fit: Fit,
     ) -> tuple[NDArray[np.float64], Information]:
-        """The shifts (M, 2) of all markers and the matrix that gave them. At their ends gridlines overlap, unless they were read in their middles only."""
+        """The shifts (M, 2) of all markers and the matrix that gave them.
+
+        At their ends gridlines overlap, unless they were read in their middles only.
+        """
         mesh, count, variance = self._mesh, len(fit.xy), fit.noise**2
         diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
         use = use * lines[:, KNOWN]

@@ -82,7 +82,7 @@ def _sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore
 @compiled
 def _opening(side, other):  # type: ignore[no-untyped-def]
     """The angle at the corner between a side's end and the next one's start, over 2 pi."""
-    ax, ay = -side[4] , -side[5]
+    ax, ay = -side[4], -side[5]
     bx, by = other[4], other[5]
     # the first side bows inwards with slope 8 along its direction; seen from the corner that turns it outwards
     angle = np.arccos(min(max((ax * bx + ay * by) / (np.hypot(ax, ay) * np.hypot(bx, by)), -1.0), 1.0))
@@ -104,12 +104,19 @@ def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, 
     flat, width = model.reshape(-1), model.shape[1]
     one, two = np.uint64(1), np.uint64(2)
     for i in range(cells.shape[0]):
-        if lines[cell_edges[i, 0], KNOWN] * lines[cell_edges[i, 1], KNOWN] * lines[cell_edges[i, 2], KNOWN] == 0.0:
+        if (
+            lines[cell_edges[i, 0], KNOWN] * lines[cell_edges[i, 1], KNOWN] * lines[cell_edges[i, 2], KNOWN]
+            == 0.0
+        ):
             continue
         a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
         turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
         bulge = _sides(cells[i], cell_edges[i], edges, lines, turn, inverse, side)
-        angle0, angle1, angle2 = _opening(side[2], side[0]), _opening(side[0], side[1]), _opening(side[1], side[2])
+        angle0, angle1, angle2 = (
+            _opening(side[2], side[0]),
+            _opening(side[0], side[1]),
+            _opening(side[1], side[2]),
+        )
         length0, length1, length2 = side[0, 6], side[1, 6], side[2, 6]
         leave0, leave1, leave2 = side[0, 7], side[1, 7], side[2, 7]
         arrive0, arrive1, arrive2 = side[0, 8], side[1, 8], side[2, 8]
@@ -192,13 +199,17 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
             if i < 0:
                 continue
             cx, cy = xy[cells[i]][:, 0].mean(), xy[cells[i]][:, 1].mean()
-            if not np.isfinite(cx):  # half of it is out of sight; it cannot be drawn, so its sides cannot be read
+            if not np.isfinite(
+                cx
+            ):  # half of it is out of sight; it cannot be drawn, so its sides cannot be read
                 out[e] = 0.0
                 lines[e, KNOWN] = 0.0
                 break
             sign = -1.0 if (cy - my) * ux - (cx - mx) * uy > 0.0 else 1.0
             for channel in range(3):
-                level = levels[i, channel] + slopes[i, channel, 0] * (mx - cx) + slopes[i, channel, 1] * (my - cy)
+                level = (
+                    levels[i, channel] + slopes[i, channel, 0] * (mx - cx) + slopes[i, channel, 1] * (my - cy)
+                )
                 out[e, channel] += sign * level
     return out
 

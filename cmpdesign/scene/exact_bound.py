@@ -80,9 +80,7 @@ def _far_apart(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
     return group
 
 
-def _owners(
-    scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]
-) -> NDArray[np.int64]:
+def _owners(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
     """(M, 2, 2): the box of pixels (from, to) that a marker's cells and their blur can reach."""
     edges = scene.layout.edges
     low, high = xy_px.copy(), xy_px.copy()
@@ -91,7 +89,7 @@ def _owners(
         np.maximum.at(high, a, xy_px[b])
     reach = REACH_SIGMA * np.hypot(scene.blur_px, 0.3) + 1
     box = np.stack([np.floor(low - reach), np.ceil(high + reach) + 1], axis=1)
-    return np.clip(box, 0, np.asarray(size)).astype(np.int64)
+    return np.asarray(np.clip(box, 0, np.asarray(size)), dtype=np.int64)
 
 
 def _derivative(
@@ -109,7 +107,9 @@ def _derivative(
     return (images[0] - images[1]) / (2 * STEP_PX)
 
 
-def _layout_from_image(scene: Scene, markers: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np.float64]:
+def _layout_from_image(
+    scene: Scene, markers: NDArray[np.int64], size: tuple[int, int]
+) -> NDArray[np.float64]:
     """(n, 2, 2) mm per px: the inverse derivative of the map from layout to image at these markers."""
     view, xy = look(scene, size), scene.layout.marker_xy_mm[markers]
     step = 1e-4 * np.ptp(scene.layout.marker_xy_mm)
