@@ -76,7 +76,7 @@ def _quadratic(xy, m, near, offset, gram, right):  # type: ignore[no-untyped-def
     if known < 2 or gram[0, 0] * gram[1, 1] - gram[1, 0] ** 2 < 0.05 * gram[0, 0] * gram[1, 1]:
         return False
     for i in range(2, 5):
-        gram[i, i] += 0.02 if known >= 5 else 1e9
+        gram[i, i] += (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
     cholesky_solve(gram, right, 5)
     return True
 
