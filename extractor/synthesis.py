@@ -90,6 +90,21 @@ def _opening(side, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
+    """The columns of row y that lie less than ``far`` outside of every side."""
+    low, high = left, right
+    for k in range(3):
+        rest = side[k, 0] + side[k, 2] * y + far
+        if side[k, 1] > 0.0:
+            low = max(low, np.ceil(-rest / side[k, 1]))
+        elif side[k, 1] < 0.0:
+            high = min(high, np.floor(-rest / side[k, 1]))
+        elif rest < 0.0:
+            high = low - 1.0
+    return low, high
+
+
+@compiled
 def _wedge(opening, end, d, back, start, other, t):  # type: ignore[no-untyped-def]
     """Share of the wedge between the end of one side (distance d, ``back`` from the corner, slope ``end``) and the
     start of the next (distance ``other``, place t, slope ``start``)."""
@@ -131,15 +146,7 @@ def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, 
         right = min(np.floor(max(a[0], b[0], c[0]) + far * sigma), box[2] - 1.0)
         g0, g1, g2 = slopes[i, 0, 0], slopes[i, 1, 0], slopes[i, 2, 0]
         for y in range(top, bottom + 1):
-            low, high = left, right
-            for k in range(3):
-                rest = side[k, 0] + side[k, 2] * y + far
-                if side[k, 1] > 0.0:
-                    low = max(low, np.ceil(-rest / side[k, 1]))
-                elif side[k, 1] < 0.0:
-                    high = min(high, np.floor(-rest / side[k, 1]))
-                elif rest < 0.0:
-                    high = low - 1.0
+            low, high = _columns(side, y, far, left, right)
             if high < low:
                 continue
             l0 = levels[i, 0] + slopes[i, 0, 1] * (y - cy) - g0 * cx
