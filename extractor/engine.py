@@ -24,9 +24,21 @@ except ImportError:  # slow, but right
 
 def compiled(function: Function) -> Function:
     """Compile ``function`` with numba on its first call; the result is cached beside its source file."""
+    return _compiled(function, False)
+
+
+def vectorized(function: Function) -> Function:
+    """The same for loops whose sums may be taken in any order, so that several terms are added at once.
+
+    NaN and infinity keep their meaning.
+    """
+    return _compiled(function, {"reassoc", "contract", "nsz", "arcp"})
+
+
+def _compiled(function: Function, fastmath: bool | set[str]) -> Function:
     if numba is None:
         return function
-    kernel: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    kernel: Function = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
     return kernel
 
 

@@ -19,10 +19,11 @@ from .mesh import build_mesh
 from .numbering import Numbering, number
 from .placing import Places, place
 from .reference import Reference
-from .refine import refine
+from .refine import PRESETS, Preset, Refiner
 from .regions import find_seeds, grow
 from .repair import repair
 from .tables import lattice_of
+from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason
 from .virtual import interpolate
@@ -59,13 +60,16 @@ class Extractor:
         LayoutError: the layout is not a triangular pattern.
     """
 
-    def __init__(self, layout: Reference) -> None:
+    def __init__(self, layout: Reference, preset: Preset = "balanced") -> None:
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
             )
         self.layout = layout
+        if preset not in PRESETS:
+            raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
+        self._refine = Refiner(topology_of(layout), preset)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
     def extract(self, image: NDArray[Any]) -> Markers:
@@ -131,7 +135,7 @@ class Extractor:
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
         size = (bgr.shape[1], bgr.shape[0])
-        refined = stages.done("refine", refine(bgr, places, estimate_noise(bgr)))
+        refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
         repaired = stages.done(
             "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
         )

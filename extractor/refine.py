@@ -1,32 +1,77 @@
-"""Sub-pixel markers: all edges of the numbered cells are measured once more and solved together.
+"""Stage 9: all markers are solved together, from profiles across the gridlines and then by synthesis.
 
-Every colored edge says where the line between its two markers runs, and every inner marker ends six of them. One
-sparse least squares over all of them uses the neighbours' edges for each marker, which is worth more than the mean
-of three corners.
+Profiles lead from a pixel to some hundredths of one. From there a step by synthesis is a Gauss-Newton step on the
+likelihood of the whole image, with the curvature that the overlap of the gridlines at the corners gives it: one is
+nearly all that can be had.
 """
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
-from math import erf
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
+from .gridlines import KNOWN, extrapolate, gridlines, local_maps
+from .information import Information, assemble, covariances, gradient, solve
+from .levels import Frame, Levels, black_at, cell_means, smooth_levels
 from .placing import Places
-from .sampling import clamp, sample_dot, sample_patch
+from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
+from .synthesis import (
+    AA,
+    AB,
+    BB,
+    BLUR,
+    BLUR_CURVATURE,
+    MISFIT,
+    PIXELS,
+    SHARE_A,
+    SHARE_B,
+    A,
+    B,
+    clear,
+    draw_cells,
+    edge_contrasts,
+    read_gridlines,
+)
+from .topology import Topology
 
-SAMPLES = 7  # at most, on each side of it
-REACH_SIGMA = 2.5  # how far a profile reaches, in units of the blur
-CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
-MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
-MIN_CONTRAST = 12.0
-LEVEL_REACH = 0.15  # of the cell's height, how far around its middle the ink is averaged
-MAX_STEPS = 60  # of the conjugate gradient
-ROUNDS = (4, 24)  # stations along an edge at most, in each round
+Preset = Literal["fast", "balanced", "accurate"]
+PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
+
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
+USUAL_SIGMA_PX = 1.5  # before it is known
+MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
+PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
+PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
+BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
+MARGIN_SIGMA = 4.0
+WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
+MAX_WIDEN = 0.3  # of the blur, in one step
+# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
+# normal density and N its integral.
+CONTRAST_TO_BLUR = 1.79
+NO_MODEL = np.empty((0, 0, 3), np.float32)
+
+
+class Steps(NamedTuple):
+    """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most, until the
+    no marker moves by more than ``enough`` of its standard deviations."""
+
+    profiles: tuple[int, ...]
+    synthesis: int
+    enough: float
+
+
+STEPS: dict[Preset, Steps] = {
+    "fast": Steps((3, 4, 24), 0, 0.0),
+    "balanced": Steps((3, 4), 4, 20.0),
+    "accurate": Steps((3, 4), 10, 0.7),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,277 +82,257 @@ class Refined:
         xy_px: (M, 2) float64, NaN where nothing was measured.
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
         blur_px: the blur found in the image, pixel included (sigma).
+        noise: the noise found, grey levels, one channel.
     """
 
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     blur_px: float
+    noise: float
 
 
-@compiled
-def _levels(image, xy, cells):  # type: ignore[no-untyped-def]
-    """(3 C, 5) per edge: what turns a color into its share of the ink, 1 in the cell and 0 beyond the edge.
+class Fit(NamedTuple):
+    """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
+    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
+    ``moved`` is by how many of its standard deviations the last step moved a marker at most."""
 
-    Columns: three channel weights, the offset to subtract, and the squared contrast; 0 where nothing can be measured.
-    Ink and black are taken from the middle of the cell and of the cell beyond.
-    """
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, beyond = np.zeros(3), np.zeros(3)
-    out = np.zeros((cells.shape[0] * 3, 5))
-    for i in range(cells.shape[0]):
-        a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
-        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-        longest = max(np.hypot(b[0] - a[0], b[1] - a[1]), np.hypot(c[0] - a[0], c[1] - a[1]))
-        longest = max(longest, np.hypot(c[0] - b[0], c[1] - b[1]))
-        radius = LEVEL_REACH * area / max(longest, 1e-9)
-        if area < 2.0 or not sample_patch(flat, height, width, cx, cy, radius, ink):
-            continue
-        for k in range(3):
-            a, b = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]]
-            if not sample_patch(flat, height, width, a[0] + b[0] - cx, a[1] + b[1] - cy, radius, beyond):
-                continue
-            contrast = (ink[0] - beyond[0]) ** 2 + (ink[1] - beyond[1]) ** 2 + (ink[2] - beyond[2]) ** 2
-            if contrast < MIN_CONTRAST**2:
-                continue
-            e = 3 * i + k
-            for channel in range(3):
-                out[e, channel] = (ink[channel] - beyond[channel]) / contrast
-                out[e, 3] += out[e, channel] * beyond[channel]
-            out[e, 4] = contrast
-    return out
+    xy: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    beyond: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+    sigma: float
+    noise: float
+    levels: Levels
+    information: Information
+    moved: float
 
 
-@compiled
-def _outward(a, b, c):  # type: ignore[no-untyped-def]
-    """Length of the edge a-b, its unit normal away from c, and the height of c over it."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    length = np.hypot(dx, dy)
-    nx, ny = dy / length, -dx / length
-    depth = (c[0] - a[0]) * nx + (c[1] - a[1]) * ny
-    if depth > 0.0:
-        return length, -nx, -ny, depth
-    return length, nx, ny, -depth
+class Refiner:
+    """Refines the markers of one layout; its buffers are kept from image to image, one set a thread."""
 
+    def __init__(self, mesh: Topology, preset: Preset) -> None:
+        self._mesh = mesh
+        self._steps = STEPS[preset]
+        self._kept = threading.local()
 
-@compiled
-def _sine(a, b, c):  # type: ignore[no-untyped-def]
-    """Sine of the angle at a between b and c, 1 where it is obtuse."""
-    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-    if ux * vx + uy * vy <= 0.0:
-        return 1.0
-    return max(abs(ux * vy - uy * vx) / (np.hypot(ux, uy) * np.hypot(vx, vy)), 0.05)
+    def __call__(self, image: NDArray[np.uint8], places: Places, noise: float) -> Refined:
+        """Solve all markers together.
 
+        Args:
+            image: (H, W, 3) uint8 BGR.
+            places: where the markers were found, to about a pixel.
+            noise: standard deviation of a channel, in grey levels; a first estimate.
 
-@compiled
-def _edge_blurs(image, xy, cells, levels, every):  # type: ignore[no-untyped-def]
-    """The blur seen across the middle of every n-th edge: the integral of f (1 - f) is sigma / sqrt(pi)."""
-    out = np.full(cells.shape[0] * 3 // every + 1, np.nan)
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    for e in range(0, cells.shape[0] * 3, every):
-        if levels[e, 4] == 0.0:
-            continue
-        i, k = e // 3, e % 3
-        a, b, c = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]], xy[cells[i, (k + 2) % 3]]
-        u0, u1, u2, zero = levels[e, :4]
-        _, nx, ny, depth = _outward(a, b, c)
-        reach = MAX_REACH * depth
-        step = reach / 8
-        total = 0.0
-        for t in range(3):
-            w = 0.4 + 0.1 * t
-            x, y = a[0] + w * (b[0] - a[0]), a[1] + w * (b[1] - a[1])
-            for m in range(-8, 9):
-                f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
-                total += f * (1.0 - f) * step / 3.0
-        out[e // every] = total * np.sqrt(np.pi)
-    return out
-
-
-@compiled
-def _measure(image, xy, cells, levels, sigma, noise, most):  # type: ignore[no-untyped-def]
-    """Per edge: its normal, and the sums of the weighted offsets of its stations.
-
-    At each station the matched filter of a blurred step tells how far the edge lies from where it is thought to be.
-    Columns: nx, ny, A00, A01, A11, B0, B1 with A the sums of weight * (1-t, t) (1-t, t)' and B of weight * (1-t, t) *
-    offset; the weight is the Fisher information A^2 / (2 sqrt(pi) s noise^2) of the station's length.
-    """
-    rows = np.zeros((cells.shape[0] * 3, 7))
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    kernel, step_profile = np.zeros(2 * SAMPLES + 1), np.zeros(2 * SAMPLES + 1)
-    for e in range(cells.shape[0] * 3):
-        if levels[e, 4] == 0.0:
-            continue
-        i, k = e // 3, e % 3
-        a, b, c = xy[cells[i, k]], xy[cells[i, (k + 1) % 3]], xy[cells[i, (k + 2) % 3]]
-        u0, u1, u2, zero, contrast = levels[e]
-        length, nx, ny, depth = _outward(a, b, c)
-        rows[e, 0], rows[e, 1] = nx, ny
-        # the sharper a corner, the longer the edge runs close to its neighbour
-        start = min(max(CLEAR_SIGMA * sigma / (length * _sine(a, b, c)), 0.15), 0.4)
-        end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * _sine(b, a, c)), 0.15), 0.4)
-        stations = min(max(int(length * (end - start)), 3), most)
-        reach = min(REACH_SIGMA * sigma, MAX_REACH * depth)
-        samples = min(max(int(np.ceil(reach)), 2), SAMPLES)
-        step = reach / samples
-        norm = 0.0
-        for m in range(-samples, samples + 1):
-            z = m * step / sigma
-            kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
-            step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
-            norm += kernel[m + samples] ** 2
-        information = (
-            contrast / (2 * np.sqrt(np.pi) * sigma * noise * noise) * length * (end - start) / stations
+        A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
+        """
+        mesh, height, width = self._mesh, image.shape[0], image.shape[1]
+        frame = Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
+        noise = max(noise, MIN_NOISE)
+        xy, beyond, maps = self._completed(places.xy_px)
+        levels = smooth_levels(
+            cell_means(image, NO_MODEL, xy, mesh.cells, USUAL_SIGMA_PX),
+            cell_means(image, NO_MODEL, xy, mesh.black, USUAL_SIGMA_PX),
+            xy,
+            mesh,
+            noise,
+            frame,
         )
-        for j in range(stations):
-            t = start + (end - start) * (j + 0.5) / stations
-            x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
-            product = 0.0
-            for m in range(-samples, samples + 1):
-                f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
-                product += kernel[m + samples] * (clamp(f, -0.3, 1.3) - step_profile[m + samples])
-            offset = product / norm
-            if not abs(offset) < max(1.0, 0.15 * length):
-                continue
-            rows[e, 2] += information * (1 - t) * (1 - t)
-            rows[e, 3] += information * (1 - t) * t
-            rows[e, 4] += information * t * t
-            rows[e, 5] += information * (1 - t) * offset
-            rows[e, 6] += information * t * offset
-    return rows
+        nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
+        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
+        for stations in self._steps.profiles:
+            fit = self._profile_step(image, fit, frame, stations)
+        if self._steps.synthesis:
+            fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
+        for _ in range(self._steps.synthesis):
+            fit = self._synthesis_step(image, fit, frame)
+            if fit.moved < self._steps.enough:
+                break
+        return self._result(fit, places)
+
+    def _completed(
+        self, xy: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+        """Markers, those just beyond the known ones put where they must be; and the map at each."""
+        mesh = self._mesh
+        maps = local_maps(xy, mesh.near, mesh.offset, mesh.stencil)
+        xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
+        return xy, beyond, maps
+
+    def _profile_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int) -> Fit:
+        mesh, levels = self._mesh, fit.levels
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
+        weights, room = unmixing(
+            lines, contrasts, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.black, *frame
+        )
+        sigma = fit.sigma
+        if sigma == 0.0:
+            blurs = profile_blurs(image, lines, weights, room, max(1, len(lines) // BLUR_EDGES))
+            seen = blurs[np.isfinite(blurs)]
+            sigma = max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
+        sums = read_profiles(image, lines, weights, room, sigma, stations)
+        use = (sums[:, AA] > 0).astype(np.float64)
+        fit = fit._replace(sigma=sigma)
+        shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
+        return self._moved(fit, shift, information)
+
+    def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
+        mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
+        box = _box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape)
+        model = self._buffer(image.shape)
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
+        clear(model, box)
+        draw_cells(
+            fit.xy,
+            mesh.cells,
+            mesh.cell_edges,
+            mesh.edges,
+            lines,
+            levels.cell,
+            levels.slope,
+            sigma,
+            box,
+            model,
+        )
+        bettered = self._level_step(image, model, fit, frame)
+        middles = 0.5 * (fit.xy[mesh.edges[:, 0]] + fit.xy[mesh.edges[:, 1]])
+        black = black_at(levels.black, middles, *frame)
+        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
+        side = self._side_changes(levels, bettered, middles, frame)
+        off = np.einsum("ec,ec->e", contrasts, side)
+        to_a, to_b = sums[:, A] - off * sums[:, SHARE_A], sums[:, B] - off * sums[:, SHARE_B]
+        use, noise = _trust(sums, to_a, to_b)
+        noise = float(noise) if np.isfinite(noise) else fit.noise
+        fit = fit._replace(noise=noise, levels=bettered)
+        shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
+        sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
+        return self._moved(fit._replace(sigma=sigma), shift, information)
+
+    def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
+        """The fit after a step; the deviations of ``moved`` are those with all other markers known."""
+        xx, xy, yy = information.diagonal.T
+        x, y = np.where(fit.beyond, 0.0, shift.T)
+        moved = float(np.sqrt(np.max(x * x * xx + 2 * x * y * xy + y * y * yy, initial=0.0)))
+        measured = fit.xy + shift
+        xy_px, beyond, maps = self._completed(np.where(_weak(information)[:, None], np.nan, measured))
+        return fit._replace(
+            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=moved
+        )
+
+    def _level_step(
+        self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
+    ) -> Levels:
+        """Levels corrected by what the drawing does not explain in the middle of the cells."""
+        mesh, levels = self._mesh, fit.levels
+        drawn = cell_means(image, model, fit.xy, mesh.cells, 0.0)
+        black = cell_means(image, model, fit.xy, mesh.black, 0.0)
+        drawn[:, :3] += levels.cell
+        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
+
+    def _blur_step(
+        self,
+        sums: NDArray[np.float64],
+        use: NDArray[np.float64],
+        contrasts: NDArray[np.float64],
+        lines: NDArray[np.float64],
+        fit: Fit,
+        sigma: float,
+    ) -> float:
+        """The blur, by how far the gridlines' pixels say that it is another, once the levels are bettered."""
+        mesh, levels = self._mesh, fit.levels
+        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
+        strength = np.maximum((contrasts * contrasts).sum(axis=1), 1e-9)
+        change = (contrasts * (now - contrasts)).sum(axis=1) / strength
+        curvature = use * sums[:, BLUR_CURVATURE]
+        total = curvature.sum()
+        if total <= 0:
+            return sigma
+        widen = ((use * sums[:, BLUR]).sum() + CONTRAST_TO_BLUR * sigma * (curvature * change).sum()) / total
+        return max(sigma + float(np.clip(widen, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
+
+    def _side_changes(
+        self, old: Levels, new: Levels, middles: NDArray[np.float64], frame: Frame
+    ) -> NDArray[np.float64]:
+        """(E, 3): the change of level of a gridline's two sides together."""
+        black = black_at(new.black - old.black, middles, *frame)
+        change = np.concatenate([new.cell - old.cell, np.zeros((1, 3))])
+        return np.asarray(np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1)))
+
+    def _solve(
+        self,
+        sums: NDArray[np.float64],
+        to_a: NDArray[np.float64],
+        to_b: NDArray[np.float64],
+        use: NDArray[np.float64],
+        lines: NDArray[np.float64],
+        contrasts: NDArray[np.float64],
+        overlapping: bool,
+        fit: Fit,
+    ) -> tuple[NDArray[np.float64], Information]:
+        """The shifts (M, 2) of all markers and the matrix that gave them.
+
+        At their ends gridlines overlap, unless they were read in their middles only.
+        """
+        mesh, count, variance = self._mesh, len(fit.xy), fit.noise**2
+        diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
+        use = use * lines[:, KNOWN]
+        prior = np.where(fit.beyond, PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
+        geometry = (lines, contrasts, mesh.edges, mesh.spokes, fit.sigma, variance, prior)
+        assemble(sums, use, overlapping, *geometry, diagonal, beside)
+        right = gradient(use * to_a / variance, use * to_b / variance, lines, mesh.edges, count)
+        return solve(diagonal, beside, mesh.edges, right), Information(diagonal, beside)
+
+    def _buffer(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        kept: Any = getattr(self._kept, "residual", None)
+        if kept is None or kept.shape != shape:
+            kept = self._kept.residual = np.zeros(shape, np.float32)
+        return kept  # type: ignore[no-any-return]
+
+    def _result(self, fit: Fit, places: Places) -> Refined:
+        mesh, information = self._mesh, fit.information
+        xy = fit.measured.copy()
+        cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
+        with np.errstate(invalid="ignore"):
+            near = np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px
+            sure = np.einsum("mii->m", cov) < (MAX_SHIFT * places.edge_px) ** 2
+        lost = ~(near & sure)
+        xy[lost] = np.nan
+        cov[lost] = np.nan
+        return Refined(xy_px=xy, cov_px2=cov, blur_px=fit.sigma, noise=fit.noise)
 
 
 @compiled
-def _multiply(rows, ends, vector, ridge, out):  # type: ignore[no-untyped-def]
-    """out = (information matrix + ridge) vector."""
-    for m in range(vector.shape[0]):
-        out[m, 0] = ridge[m] * vector[m, 0]
-        out[m, 1] = ridge[m] * vector[m, 1]
-    for e in range(rows.shape[0]):
-        if rows[e, 2] == 0.0:
+def _trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines whose pixels the pattern explains once they are moved, and the noise."""
+    count = sums.shape[0]
+    misfit, use = np.full(count, np.nan), np.zeros(count)
+    for e in range(count):
+        if sums[e, PIXELS] <= 8:
             continue
-        nx, ny, a, b = rows[e, 0], rows[e, 1], ends[e, 0], ends[e, 1]
-        at_a = nx * vector[a, 0] + ny * vector[a, 1]
-        at_b = nx * vector[b, 0] + ny * vector[b, 1]
-        to_a = rows[e, 2] * at_a + rows[e, 3] * at_b
-        to_b = rows[e, 3] * at_a + rows[e, 4] * at_b
-        out[a, 0] += nx * to_a
-        out[a, 1] += ny * to_a
-        out[b, 0] += nx * to_b
-        out[b, 1] += ny * to_b
+        aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
+        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
+        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
+        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (3 * sums[e, PIXELS] - 2)
+    usual = max(np.nanmedian(misfit), MIN_NOISE**2)
+    for e in range(count):
+        if np.isfinite(misfit[e]):
+            limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
+            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+    return use, np.sqrt(usual)
 
 
-@compiled
-def _blocks(rows, ends, count):  # type: ignore[no-untyped-def]
-    """(M, 3): xx, xy, yy of the diagonal blocks of the information matrix."""
-    block = np.zeros((count, 3))
-    for e in range(rows.shape[0]):
-        nx, ny = rows[e, 0], rows[e, 1]
-        for side in range(2):
-            m = ends[e, side]
-            weight = rows[e, 2 + 2 * side]
-            block[m, 0] += weight * nx * nx
-            block[m, 1] += weight * nx * ny
-            block[m, 2] += weight * ny * ny
-    return block
+def _weak(information: Information) -> NDArray[np.bool_]:
+    """(M,) markers that the image says far less about than about most, in one direction at least."""
+    xx, xy, yy = information.diagonal.T
+    least = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
+    shown = least > 4 * PRIOR_BEYOND_PX**-2
+    return np.asarray(least < WEAK * np.median(least[shown])) if shown.any() else ~shown
 
 
-@compiled
-def _solve(rows, ends, count, block):  # type: ignore[no-untyped-def]
-    """The shifts (M, 2) that fit all edges, by conjugate gradients preconditioned with the diagonal blocks."""
-    ridge = np.empty(count)
-    inverse = np.zeros((count, 3))
-    residual = np.zeros((count, 2))
-    for m in range(count):
-        ridge[m] = 1e-6 * (block[m, 0] + block[m, 2]) + 1e-12
-        xx, xy, yy = block[m, 0] + ridge[m], block[m, 1], block[m, 2] + ridge[m]
-        determinant = xx * yy - xy * xy
-        inverse[m, 0], inverse[m, 1], inverse[m, 2] = yy / determinant, -xy / determinant, xx / determinant
-    for e in range(rows.shape[0]):
-        for side in range(2):
-            m = ends[e, side]
-            residual[m, 0] += rows[e, 0] * rows[e, 5 + side]
-            residual[m, 1] += rows[e, 1] * rows[e, 5 + side]
-    shift = np.zeros((count, 2))
-    search = np.zeros((count, 2))
-    product = np.zeros((count, 2))
-    descent = np.empty((count, 2))
-    before, start = 1.0, 0.0
-    for step in range(MAX_STEPS):
-        now = 0.0
-        for m in range(count):
-            descent[m, 0] = inverse[m, 0] * residual[m, 0] + inverse[m, 1] * residual[m, 1]
-            descent[m, 1] = inverse[m, 1] * residual[m, 0] + inverse[m, 2] * residual[m, 1]
-            now += residual[m, 0] * descent[m, 0] + residual[m, 1] * descent[m, 1]
-        if step == 0:
-            start = now
-        if not now > 1e-8 * start:
-            break
-        blend = now / before if step > 0 else 0.0
-        search = descent + blend * search
-        _multiply(rows, ends, search, ridge, product)
-        length = now / (search * product).sum()
-        shift += length * search
-        residual -= length * product
-        before = now
-    return shift
-
-
-@compiled
-def _covariances(rows, ends, block):  # type: ignore[no-untyped-def]
-    """(M, 2, 2): the inverse of each marker's block once its neighbours are solved for (Schur complement)."""
-    count = block.shape[0]
-    reduced = block.copy()
-    for e in range(rows.shape[0]):
-        nx, ny = rows[e, 0], rows[e, 1]
-        for side in range(2):
-            m, other = ends[e, side], ends[e, 1 - side]
-            xx, xy, yy = block[other, 0], block[other, 1], block[other, 2]
-            determinant = xx * yy - xy * xy
-            if determinant <= 1e-12 * (xx + yy) ** 2:
-                continue
-            stiffness = (yy * nx * nx - 2 * xy * nx * ny + xx * ny * ny) / determinant
-            loss = rows[e, 3] * rows[e, 3] * stiffness
-            reduced[m, 0] -= loss * nx * nx
-            reduced[m, 1] -= loss * nx * ny
-            reduced[m, 2] -= loss * ny * ny
-    out = np.full((count, 2, 2), np.nan)
-    for m in range(count):
-        xx, xy, yy = reduced[m, 0], reduced[m, 1], reduced[m, 2]
-        determinant = xx * yy - xy * xy
-        if determinant > 1e-9 * (xx + yy) ** 2:
-            out[m, 0, 0] = yy / determinant
-            out[m, 0, 1] = -xy / determinant
-            out[m, 1, 0] = -xy / determinant
-            out[m, 1, 1] = xx / determinant
-    return out
-
-
-def refine(image: NDArray[np.uint8], places: Places, noise: float) -> Refined:
-    """Solve all markers together from the edges of the numbered colored cells.
-
-    Args:
-        image: (H, W, 3) uint8 BGR.
-        places: where the markers were found, to about a pixel.
-        noise: standard deviation of a channel, in grey levels.
-
-    A marker that its edges would move by more than ``MAX_SHIFT`` of an edge is lost.
-    """
-    cells, xy = places.cells, places.xy_px
-    levels = _levels(image, xy, cells)
-    blurs = _edge_blurs(image, xy, cells, levels, max(1, 3 * len(cells) // 200))
-    sigma = max(float(np.nanmedian(blurs)) if np.isfinite(blurs).any() else 1.0, 0.4)
-    ends = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
-    rows = np.zeros((len(ends), 7))
-    block = np.zeros((len(xy), 3))
-    for stations in ROUNDS:
-        rows = _measure(image, xy, cells, levels, sigma, max(noise, MIN_NOISE), stations)
-        block = _blocks(rows, ends, len(xy))
-        xy = xy + _solve(rows, ends, len(xy), block)
-    cov = _covariances(rows, ends, block)
-    with np.errstate(invalid="ignore"):
-        astray = ~(np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px)
-    lost = astray | np.isnan(cov[:, 0, 0])
-    xy[lost] = np.nan
-    cov[lost] = np.nan
-    return Refined(xy_px=xy, cov_px2=cov, blur_px=sigma)
+def _box(xy: NDArray[np.float64], margin: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """(4,) x from, y from, x to, y to: the pattern's part of the image."""
+    known = xy[np.isfinite(xy[:, 0])]
+    low, high = np.floor(known.min(axis=0) - margin), np.ceil(known.max(axis=0) + margin) + 1
+    size = np.array([shape[1], shape[0]])
+    return np.concatenate([np.clip(low, 0, size), np.clip(high, 0, size)]).astype(np.int64)

@@ -1,0 +1,159 @@
+"""The gridlines between the current markers: cubic curves through the smooth map that the markers define.
+
+Gridlines are straight in the layout and curved by the map to the image. At every marker the map's derivative is
+estimated from the two rings of neighbours; it gives the direction in which each gridline leaves. A cubic between the
+two markers with these directions is what a C1-smooth interpolation of the map (Clough-Tocher) draws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .algebra import cholesky_solve
+from .engine import compiled
+
+# columns of a gridline
+X, Y, UX, UY, LENGTH, LEAVE, ARRIVE, KNOWN = range(8)
+FIRST_RING = 6
+MAX_SLOPE = 0.5  # of a gridline against its chord; more is an error somewhere
+
+
+@compiled
+def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
+    """(M, 2, 5): derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2 at each marker; NaN where unknown.
+
+    Where both rings are whole, the first derivatives are those of a cubic (and the second 0: nothing asks for them);
+    elsewhere of a quadratic, bending held towards 0, and without bending where fewer than five neighbours are known.
+    """
+    count = xy.shape[0]
+    out = np.full((count, 2, 5), np.nan)
+    gram, right = np.empty((5, 5)), np.empty((2, 5))
+    for m in range(count):
+        if not np.isfinite(xy[m, 0]):
+            continue
+        whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
+        xu, xv, yu, yv = 0.0, 0.0, 0.0, 0.0
+        for k in range(near.shape[1]):
+            n = near[m, k]
+            if not whole or n < 0:
+                whole = False
+                break
+            dx, dy = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
+            u, v = stencil[m, 0, k], stencil[m, 1, k]
+            xu += u * dx
+            xv += v * dx
+            yu += u * dy
+            yv += v * dy
+        if whole and np.isfinite(xu):
+            out[m, :, 2:] = 0.0
+            out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
+        elif _quadratic(xy, m, near[m], offset[m], gram, right):
+            out[m] = right
+    return out
+
+
+@compiled
+def _quadratic(xy, m, near, offset, gram, right):  # type: ignore[no-untyped-def]
+    """Write the five derivatives at marker m into ``right``; False where its neighbours do not tell them."""
+    terms = np.empty(5)
+    gram[:] = 0.0
+    right[:] = 0.0
+    known = 0
+    for k in range(near.shape[0]):
+        n = near[k]
+        if n < 0 or not np.isfinite(xy[n, 0]):
+            continue
+        known += 1
+        x, y = offset[k]
+        weight = 1.0 / (x * x + y * y) ** 2
+        terms[0], terms[1], terms[2], terms[3], terms[4] = x, y, 0.5 * x * x, x * y, 0.5 * y * y
+        for i in range(5):
+            v = weight * terms[i]
+            for j in range(i + 1):
+                gram[i, j] += v * terms[j]
+            for axis in range(2):
+                right[axis, i] += v * (xy[n, axis] - xy[m, axis])
+    if known < 2 or gram[0, 0] * gram[1, 1] - gram[1, 0] ** 2 < 0.05 * gram[0, 0] * gram[1, 1]:
+        return False
+    for i in range(2, 5):
+        gram[i, i] += (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
+    cholesky_solve(gram, right, 5)
+    return True
+
+
+@compiled
+def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
+    """``xy`` with unknown markers beside known ones put where their neighbours' maps say; which ones, (M,) bool."""
+    out = xy.copy()
+    put = np.zeros(xy.shape[0], np.bool_)
+    for m in range(xy.shape[0]):
+        if np.isfinite(xy[m, 0]):
+            continue
+        x, y, count = 0.0, 0.0, 0
+        for k in range(FIRST_RING):
+            n = near[m, k]
+            if n < 0 or not np.isfinite(maps[n, 0, 0]):
+                continue
+            u, v = -offset[m, k, 0], -offset[m, k, 1]
+            x += xy[n, 0] + u * maps[n, 0, 0] + v * maps[n, 0, 1]
+            x += 0.5 * u * u * maps[n, 0, 2] + u * v * maps[n, 0, 3] + 0.5 * v * v * maps[n, 0, 4]
+            y += xy[n, 1] + u * maps[n, 1, 0] + v * maps[n, 1, 1]
+            y += 0.5 * u * u * maps[n, 1, 2] + u * v * maps[n, 1, 3] + 0.5 * v * v * maps[n, 1, 4]
+            count += 1
+        if count > 0:
+            out[m, 0], out[m, 1] = x / count, y / count
+            put[m] = True
+    return out, put
+
+
+@compiled
+def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
+    """(E, 8) per gridline: start, unit vector along its chord, length, slopes against the chord at both ends, known.
+
+    Slopes count towards (-uy, ux), per unit of length along the chord.
+    """
+    out = np.zeros((edges.shape[0], 8))
+    for e in range(edges.shape[0]):
+        a, b = edges[e]
+        dx, dy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
+        length = np.hypot(dx, dy)
+        if not length > 1.0:
+            continue
+        ux, uy = dx / length, dy / length
+        out[e, X], out[e, Y], out[e, UX], out[e, UY], out[e, LENGTH] = xy[a, 0], xy[a, 1], ux, uy, length
+        out[e, KNOWN] = 1.0
+        leave, arrive = np.nan, np.nan
+        for k in range(FIRST_RING):
+            if near[a, k] == b:
+                leave = _slope(maps[a], offset[a, k, 0], offset[a, k, 1], ux, uy)
+            if near[b, k] == a:
+                arrive = _slope(maps[b], -offset[b, k, 0], -offset[b, k, 1], ux, uy)
+        # where one end's direction is unknown the gridline is a parabola, where both are, straight
+        if not np.isfinite(arrive):
+            arrive = -leave
+        if not np.isfinite(leave):
+            leave = -arrive
+        if np.isfinite(leave):
+            out[e, LEAVE], out[e, ARRIVE] = leave, arrive
+    return out
+
+
+@compiled
+def _slope(derivatives, u, v, ux, uy):  # type: ignore[no-untyped-def]
+    tx = derivatives[0, 0] * u + derivatives[0, 1] * v
+    ty = derivatives[1, 0] * u + derivatives[1, 1] * v
+    along = tx * ux + ty * uy
+    slope = (ty * ux - tx * uy) / along
+    if not (along > 0.0 and abs(slope) < MAX_SLOPE):
+        return np.nan
+    return slope
+
+
+@compiled
+def bow(t, length, leave, arrive):  # type: ignore[no-untyped-def]
+    """How far the gridline lies off its chord at the fraction t; straight on beyond its ends."""
+    if t <= 0.0:
+        return length * leave * t
+    if t >= 1.0:
+        return length * arrive * (t - 1.0)
+    return length * t * (1.0 - t) * (leave * (1.0 - t) - arrive * t)

@@ -1,0 +1,285 @@
+"""The inks as they look in this image: a level for every cell, from itself and from the cells of its ink.
+
+A cell's own level is noisy, and half of its error would go into its gridlines. The light and the print vary smoothly
+from cell to cell as a rule: a low polynomial over the image, fitted robustly to each ink, is far less noisy. Every
+level is drawn towards it by as much as the cells' scatter about it is noise; where it is not (uneven print, hard
+shadows, a cell that fell out) the cell's own level stays.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .algebra import cholesky_solve
+from .engine import compiled
+from .topology import Topology
+
+INKS = 5  # red, green, blue, black, white
+BLACK, WHITE = 3, 4
+TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
+CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
+DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
+CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
+MIN_RADIUS_PX = 0.75
+ROUNDS = 2  # of the robust fit
+TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
+
+
+class Frame(NamedTuple):
+    """The image coordinates of the polynomials: (x - x) / scale, (y - y) / scale."""
+
+    x: float
+    y: float
+    scale: float
+
+
+class Levels(NamedTuple):
+    """Attributes:
+    cell: (K, 3) level of the drawn cells over the black beneath, at their centroids.
+    slope: (K, 3, 2) its change per px along x and y.
+    black: (3, 10) the black's polynomial.
+    strange: (K,) bool, cells whose ink is not that of their kind.
+    """
+
+    cell: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    black: NDArray[np.float64]
+    strange: NDArray[np.bool_]
+
+
+@compiled
+def monomials(x, y, out):  # type: ignore[no-untyped-def]
+    """Write the ten terms at (x, y)."""
+    out[0], out[1], out[2] = 1.0, x, y
+    out[3], out[4], out[5] = x * x, x * y, y * y
+    out[6], out[7], out[8], out[9] = x * x * x, x * x * y, x * y * y, y * y * y
+
+
+@compiled
+def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
+    """(K, 4): each cell's mean of image - model over the pixels about its centroid, and their number (0: none).
+
+    ``model`` may be empty; ``sigma`` is the blur.
+    """
+    bare = model.shape[0] == 0
+    seen, drawn = image.reshape(-1), model.reshape(-1)
+    one, two = np.uint64(1), np.uint64(2)
+    height, width = image.shape[0], image.shape[1]
+    out = np.zeros((cells.shape[0], 4))
+    for i in range(cells.shape[0]):
+        a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
+        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
+        if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
+            continue
+        area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+        around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
+        around += np.hypot(a[0] - c[0], a[1] - c[1])
+        inscribed = area / max(around, 1e-9)
+        radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
+        count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
+        for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
+            half = np.sqrt(max(radius * radius - (y - cy) ** 2, 0.0))
+            first, last = max(int(np.ceil(cx - half)), 0), min(int(cx + half), width - 1)
+            at = np.uint64((y * width + first) * 3)
+            for _ in range(first, last + 1):
+                s0 += seen[at]
+                s1 += seen[at + one]
+                s2 += seen[at + two]
+                if not bare:
+                    s0 -= drawn[at]
+                    s1 -= drawn[at + one]
+                    s2 -= drawn[at + two]
+                at += np.uint64(3)
+            count += max(last - first + 1, 0)
+        if count > 0:
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = s0 / count, s1 / count, s2 / count, count
+    return out
+
+
+@compiled
+def _fit(terms, values, weight, count):  # type: ignore[no-untyped-def]
+    """(3, 10): the weighted least squares polynomial with the first ``count`` terms, a little held towards 0."""
+    gram, right = np.zeros((count, count)), np.zeros((3, TERMS))
+    for i in range(terms.shape[0]):
+        w = weight[i]
+        if w == 0.0:
+            continue
+        for j in range(count):
+            v = w * terms[i, j]
+            for k in range(j + 1):
+                gram[j, k] += v * terms[i, k]
+            for channel in range(3):
+                right[channel, j] += v * values[i, channel]
+    if not gram[0, 0] > 0.0:
+        return np.zeros((3, TERMS))
+    for j in range(1, count):
+        gram[j, j] += 1e-6 * gram[0, 0]
+    cholesky_solve(gram, right, count)
+    return right
+
+
+@compiled
+def _misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
+    """Mean squared distance of each cell's level from the polynomial."""
+    for i in range(terms.shape[0]):
+        out[i] = 0.0
+        for channel in range(3):
+            rest = values[i, channel]
+            for k in range(TERMS):
+                rest -= terms[i, k] * field[channel, k]
+            out[i] += rest * rest / 3.0
+
+
+@compiled
+def _field(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
+    """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange.
+
+    The fourth column of ``values`` is the number of pixels.
+    """
+    n = terms.shape[0]
+    weight, misfit = np.empty(n), np.zeros(n)
+    for i in range(n):
+        weight[i] = values[i, 3] / (1.0 + 0.1 * values[i, 3])
+    start = weight.copy()
+    field = _fit(terms, values, weight, count)
+    spread = 0.0
+    for _ in range(rounds):
+        _misfits(terms, values, field, misfit)
+        # 0.79 is the median of a chi-square of 3 degrees over 3
+        spread = np.median(misfit) / 0.79
+        for i in range(n):
+            weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * spread + 1e-9)) ** 2
+        field = _fit(terms, values, weight, count)
+    _misfits(terms, values, field, misfit)
+    spread = np.median(misfit) / 0.79
+    expected = noise * noise / np.median(values[:, 3])
+    strange = np.zeros(n, np.bool_)
+    for i in range(n):
+        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / values[i, 3]) + 4.0
+    return field, max(spread * n / max(n - count, 1) - 1.15 * expected, 0.0), strange
+
+
+@compiled
+def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
+    """Fill in the cells' levels over black and their slopes."""
+    terms = np.empty(TERMS)
+    for i in range(own.shape[0]):
+        x, y = place[i]
+        monomials(x, y, terms)
+        c = color[i]
+        known = own[i, 3] > 0.0
+        keep = 0.0
+        if known:
+            keep = 1.0 if strange[i] else spreads[c] / (spreads[c] + noise * noise / own[i, 3])
+        for channel in range(3):
+            f, b = fields[c, channel], fields[BLACK, channel]
+            level, below = 0.0, 0.0
+            for k in range(TERMS):
+                level += terms[k] * f[k]
+                below += terms[k] * b[k]
+            if known:
+                level += keep * (own[i, channel] - level)
+            cell[i, channel] = level - below
+            for axis in range(2):
+                d = 0.0
+                if not strange[i]:
+                    d = f[1 + axis] - b[1 + axis]
+                    if axis == 0:
+                        d += 2 * x * (f[3] - b[3]) + y * (f[4] - b[4]) + 3 * x * x * (f[6] - b[6])
+                        d += 2 * x * y * (f[7] - b[7]) + y * y * (f[8] - b[8])
+                    else:
+                        d += x * (f[4] - b[4]) + 2 * y * (f[5] - b[5]) + x * x * (f[7] - b[7])
+                        d += 2 * x * y * (f[8] - b[8]) + 3 * y * y * (f[9] - b[9])
+                slope[i, channel, axis] = d / scale
+
+
+@compiled
+def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
+    """Terms (n, 10), values (n, 4) and numbers (n,) of an ink's cells that can be seen."""
+    n = 0
+    for i in range(values.shape[0]):
+        if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
+            n += 1
+    terms, own, number = np.empty((n, TERMS)), np.empty((n, 4)), np.empty(n, np.int64)
+    n = 0
+    for i in range(values.shape[0]):
+        if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
+            monomials(place[i, 0], place[i, 1], terms[n])
+            own[n], number[n] = values[i], i
+            n += 1
+    return terms, own, number
+
+
+@compiled
+def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
+    out = np.empty((cells.shape[0], 2))
+    for i in range(cells.shape[0]):
+        a, b, c = cells[i]
+        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - x0) / scale
+        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - y0) / scale
+    return out
+
+
+@compiled
+def _smooth(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """Everything of ``smooth_levels``."""
+    fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
+    strange = np.zeros(drawn.shape[0], np.bool_)
+    place, place_black = _places(xy, cells, x0, y0, scale), _places(xy, black_cells, x0, y0, scale)
+    for ink in range(INKS):
+        if ink == BLACK:
+            terms, own, number = _gather(black, place_black, color, ink)
+        else:
+            terms, own, number = _gather(drawn, place, color, ink)
+        n = number.shape[0]
+        if n == 0:
+            continue
+        count = 1
+        for k in range(len(CELLS_FOR_TERMS)):
+            if n >= CELLS_FOR_TERMS[k][0]:
+                count = CELLS_FOR_TERMS[k][1]
+                break
+        field, spread, odd = _field(terms, own, noise, count, ROUNDS)
+        fields[ink], spreads[ink] = field, spread
+        if ink == WHITE:  # alone of its kind
+            spreads[ink] = 1e9
+        if ink != BLACK:
+            for i in range(n):
+                strange[number[i]] = odd[i]
+    cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
+    _shrunk(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
+    return cell, slope, fields[BLACK], strange
+
+
+def smooth_levels(
+    drawn: NDArray[np.float64],
+    black: NDArray[np.float64],
+    xy: NDArray[np.float64],
+    mesh: Topology,
+    noise: float,
+    frame: Frame,
+) -> Levels:
+    """Levels from the cells' own ones.
+
+    Args:
+        drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
+        black: (B, 4) the same for the black cells.
+        xy: (M, 2) the markers, NaN where unknown.
+        noise: grey levels.
+    """
+    return Levels(*_smooth(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
+
+
+@compiled
+def black_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """(K, 3): the black's polynomial at the points (K, 2) px."""
+    out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
+    for i in range(xy.shape[0]):
+        monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
+        for channel in range(3):
+            for k in range(TERMS):
+                out[i, channel] += terms[k] * black[channel, k]
+    return out

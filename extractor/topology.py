@@ -1,0 +1,111 @@
+"""What refinement needs of a layout: which gridlines, cells and neighbours belong to each other. Made once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .reference import BLACK, Reference
+
+NEIGHBOURS = 6  # around a marker at most
+NEAR = 18  # in its two rings at most
+MONOMIALS = 9  # of a cubic without its constant, in two variables
+
+
+class Topology(NamedTuple):
+    """Indices only; -1 stands for none. K cells are drawn, colored ones and the white; B are black.
+
+    Attributes:
+        edges: (E, 2) int32 marker ids, the smaller first.
+        cells: (K, 3) int32 marker ids of the drawn cells.
+        cell_color: (K,) int32, red 0, green 1, blue 2, white 4.
+        cell_edges: (K, 3) int32, edge k runs between the corners k and k + 1.
+        black: (B, 3) int32 marker ids of the black cells.
+        edge_cells: (E, 2) int32, the drawn cells on an edge's two sides, in no order.
+        spokes: (M, 6) int32, the edges that end at a marker.
+        near: (M, 18) int32, the markers of its two rings.
+        offset: (M, 18, 2) float64, their places relative to it in the layout, in units of the mean edge, y up.
+        stencil: (M, 2, 18) float64: weights that give the map's derivatives from the differences to these markers
+            (a cubic's least squares), where all 18 are there; else 0.
+    """
+
+    edges: NDArray[np.int32]
+    cells: NDArray[np.int32]
+    cell_color: NDArray[np.int32]
+    cell_edges: NDArray[np.int32]
+    black: NDArray[np.int32]
+    edge_cells: NDArray[np.int32]
+    spokes: NDArray[np.int32]
+    near: NDArray[np.int32]
+    offset: NDArray[np.float64]
+    stencil: NDArray[np.float64]
+
+
+def topology_of(layout: Reference) -> Topology:
+    """The topology of a triangular layout."""
+    count, edges = len(layout.layer), layout.edges.astype(np.int64)
+    drawn = layout.cell_color != BLACK
+    cells = layout.cell_corners[drawn].astype(np.int64)
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2)
+    key = edges[:, 0] * count + edges[:, 1]
+    cell_edges = np.searchsorted(key, sides.min(axis=2) * count + sides.max(axis=2))
+    edge_cells = _grouped(cell_edges.ravel(), np.repeat(np.arange(len(cells)), 3), len(edges), 2)
+    ends = edges.ravel(order="F")
+    spokes = _grouped(ends, np.tile(np.arange(len(edges)), 2), count, NEIGHBOURS)
+    ring = _grouped(ends, edges[:, ::-1].ravel(order="F"), count, NEIGHBOURS)
+    near = _two_rings(ring)
+    xy = layout.xy_mm
+    length = np.linalg.norm(xy[edges[:, 1]] - xy[edges[:, 0]], axis=1)
+    offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
+    return Topology(
+        edges=layout.edges.astype(np.int32),
+        cells=cells.astype(np.int32),
+        cell_color=layout.cell_color[drawn].astype(np.int32),
+        cell_edges=cell_edges.astype(np.int32),
+        black=layout.cell_corners[~drawn].astype(np.int32).reshape(-1, 3),
+        edge_cells=edge_cells,
+        spokes=spokes,
+        near=near,
+        offset=offset,
+        stencil=_stencil(near, offset),
+    )
+
+
+def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most: int) -> NDArray[np.int32]:
+    """(count, most) int32: the items of each owner, filled up with -1."""
+    order = np.argsort(owner, kind="stable")
+    owner, item = owner[order], item[order]
+    place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    out = np.full((count, most), -1, np.int32)
+    out[owner, place] = item
+    return out
+
+
+def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(M, 18): the neighbours, then the neighbours' neighbours, each once."""
+    count = len(ring)
+    second = np.where(ring[:, :, None] >= 0, ring[ring], -1).reshape(count, -1)
+    both = np.concatenate([ring, second], axis=1)
+    both[both == np.arange(count)[:, None]] = -1
+    order = np.argsort(both, axis=1, kind="stable")
+    ordered = np.take_along_axis(both, order, axis=1)
+    again = np.zeros(both.shape, np.bool_)
+    again[:, 1:] = ordered[:, 1:] == ordered[:, :-1]
+    np.put_along_axis(both, order, np.where(again, -1, ordered), axis=1)
+    front = np.argsort(both < 0, axis=1, kind="stable")
+    return np.ascontiguousarray(np.take_along_axis(both, front, axis=1)[:, :NEAR].astype(np.int32))
+
+
+def _stencil(near: NDArray[np.int32], offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    x, y = offset[..., 0], offset[..., 1]
+    terms = np.stack([x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
+    out = np.zeros((len(near), 2, NEAR))
+    full = (near >= 0).all(axis=1)
+    terms = terms[full]
+    gram = np.swapaxes(terms, 1, 2) @ terms
+    sound = np.linalg.cond(gram) < 1e8 if len(gram) else np.empty(0, np.bool_)
+    solved = np.linalg.solve(gram[sound], np.swapaxes(terms[sound], 1, 2))[:, :2]
+    out[np.flatnonzero(full)[sound]] = solved
+    return out

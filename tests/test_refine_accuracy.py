@@ -1,0 +1,117 @@
+"""Refinement against the exact bound of its scene: error, bias and covariance, flat and bent, sharp and blurred."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cmpdesign.scene import Optics, Scene, Sensor, render, standard_layout, standard_scene
+from cmpdesign.scene.bound import cramer_rao
+from cmpdesign.scene.camera import Camera
+from cmpdesign.scene.exact_bound import exact_bound
+from cmpdesign.scene.light import Light
+from cmpdesign.scene.surface import Press, Twist, composed
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, parse_layout
+
+SIZE = (300, 260)
+LAYERS = 5
+SEEDS = 3
+
+
+@cache
+def extractor(preset: str, pattern: str = "honeycomb") -> Extractor:
+    layout = standard_layout(pattern, LAYERS)
+    return Extractor(parse_layout(layout_to_json(layout)), preset=preset)  # type: ignore[arg-type]
+
+
+def scene(pattern: str = "honeycomb", bent: str = "", blur: float = 1.0) -> Scene:
+    surface = {
+        "bulge": composed(Press(radius_mm=5.0, depth_mm=1.2)),
+        "twist": composed(Twist(radius_mm=5.0, angle_deg=8.0)),
+    }.get(bent)
+    plain = standard_scene(standard_layout(pattern, LAYERS))
+    return replace(plain, surface=surface, optics=Optics(blur))
+
+
+@cache
+def rms_bound(pattern: str, bent: str, blur: float) -> float:
+    layer = standard_layout(pattern, LAYERS).marker_layer
+    covariance = exact_bound(scene(pattern, bent, blur), size=SIZE)[layer < LAYERS]
+    return float(np.sqrt(np.einsum("mii->m", covariance).mean() / 2))
+
+
+def measured(wanted: Scene, preset: str, pattern: str = "honeycomb") -> tuple[np.ndarray, np.ndarray]:
+    """Errors (S, M, 2) and covariances (S, M, 2, 2) of the inner markers."""
+    inner = wanted.layout.marker_layer < LAYERS
+    errors, covariances = [], []
+    for seed in range(SEEDS):
+        seen = render(replace(wanted, seed=seed), size=SIZE)
+        markers = extractor(preset, pattern).extract(seen.image)
+        errors.append((markers.xy_px - seen.truth.marker_xy_px)[inner])
+        covariances.append(markers.cov_px2[inner])
+    return np.array(errors), np.array(covariances)
+
+
+CASES = [
+    ("honeycomb", "", 1.0),
+    ("honeycomb", "", 0.6),
+    ("honeycomb", "", 2.0),
+    ("honeycomb", "bulge", 1.0),
+    ("honeycomb", "twist", 1.0),
+    ("round", "", 1.0),
+]
+
+
+@pytest.mark.parametrize(("preset", "limit"), [("fast", 1.5), ("balanced", 1.25), ("accurate", 1.1)])
+@pytest.mark.parametrize(("pattern", "bent", "blur"), CASES)
+def test_the_error_is_near_the_exact_bound(
+    preset: str, limit: float, pattern: str, bent: str, blur: float
+) -> None:
+    if preset == "fast" and blur > 1.5:
+        limit = 3.0  # profiles keep off the corners, and blur makes those wide
+    error, covariance = measured(scene(pattern, bent, blur), preset, pattern)
+    assert np.isfinite(error).all()
+    assert np.sqrt(np.mean(error**2)) < limit * rms_bound(pattern, bent, blur)
+    if preset != "fast":
+        normalised = np.einsum("smi,smij,smj->sm", error, np.linalg.inv(covariance), error)
+        assert 0.87 < np.sqrt(normalised.mean() / 2) < 1.13
+
+
+def test_without_noise_there_is_no_bias() -> None:
+    seen = render(replace(scene(), sensor=None), size=SIZE)
+    error = extractor("accurate").extract(seen.image).xy_px - seen.truth.marker_xy_px
+    assert np.sqrt(np.mean(error**2)) < 0.002
+    assert abs(error.mean(axis=0)).max() < 0.0005
+
+
+def test_uneven_light_does_not_pull_the_markers() -> None:
+    lit = replace(scene(), light=Light(gradient=(0.35, -0.2), vignetting=0.2))
+    error, _ = measured(lit, "balanced")
+    assert np.sqrt(np.mean(error**2)) < 1.8 * rms_bound("honeycomb", "", 1.0)
+
+
+def test_a_view_of_a_part_keeps_its_markers() -> None:
+    """Cells that the image's border cuts are drawn too, so they do not pull the markers beside them."""
+    wanted = scene()
+    seen = render(wanted, size=(120, 110))
+    markers = extractor("accurate").extract(seen.image)
+    error = np.linalg.norm(markers.xy_px - seen.truth.marker_xy_px, axis=1)
+    deep = np.all((seen.truth.marker_xy_px > 24) & (seen.truth.marker_xy_px < [95, 85]), axis=1)
+    assert deep.sum() > 10 and np.isfinite(error[deep]).all() and error[deep].max() < 0.1
+
+
+@pytest.mark.parametrize("pitch", [16.0, 20.0, 48.0])
+def test_the_exact_bound_meets_the_closed_form_for_long_gridlines(pitch: float) -> None:
+    """Gridlines share pixels at their ends only: the longer they are, the less that matters."""
+    wanted = replace(
+        scene(), layout=standard_layout(layers=2), camera=Camera(pitch_px=pitch), sensor=Sensor(noise=2.0)
+    )
+    exact, closed = (
+        np.einsum("mii->m", f(wanted, size=(320, 300))).mean() for f in (exact_bound, cramer_rao)
+    )
+    expected = {16.0: 1.087, 20.0: 1.062, 48.0: 1.019}[pitch]
+    assert np.sqrt(exact / closed) == pytest.approx(expected, abs=0.005)
