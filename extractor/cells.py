@@ -49,9 +49,8 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     center = (seeds.center + 0.5) * scale - 0.5
     center[triangles.region] = triangles.corner_px.mean(axis=1)
     area = seeds.area_px.astype(np.float64)
-    if len(center) > NEIGHBOURS:
+    keep = np.ones(len(center), np.bool_)
+    if len(center) > NEIGHBOURS and area.min() < MIN_AREA_SHARE * area.max():
         _, near = cKDTree(center).query(center, NEIGHBOURS)
         keep = area >= MIN_AREA_SHARE * np.sort(area[near], axis=1)[:, NEIGHBOURS // 2]
-    else:
-        keep = np.ones(len(center), np.bool_)
     return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])

@@ -103,20 +103,17 @@ def _label(hsv, chroma, ink_of_hue, threshold, tile, target, shrink):  # type: i
     """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
     height, width = chroma.shape
     label = np.zeros((height, width), np.uint8)
-    limit = np.empty((4, width), np.uint8)
     for y in range(height):
-        if y % tile == 0 or y % shrink == 0:
-            for x in range(width):
-                limit[0, x] = 255
-                for ink in range(3):
-                    inside = target[y // shrink, x // shrink] != 0
-                    limit[ink + 1, x] = threshold[ink, y // tile, x // tile] if inside else 255
         row, colors, out = chroma[y], hsv[y], label[y]
-        for x in range(width):
-            if row[x] >= MIN_CHROMA:
-                ink = ink_of_hue[colors[x, 0]]
-                if row[x] > limit[ink, x]:
-                    out[x] = ink
+        for start in range(0, width, shrink):
+            if target[y // shrink, start // shrink] == 0:
+                continue
+            limit = threshold[:, y // tile, start // tile]
+            for x in range(start, min(start + shrink, width)):
+                if row[x] >= MIN_CHROMA:
+                    ink = ink_of_hue[colors[x, 0]]
+                    if ink > 0 and row[x] > limit[ink - 1]:
+                        out[x] = ink
     return label
 
 
@@ -163,7 +160,8 @@ def find_target(colors: Colors) -> Target:
     pattern's rim while its black cells stay dry.
     """
     chroma = _tile_chroma(colors.chroma, SHRINK)
-    threshold = max(MIN_CHROMA, 0.15 * float(np.percentile(chroma, 95)))
+    strong = np.sort(chroma, axis=None)[int(0.95 * (chroma.size - 1))]
+    threshold = max(MIN_CHROMA, 0.15 * float(strong))
     dry = cv2.morphologyEx((chroma > threshold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     water = cv2.copyMakeBorder(dry, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cv2.floodFill(water, None, (0, 0), 2)
@@ -210,6 +208,11 @@ def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) ->
     return (nominal_deg + shift) % 360 if found else None
 
 
+def _upper_quartile(values: NDArray[np.float32]) -> float:
+    """The value that a quarter of them exceeds; 0 of none."""
+    return float(np.sort(values)[3 * len(values) // 4]) if len(values) else 0.0
+
+
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
     """Stage 2: label every pixel of the target area with its ink; None when one of the three inks is absent."""
     hsv, chroma = colors.hsv, colors.chroma
@@ -221,7 +224,7 @@ def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) ->
     ink_of_hue = np.where(away.min(axis=1) < 60, away.argmin(axis=1) + 1, 0).astype(np.uint8)
     tile = max(TILE_PX, min(chroma.shape) // 12 // SHRINK * SHRINK)
     level = _tile_levels(hsv, chroma, ink_of_hue, tile, step)
-    typical = np.array([np.percentile(v[v > 0], 75) if np.any(v > 0) else 0.0 for v in level])
+    typical = np.array([_upper_quartile(v[v > 0]) for v in level])
     threshold = np.empty(level.shape, np.uint8)
     for ink in range(3):
         spread = cv2.blur(cv2.dilate(level[ink], np.ones((3, 3), np.uint8)), (3, 3))

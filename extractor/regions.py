@@ -211,18 +211,20 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
+        m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(end):
             x, y = float(queue[i, 0] - sx), float(queue[i, 1] - sy)
-            moments[region, 0] += 1.0
-            moments[region, 1] += x
-            moments[region, 2] += y
-            moments[region, 3] += x * x
-            moments[region, 4] += x * y
-            moments[region, 5] += y * y
-            moments[region, 6] += x * x * x
-            moments[region, 7] += x * x * y
-            moments[region, 8] += x * y * y
-            moments[region, 9] += y * y * y
+            xx, xy, yy = x * x, x * y, y * y
+            m1 += x
+            m2 += y
+            m3 += xx
+            m4 += xy
+            m5 += yy
+            m6 += xx * x
+            m7 += xx * y
+            m8 += x * yy
+            m9 += yy * y
+        moments[region] = (float(end), m1, m2, m3, m4, m5, m6, m7, m8, m9)
     return owner, moments
 
 
