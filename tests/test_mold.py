@@ -267,9 +267,10 @@ def test_the_same_bytes_in_another_process() -> None:
     assert runs[0] == runs[1] and runs[0].count(".step") == 14
     design = load_design("honeycomb", {"layers": "2"})
     files = make.make_mold(design, build_layout(design)).files
-    here = "".join(
-        f"{name} {hashlib.sha256(bytes(content)).hexdigest()}\n" for name, content in files.items()
-    )  # type: ignore[arg-type]
+    here = ""
+    for name, content in files.items():
+        assert isinstance(content, bytes)
+        here += f"{name} {hashlib.sha256(content).hexdigest()}\n"
     assert here == runs[0]
 
 

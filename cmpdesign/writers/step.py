@@ -152,9 +152,13 @@ def _canonical(data: bytes, name: str) -> bytes:
     numbers: dict[str, int] = {}
 
     def renumbered(match: re.Match[str]) -> str:
-        return f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{numbers.setdefault(match[1], len(numbers) + 1)}'"
+        # The counter's digits move the line's break, too.
+        name, rest = match[2], re.sub(r"\n *", "", match[3])
+        number = numbers.setdefault(match[1], len(numbers) + 1)
+        return f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}',{name}{rest};\n"
 
-    body = re.sub(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)'", renumbered, body)
+    usage = r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)',\s*('[^']*')(.*?);\n"
+    body = re.sub(usage, renumbered, body, flags=re.DOTALL)
     return (head + mark + _styles_in_order(body)).encode("utf-8")
 
 
