@@ -13,6 +13,7 @@ from .lattice import layer_of, marker_id
 RING = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
 )
+INNER = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING])
 TERMS = 6  # 1, x, y, x^2, xy, y^2 in units of the local edge
 MIN_QUADRATIC = 9  # neighbours for the quadratic; fewer get the linear map
 MIN_LINEAR = 4

@@ -50,6 +50,9 @@ PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
+UNEXPLAINED = (
+    25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
+)
 WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
 MAX_WIDEN = 0.3  # of the blur, in one step
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
@@ -141,13 +144,14 @@ class Refiner:
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
         for stations in self._steps.profiles:
             fit = self._profile_step(image, fit, frame, stations)
+        start = fit
         if self._steps.synthesis:
             fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
         for _ in range(self._steps.synthesis):
             fit = self._synthesis_step(image, fit, frame)
             if fit.moved < self._steps.enough:
                 break
-        return self._result(fit, places)
+        return self._result(fit, start, places)
 
     def _completed(
         self, xy: NDArray[np.float64]
@@ -289,7 +293,17 @@ class Refiner:
             kept = self._kept.residual = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def _result(self, fit: Fit, places: Places) -> Refined:
+    def _result(self, fit: Fit, start: Fit, places: Places) -> Refined:
+        """What is sure; where the drawing does not explain the image, as in glare, what the profiles had said."""
+        xy, cov = self._sure(fit, places)
+        lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
+        if lost.any() and start is not fit:
+            profiled, wide = self._sure(start, places)
+            xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
+        return Refined(xy_px=xy, cov_px2=cov, blur_px=fit.sigma, noise=fit.noise)
+
+    def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
@@ -299,7 +313,7 @@ class Refiner:
         lost = ~(near & sure)
         xy[lost] = np.nan
         cov[lost] = np.nan
-        return Refined(xy_px=xy, cov_px2=cov, blur_px=fit.sigma, noise=fit.noise)
+        return xy, cov
 
 
 @compiled

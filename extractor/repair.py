@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .neighbourhood import predict
+from .neighbourhood import INNER, predict
 from .tables import Lattice
 from .types import Status
 
@@ -109,12 +109,14 @@ def _by_neighbours(
     xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(M, 2) places by the two rings around each lost marker, and their (M,) sigma; infinite where not safe."""
-    place, variance, leverage, support = predict(
-        xy, np.isnan(xy[:, 0]), lattice.marker_mm, lattice.neighbours
-    )
+    lost = np.isnan(xy[:, 0])
+    place, variance, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
+    nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
     safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE)
     with np.errstate(invalid="ignore"):
-        sigma = np.sqrt(variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2)
+        # where the inner ring alone says something else, the surface is too bent for either to be believed
+        doubt = ((place - nearer) ** 2).sum(axis=1) / 4
+        sigma = np.sqrt(variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt)
     return place, np.where(safe & np.isfinite(sigma), sigma, np.inf)
 
 
