@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
+
+from pydantic import BaseModel
 
 from cmpdesign.design import Design, Palette, design_schema
 from cmpdesign.patterns import patterns
@@ -13,21 +16,41 @@ BEGIN, END = "<!-- {}: written by python -m docs.figures -->", "<!-- end of {} -
 
 def filled(text: str) -> str:
     """The page with its tables written anew."""
-    for name, table in (("fields", fields()), ("palette", palette()), ("units", units())):
+    written = {"fields": fields(), "palette": palette(), "units": units()}
+    written |= {name: table(model) for name, model in tables().items()}
+    for name, lines in written.items():
         begin, end = BEGIN.format(name), END.format(name)
         before, _, rest = text.partition(begin)
         _, found, after = rest.partition(end)
         if not found:
             raise ValueError(f"docs/design-files.md has no place for the table of {name}")
-        text = f"{before}{begin}\n\n{table}\n{end}{after}"
+        text = f"{before}{begin}\n\n{lines}\n{end}{after}"
     return text
 
 
 def fields() -> str:
     """Every field of a design: what it takes, its default, what it means."""
+    return _rows(Design, design_schema()["properties"])
+
+
+def tables() -> dict[str, type[BaseModel]]:
+    """The tables of a design, but for the palette, which has a shorter one: name -> model."""
+    found = {name: field.annotation for name, field in Design.model_fields.items()}
+    return {
+        name: model
+        for name, model in found.items()
+        if isinstance(model, type) and issubclass(model, BaseModel) and model is not Palette
+    }
+
+
+def table(model: type[BaseModel]) -> str:
+    """Every field of a table of a design, as ``fields`` shows those of the design itself."""
+    return _rows(model, model.model_json_schema()["properties"])
+
+
+def _rows(model: type[BaseModel], properties: dict[str, Any]) -> str:
     rows = ["| field | takes | default | meaning |", "|---|---|---|---|"]
-    properties = design_schema()["properties"]
-    for name, field in Design.model_fields.items():
+    for name, field in model.model_fields.items():
         default = (
             "required" if field.is_required() else _default(field.get_default(call_default_factory=True))
         )
@@ -50,7 +73,7 @@ def units() -> str:
 
 
 def _default(value: Any) -> str:
-    if isinstance(value, Palette):
+    if isinstance(value, BaseModel):
         return "below"
     if value is None:
         return "none"
@@ -65,7 +88,7 @@ def _default(value: Any) -> str:
 
 
 def _takes(name: str, schema: dict[str, Any]) -> str:
-    if name == "palette":
+    if "$ref" in schema:
         return "a table"
     if name == "pattern":
         return ", ".join(f'`"{pattern}"`' for pattern in patterns())
@@ -77,7 +100,7 @@ def _takes(name: str, schema: dict[str, Any]) -> str:
 
 def _kind(name: str, schema: dict[str, Any]) -> str:
     if "enum" in schema:
-        return ", ".join(f'`"{choice}"`' for choice in schema["enum"])
+        return ", ".join(f"`{json.dumps(choice)}`" for choice in schema["enum"])
     if name.endswith(("_mm", "_deg")):
         return "a length" if name.endswith("_mm") else "an angle"
     kind = {"boolean": "true or false", "integer": "an integer", "number": "a number", "string": "a text"}
