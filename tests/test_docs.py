@@ -229,6 +229,10 @@ def test_everything_registered_is_in_the_gallery(drawn: dict[str, bytes]) -> Non
 def test_every_field_of_a_design_is_documented() -> None:
     named = re.findall(r"^\| `(\w+)` \|", fields.fields(), flags=re.MULTILINE)
     assert named == list(Design.model_fields)
+    page = (ROOT / "docs" / "design-files.md").read_text(encoding="utf-8")
+    for name, model in fields.tables().items():
+        named = re.findall(r"^\| `(\w+)` \|", fields.table(model), flags=re.MULTILINE)
+        assert named == list(model.model_fields) and f"\n### {name}\n" in page
 
 
 @pytest.mark.parametrize(
