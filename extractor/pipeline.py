@@ -136,9 +136,7 @@ class Extractor:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
         size = (bgr.shape[1], bgr.shape[0])
         refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
-        repaired = stages.done(
-            "repair", repair(refined.xy_px, refined.cov_px2, places.edge_px, self._lattice, size)
-        )
+        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, size))
         virtual, virtual_status = stages.done(
             "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
         )

@@ -84,12 +84,15 @@ class Refined:
     Attributes:
         xy_px: (M, 2) float64, NaN where nothing was measured.
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
+        explained: (M,) bool, the drawn pattern explains the image around the marker; where not, its place is from
+            profiles alone, and something lies on it.
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
     """
 
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
+    explained: NDArray[np.bool_]
     blur_px: float
     noise: float
 
@@ -300,7 +303,7 @@ class Refiner:
         if lost.any() and start is not fit:
             profiled, wide = self._sure(start, places)
             xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
-        return Refined(xy_px=xy, cov_px2=cov, blur_px=fit.sigma, noise=fit.noise)
+        return Refined(xy_px=xy, cov_px2=cov, explained=~lost, blur_px=fit.sigma, noise=fit.noise)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .neighbourhood import INNER, predict
+from .refine import Refined
 from .tables import Lattice
 from .types import Status
 
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
+MAX_UNEXPLAINED = 0.08  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
@@ -37,23 +39,19 @@ class Repaired:
 
 
 def repair(
-    xy_px: NDArray[np.float64],
-    cov_px2: NDArray[np.float64],
-    edge_px: NDArray[np.float64],
-    lattice: Lattice,
-    size: tuple[int, int],
+    refined: Refined, edge_px: NDArray[np.float64], lattice: Lattice, size: tuple[int, int]
 ) -> Repaired:
     """Drop what contradicts its neighbours and repair what they imply.
 
     Args:
-        xy_px, cov_px2: (M, 2), (M, 2, 2) as measured, NaN where lost.
+        refined: the markers as measured.
         edge_px: (M,) the edges at each marker, NaN where unknown.
         size: width and height of the image; nothing is reported outside.
     """
-    xy, cov = xy_px.copy(), cov_px2.copy()
+    xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
-    _drop_outliers(xy, cov, edge_px, lattice)
+    _drop_outliers(xy, cov, edge_px, refined.explained, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
@@ -76,9 +74,16 @@ def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]
 
 
 def _drop_outliers(
-    xy: NDArray[np.float64], cov: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    edge: NDArray[np.float64],
+    explained: NDArray[np.bool_],
+    lattice: Lattice,
 ) -> None:
-    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot."""
+    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
+
+    What the drawing does not explain must lie nearer, and have neighbours that say so.
+    """
     table = lattice.neighbours
     for _ in range(ROUNDS):
         known = np.isfinite(xy[:, 0])
@@ -87,8 +92,10 @@ def _drop_outliers(
         deviation = np.linalg.norm(xy - place, axis=1)
         with np.errstate(invalid="ignore"):
             allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
-            excess = deviation / (edge * np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE))
+            allowed = np.where(explained, np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE), MAX_UNEXPLAINED)
+            excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
+        excess[known & ~explained & ~np.isfinite(place[:, 0])] = np.inf
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
         bad = (excess > 1.0) & (excess >= around)
         if not bad.any():
