@@ -42,7 +42,7 @@ lint: $(READY)
 	@$(BIN)/mypy
 
 bench: $(READY)
-	@set -e; for name in startup extraction stress laser; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+	@set -e; for name in startup extraction accuracy numbering tracking laser molds stress; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
 figures: $(READY)
 	@$(BIN)/python -m docs.figures
