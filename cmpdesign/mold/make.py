@@ -13,7 +13,8 @@ from cmpdesign.mold.measure import drafts_deg, measure
 from cmpdesign.mold.parts import Part, parts_of
 from cmpdesign.mold.stack import LAYERS, Stack, stack_of
 from cmpdesign.products import Made
-from cmpdesign.writers.step import Assembly, Place, Solid, assembly_to_step, solid_to_step
+from cmpdesign.writers.step import Solid, solid_to_step
+from cmpdesign.writers.step_assembly import Assembly, Place, assembly_to_step
 
 FOLDER = "mold"
 # Free space between the steps of the assembly, and the share by which a volume may differ from its formula.
@@ -38,11 +39,9 @@ def make_mold(design: Design, layout: Layout) -> Made:
     refuse_impossible(findings)
     parts = parts_of(stack)
     figures = {part.name: checked(part) for part in parts}
-    solids = {part.name: Solid(part.name, part.color, part.solid) for part in parts}
-    files: dict[str, str | bytes] = {
-        f"{FOLDER}/{part.name}.step": solid_to_step(solids[part.name]) for part in parts
-    }
-    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts, solids))
+    steps = {part.name: solid_to_step(Solid(part.name, part.color, part.solid)) for part in parts}
+    files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": step for name, step in steps.items()}
+    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts), steps)
     summary = {"parts": figures, **mold_figures(stack)}
     return Made(files, summary, tuple(findings))
 
@@ -99,25 +98,25 @@ def _frustum(stack: Stack, layer: int) -> float:
     return volume
 
 
-def assembly_of(stack: Stack, parts: Sequence[Part], solids: dict[str, Solid]) -> Assembly:
+def assembly_of(stack: Stack, parts: Sequence[Part]) -> Assembly:
     """One group a step of the work, side by side along x; in each, the parts lie where they are used."""
     by_name = {part.name: part for part in parts}
     width = float(stack.block.points[:, 0].max() - stack.block.points[:, 0].min()) + STEP_APART_MM
     groups = []
     for number, (name, members) in enumerate(steps_of(stack).items()):
         x = number * width
-        places = [_place(by_name[member], solids, x, name) for member in members]
+        places = [_place(by_name[member], x, name) for member in members]
         for index, (pin_x, pin_y) in enumerate(stack.pins_mm.tolist(), start=1):
             pin = by_name["pin"]
-            places.append(Place(solids["pin"], f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
+            places.append(Place("pin", f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
         groups.append(Assembly(name, places))
     return Assembly("assembly", (), groups)
 
 
-def _place(part: Part, solids: dict[str, Solid], x: float, step: str) -> Place:
+def _place(part: Part, x: float, step: str) -> Place:
     # Over the base alone, the lid lies a frame and a cover lower than over the finished pad.
     z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_STEP) else part.z_mm
-    return Place(solids[part.name], f"{step}-{part.name}", (x, 0.0, z), part.turned)
+    return Place(part.name, f"{step}-{part.name}", (x, 0.0, z), part.turned)
 
 
 def steps_of(stack: Stack) -> dict[str, tuple[str, ...]]:
