@@ -106,13 +106,13 @@ class _Entities:
                 raise RuntimeError(f"STEP: #{number} of a part's file is no {kind}")
         data = data[data.index(b"#%d = " % (_CONTEXT + 1)) :]
         shift = self.last - _CONTEXT
-        shared = {b"%d" % number: b"#%d" % number for number in range(1, _CONTEXT + 1)}
-
-        def renumbered(match: re.Match[bytes]) -> bytes:
-            return shared.get(match[1]) or b"#%d" % (int(match[1]) + shift)
-
-        self.texts.append(re.sub(rb"#(\d+)", renumbered, data))
-        self.last = shift + int(data[data.rindex(b"\n#") + 2 :].partition(b" ")[0])
+        last = int(data[data.rindex(b"\n#") + 2 :].partition(b" ")[0])
+        new = {b"%d" % number: b"#%d" % (number + shift) for number in range(_CONTEXT + 1, last + 1)}
+        new |= {b"%d" % number: b"#%d" % number for number in range(1, _CONTEXT + 1)}
+        pieces = re.split(rb"#(\d+)", data)
+        pieces[1::2] = [new[number] for number in pieces[1::2]]
+        self.texts.append(b"".join(pieces))
+        self.last = last + shift
         return _Product(_DEFINITION + shift, _REPRESENTATION + shift, _ORIGIN + shift)
 
 
