@@ -285,7 +285,7 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(
         finish.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
     )
-    monkeypatch.setattr(finish.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(finish, "cores", lambda: 2)
     together = make.make_mold(design, layout)
     assert len(helped) == 1
     assert list(together.files.items()) == list(alone.files.items())
@@ -295,7 +295,7 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     design = load_design("honeycomb", {"layers": "2"})
     monkeypatch.setattr(finish, "BOSSES_OF_TWO", 0)
-    monkeypatch.setattr(finish.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(finish, "cores", lambda: 2)
     monkeypatch.setattr(finish, "__name__", "cmpdesign.mold.absent")
     with pytest.raises(RuntimeError, match=r"(?s)the second process failed: .*No module named"):
         make.make_mold(design, build_layout(design))

@@ -91,7 +91,7 @@ def checked(part: Part) -> dict[str, Any]:
 
 def _halves(parts: Sequence[Part]) -> tuple[list[Part], list[Part]]:
     """The parts for this process and for a second one, alike in work; none there if it does not pay."""
-    if sum(map(_bosses, parts)) < BOSSES_OF_TWO or (os.cpu_count() or 1) < 2 or not sys.executable:
+    if sum(map(_bosses, parts)) < BOSSES_OF_TWO or cores() < 2 or not sys.executable:
         return list(parts), []
     here: list[Part] = []
     there: list[Part] = []
@@ -99,6 +99,13 @@ def _halves(parts: Sequence[Part]) -> tuple[list[Part], list[Part]]:
         lighter = here if sum(map(_bosses, here)) <= sum(map(_bosses, there)) else there
         lighter.append(part)
     return here, there
+
+
+def cores() -> int:
+    """Those that this process may use, where the system tells."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _bosses(part: Part) -> int:
