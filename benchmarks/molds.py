@@ -4,7 +4,7 @@
     python benchmarks/molds.py --large    and one of 44
 
 Times are of one core (user and system time), so that a busy machine does not blur them; whole processes show
-wall time too.
+wall time too. A large mold is made by two processes: its core seconds are of both, its memory of the larger one.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def standing(boss: Feature) -> Any:
 
 
 def process(layers: int, folder: Path) -> tuple[float, float, float, str]:
-    """Wall and core seconds, peak memory in GB and a digest of all files of ``build --only mold``."""
+    """``build --only mold``: wall and core seconds, peak memory in GB, a digest of all files."""
     command = [sys.executable, "-c", "from cmpdesign.cli import main; main()", "build", "honeycomb"]
     command += ["--set", f"layers={layers}", "--only", "mold", "-o", str(folder)]
     start = time.perf_counter()

@@ -38,7 +38,7 @@ MIN_EVIDENCE = 0.06
 MIN_CELLS = 9  # or all, in a layout that has fewer
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
-WITNESSES = 150  # faces that say which turn is that of the markers
+WITNESSES = 80  # faces that say which turn is that of the markers
 KEY = 1 << 16  # q KEY + r is one number for an axial place
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
@@ -279,7 +279,7 @@ def _largest_parts(cells: Cells, mesh: Mesh) -> list[NDArray[np.intp]]:
     for number_of in np.argsort(-sizes, kind="stable")[:MAX_PARTS]:
         faces = np.flatnonzero(part == number_of)
         middle = cells.center_px[mesh.faces[faces]].mean(axis=1)
-        distance = np.linalg.norm(middle - np.median(middle, axis=0), axis=1)
+        distance = ((middle - middle.mean(axis=0)) ** 2).sum(axis=1)
         found.append(faces[np.argsort(distance, kind="stable")])
     return found
 

@@ -74,7 +74,8 @@ def _matched(
     """
     turned = corner if mirrored else corner[:, ::-1]
     options = np.stack([np.roll(turned, shift, axis=1) for shift in range(3)], axis=1)
-    misfit = np.linalg.norm(options - predicted[:, None], axis=3).max(axis=2)
+    apart = options - predicted[:, None]
+    misfit = np.hypot(apart[..., 0], apart[..., 1]).max(axis=2)
     best = np.where(np.isfinite(misfit), misfit, np.inf).argmin(axis=1)
     row = np.arange(len(corner))
     fitted = misfit[row, best] < MAX_CORNER_MISFIT * edge

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,10 +16,10 @@ from hypothesis import strategies as st
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.errors import DesignError
-from cmpdesign.mold import make
+from cmpdesign.mold import finish, make
 from cmpdesign.mold.checks import check_mold, refuse_impossible
 from cmpdesign.mold.loops import Loop, circle, frustum_volume_mm3, polygon, rounded
-from cmpdesign.mold.measure import distance_mm, drafts_deg, measure, overlap_mm3
+from cmpdesign.mold.measure import distance_mm, drafts_deg, measure, of_kind, overlap_mm3
 from cmpdesign.mold.parts import Part, parts_of
 from cmpdesign.mold.sheets import tiled_sheet
 from cmpdesign.mold.shells import Feature, Slab, slab_solid, slab_volume_mm3
@@ -272,6 +273,70 @@ def test_the_same_bytes_in_another_process() -> None:
         assert isinstance(content, bytes)
         here += f"{name} {hashlib.sha256(content).hexdigest()}\n"
     assert here == runs[0]
+
+
+def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> None:
+    design = load_design("honeycomb", {"layers": "3"})
+    layout = build_layout(design)
+    alone = make.make_mold(design, layout)
+    monkeypatch.setattr(finish, "BOSSES_OF_TWO", 0)
+    helped: list[object] = []
+    process = finish.subprocess.Popen
+    monkeypatch.setattr(
+        finish.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
+    )
+    monkeypatch.setattr(finish, "cores", lambda: 2)
+    together = make.make_mold(design, layout)
+    assert len(helped) == 1
+    assert list(together.files.items()) == list(alone.files.items())
+    assert together.figures == alone.figures
+
+
+def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    design = load_design("honeycomb", {"layers": "2"})
+    monkeypatch.setattr(finish, "BOSSES_OF_TWO", 0)
+    monkeypatch.setattr(finish, "cores", lambda: 2)
+    monkeypatch.setattr(finish, "__name__", "cmpdesign.mold.absent")
+    with pytest.raises(RuntimeError, match=r"(?s)the second process failed: .*No module named"):
+        make.make_mold(design, build_layout(design))
+
+
+def test_assembly_holds_every_part_where_it_is_used() -> None:
+    design = load_design("honeycomb", {"layers": "2"})
+    layout = build_layout(design)
+    content = make.make_mold(design, layout).files["mold/assembly.step"]
+    assert isinstance(content, bytes)
+    numbers = [int(n) for n in re.findall(rb"^#(\d+) = ", content, flags=re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert {int(n) for n in re.findall(rb"#(\d+)", content)} == set(numbers)
+    mold = stack_of(design, layout)
+    described = parts_of(mold)
+    by_name = {part.name: part for part in described}
+    places = [p for group in make.assembly_of(mold, described).groups for p in group.places]
+    found = solids_of(read_step(content))
+    assert len(found) == len(places)
+    for solid, place in zip(found, places, strict=True):
+        volume, centre = volume_and_centre(solid)
+        own_volume, own_centre = volume_and_centre(by_name[place.part].solid)
+        turn = np.array([1, -1, -1]) if place.turned else np.ones(3)
+        assert volume == pytest.approx(own_volume, rel=1e-9), place.name
+        np.testing.assert_allclose(centre, own_centre * turn + place.xyz_mm, atol=1e-8, err_msg=place.name)
+
+
+def solids_of(shape: object) -> list[object]:
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    return of_kind(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+
+
+def volume_and_centre(shape: object) -> tuple[float, np.ndarray]:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    centre = properties.CentreOfMass()
+    return properties.Mass(), np.array([centre.X(), centre.Y(), centre.Z()])
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

@@ -6,24 +6,18 @@ from collections.abc import Sequence
 from typing import Any
 
 from cmpdesign.design import Design
-from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout import COLORS, Layout
 from cmpdesign.mold.checks import boss_volume_mm3, check_mold, moat_to_pin_mm, plate_web_mm, refuse_impossible
-from cmpdesign.mold.measure import drafts_deg, measure
+from cmpdesign.mold.finish import finished_all
 from cmpdesign.mold.parts import Part, parts_of
 from cmpdesign.mold.stack import LAYERS, Stack, stack_of
 from cmpdesign.products import Made
-from cmpdesign.writers.step import Assembly, Place, Solid, assembly_to_step, solid_to_step
+from cmpdesign.writers.step_assembly import Assembly, Place, assembly_to_step
 
 FOLDER = "mold"
-# Free space between the steps of the assembly, and the share by which a volume may differ from its formula.
+# Free space between the steps of the assembly.
 STEP_APART_MM = 10.0
 BASE_STEP = "1-base"
-VOLUME_TOLERANCE = 1e-9
-
-
-class MoldError(CmpDesignError):
-    """A part did not come out as computed; nothing was written."""
 
 
 def make_mold(design: Design, layout: Layout) -> Made:
@@ -37,39 +31,12 @@ def make_mold(design: Design, layout: Layout) -> Made:
     findings = check_mold(stack)
     refuse_impossible(findings)
     parts = parts_of(stack)
-    figures = {part.name: checked(part) for part in parts}
-    solids = {part.name: Solid(part.name, part.color, part.solid) for part in parts}
-    files: dict[str, str | bytes] = {
-        f"{FOLDER}/{part.name}.step": solid_to_step(solids[part.name]) for part in parts
-    }
-    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts, solids))
-    summary = {"parts": figures, **mold_figures(stack)}
+    made = finished_all(design, layout, parts)
+    steps = {name: part.step for name, part in made.items()}
+    files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": step for name, step in steps.items()}
+    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts), steps)
+    summary = {"parts": {name: part.figures for name, part in made.items()}, **mold_figures(stack)}
     return Made(files, summary, tuple(findings))
-
-
-def checked(part: Part) -> dict[str, Any]:
-    """A part's figures as measured on its solid.
-
-    Raises:
-        MoldError: open, invalid, or of another volume than its closed form.
-    """
-    found = measure(part.solid)
-    error = abs(found.volume_mm3 / part.volume_mm3 - 1)
-    if not found.valid or not found.closed or error > VOLUME_TOLERANCE:
-        state = "closed" if found.closed else "open"
-        raise MoldError(
-            f"mold: {part.name} came out {'valid' if found.valid else 'invalid'}, {state}, with a "
-            "volume off by "
-            f"{error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of cmpdesign, "
-            "please report it"
-        )
-    drafts = drafts_deg(part.solid, *part.pulled)
-    return {
-        "faces": found.faces,
-        "volume_mm3": round(found.volume_mm3, 6),
-        "draft_min_deg": round(drafts[0], 6) if drafts[0] == drafts[0] else None,
-        "draft_max_deg": round(drafts[1], 6) if drafts[1] == drafts[1] else None,
-    }
 
 
 def mold_figures(stack: Stack) -> dict[str, Any]:
@@ -99,25 +66,25 @@ def _frustum(stack: Stack, layer: int) -> float:
     return volume
 
 
-def assembly_of(stack: Stack, parts: Sequence[Part], solids: dict[str, Solid]) -> Assembly:
+def assembly_of(stack: Stack, parts: Sequence[Part]) -> Assembly:
     """One group a step of the work, side by side along x; in each, the parts lie where they are used."""
     by_name = {part.name: part for part in parts}
     width = float(stack.block.points[:, 0].max() - stack.block.points[:, 0].min()) + STEP_APART_MM
     groups = []
     for number, (name, members) in enumerate(steps_of(stack).items()):
         x = number * width
-        places = [_place(by_name[member], solids, x, name) for member in members]
+        places = [_place(by_name[member], x, name) for member in members]
         for index, (pin_x, pin_y) in enumerate(stack.pins_mm.tolist(), start=1):
             pin = by_name["pin"]
-            places.append(Place(solids["pin"], f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
+            places.append(Place("pin", f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
         groups.append(Assembly(name, places))
     return Assembly("assembly", (), groups)
 
 
-def _place(part: Part, solids: dict[str, Solid], x: float, step: str) -> Place:
+def _place(part: Part, x: float, step: str) -> Place:
     # Over the base alone, the lid lies a frame and a cover lower than over the finished pad.
     z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_STEP) else part.z_mm
-    return Place(solids[part.name], f"{step}-{part.name}", (x, 0.0, z), part.turned)
+    return Place(part.name, f"{step}-{part.name}", (x, 0.0, z), part.turned)
 
 
 def steps_of(stack: Stack) -> dict[str, tuple[str, ...]]:

@@ -81,7 +81,7 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS
 
-    leans = []
+    least, largest = float("inf"), float("-inf")
     for face in of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         surface = BRepAdaptor_Surface(TopoDS.Face(face), False)
         kind, lean = surface.GetType(), LEVEL_DEG
@@ -93,9 +93,11 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
             lean = 90.0 - float(
                 np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z()))))
             )
-        if lean < LEVEL_DEG and _within(face, low_mm, high_mm):
-            leans.append(lean)
-    return (min(leans), max(leans)) if leans else (float("nan"), float("nan"))
+        # Where a face lies is asked only if it would change the answer: nearly all lean alike.
+        known = least <= lean <= largest
+        if lean < LEVEL_DEG and not known and _within(face, low_mm, high_mm):
+            least, largest = min(least, lean), max(largest, lean)
+    return (least, largest) if least <= largest else (float("nan"), float("nan"))
 
 
 def _within(face: Any, low_mm: Point, high_mm: Point) -> bool:

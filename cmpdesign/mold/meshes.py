@@ -10,9 +10,9 @@ import numpy as np
 from cmpdesign.design import Design
 from cmpdesign.layout import Layout
 from cmpdesign.mold.checks import check_mold, refuse_impossible
+from cmpdesign.mold.finish import MoldError
 from cmpdesign.mold.job_sheet import job_sheet
 from cmpdesign.mold.loops import boxes_of
-from cmpdesign.mold.make import MoldError
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import Part, parts_of
 from cmpdesign.mold.pictures import exploded_png, part_pictures
