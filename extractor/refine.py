@@ -72,7 +72,7 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((3, 4, 24), 0, 0.0),
-    "balanced": Steps((3, 4), 4, 20.0),
+    "balanced": Steps((2, 3), 4, 20.0),
     "accurate": Steps((3, 4), 10, 0.7),
 }
 

@@ -166,43 +166,48 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it."""
     height, width = label.shape
     owner = np.zeros((height, width), np.int32)
-    queue = np.empty((limit_px + 2, 2), np.int32)
+    owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
+    last = height * width
+    queue = np.empty((limit_px + 2, 2), np.int32)  # a pixel's place in the flat image, and its x
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
     half = HUES // 2
     for region in range(seed_xy.shape[0]):
         sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
-        if owner[sy, sx] != 0:
+        first = sy * width + sx
+        if owners[first] != 0:
             continue
-        queue[0, 0] = sx
-        queue[0, 1] = sy
-        owner[sy, sx] = region + 1
-        h0 = int(hsv[sy, sx, 0])
-        sum_h, sum_s, sum_v = 0.0, float(hsv[sy, sx, 1]), float(hsv[sy, sx, 2])
-        mean_h, mean_s, mean_v = float(h0), sum_s, sum_v
+        queue[0, 0], queue[0, 1] = first, sx
+        owners[first] = region + 1
+        h0 = float(colors[3 * first])
+        sum_h, sum_s, sum_v = 0.0, float(colors[3 * first + 1]), float(colors[3 * first + 2])
+        mean_h, mean_s, mean_v = h0, sum_s, sum_v
         begin, end = 0, 1
         while begin < end and end <= limit_px:
             wave_end = end
             for i in range(begin, wave_end):
+                at, x = queue[i, 0], queue[i, 1]
                 for side in range(4):
-                    x = queue[i, 0] + (1 if side == 0 else -1 if side == 1 else 0)
-                    y = queue[i, 1] + (1 if side == 2 else -1 if side == 3 else 0)
-                    if x < 0 or y < 0 or x >= width or y >= height or owner[y, x] != 0:
+                    step = 1 if side == 0 else -1 if side == 1 else width if side == 2 else -width
+                    to = at + step
+                    if to < 0 or to >= last or (side == 0 and x == width - 1) or (side == 1 and x == 0):
                         continue
-                    if end > limit_px or (label[y, x] != ink and label[y, x] != 0):
+                    if owners[to] != 0 or end > limit_px or (labels[to] != ink and labels[to] != 0):
                         continue
-                    s, v = float(hsv[y, x, 1]), float(hsv[y, x, 2])
+                    h, s, v = float(colors[3 * to]), float(colors[3 * to + 1]), float(colors[3 * to + 2])
                     # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
-                    dh = (float(hsv[y, x, 0]) - mean_h + half) % HUES - half
+                    dh = h - mean_h
+                    dh += HUES if dh < -half else -HUES if dh >= half else 0.0
                     ds, dv = s - mean_s, v - mean_v
                     scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
                     if dh * dh + ds * ds + dv * dv >= limit2 * scale:
                         continue
-                    owner[y, x] = region + 1
-                    queue[end, 0] = x
-                    queue[end, 1] = y
+                    owners[to] = region + 1
+                    queue[end, 0] = to
+                    queue[end, 1] = x + step if side < 2 else x
                     end += 1
-                    sum_h += (float(hsv[y, x, 0]) - h0 + half) % HUES - half
+                    away = h - h0
+                    sum_h += away + (HUES if away < -half else -HUES if away >= half else 0.0)
                     sum_s += s
                     sum_v += v
             begin = wave_end
@@ -213,7 +218,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             continue  # a leak or a background: no cell is that large
         m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(end):
-            x, y = float(queue[i, 0] - sx), float(queue[i, 1] - sy)
+            x, y = float(queue[i, 1] - sx), float((queue[i, 0] - queue[i, 1]) // width - sy)
             xx, xy, yy = x * x, x * y, y * y
             m1 += x
             m2 += y
