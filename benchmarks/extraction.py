@@ -43,6 +43,7 @@ from cmpdesign.scene import (
 )
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
+from extractor.refine import PRESETS, Preset
 
 LAYERS = 10
 PITCH_PX = 20.0
@@ -93,8 +94,8 @@ class Speed:
     stages_ms: dict[str, float]
 
 
-def extractor_of(layout: Layout) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(layout)))
+def extractor_of(layout: Layout, preset: Preset = "balanced") -> Extractor:
+    return Extractor(parse_layout(layout_to_json(layout)), preset)
 
 
 def scene_of(pattern: str, state: str, seed: int) -> Scene:
@@ -147,11 +148,18 @@ def accuracy(pattern: str, state: str, seeds: int) -> Accuracy:
     )  # fmt: skip
 
 
-def speed(name: str, layout: Layout, pitch_px: float, size: tuple[int, int], runs: int) -> Speed:
+def speed(
+    name: str,
+    layout: Layout,
+    pitch_px: float,
+    size: tuple[int, int],
+    runs: int,
+    preset: Preset = "balanced",
+) -> Speed:
     """Time the extraction of one scene; two runs before the clock starts."""
     scene = standard_scene(layout)
     rendered = render(replace(scene, camera=Camera(pitch_px, rotation_deg=7.3)), size=size)
-    extractor = extractor_of(layout)
+    extractor = extractor_of(layout, preset)
     for _ in range(2):
         markers = extractor.extract(rendered.image)
     total, stages = [], []
@@ -255,7 +263,11 @@ def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str
 def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
     """Everything, as data and as tables."""
     runs, seeds = (7, 2) if quick else (61, 12)
-    standard = speed("640x480, 331 markers", standard_layout("honeycomb", LAYERS), PITCH_PX, SIZE, 3 * runs)
+    usual = standard_layout("honeycomb", LAYERS)
+    fast, standard, accurate = (
+        speed(f"640x480, 331 markers, {preset}", usual, PITCH_PX, SIZE, 3 * runs, preset)
+        for preset in PRESETS
+    )
     large = speed(
         "12 MP, 20 layers", standard_layout("honeycomb", 20), 70.0, side_px(12.0), max(3, runs // 4)
     )
@@ -263,7 +275,8 @@ def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
     pixels, markers = over_pixels(max(3, runs // 6)), over_markers(max(3, runs // 6))
     by_pixels, by_markers = growth(pixels, lambda r: r.megapixels), growth(markers, lambda r: r.markers)
     results = {
-        "standard": asdict(standard), "large": asdict(large), "accuracy": [asdict(r) for r in precise],
+        "standard": asdict(standard), "fast": asdict(fast), "accurate": asdict(accurate),
+        "large": asdict(large), "accuracy": [asdict(r) for r in precise],
         "over_pixels": [asdict(r) for r in pixels], "over_markers": [asdict(r) for r in markers],
         "growth": {"megapixels": by_pixels, "markers": by_markers},
     }  # fmt: skip
@@ -276,7 +289,9 @@ def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
 
     tables = [
         speed_table(
-            "Cold extraction", [standard, large], "one core, warm code, honeycomb, blur 1 px, noise 2/255"
+            "Cold extraction",
+            [fast, standard, accurate, large],
+            "one core, warm code, honeycomb, blur 1 px, noise 2/255",
         ),
         stage_table([standard, large]),
         accuracy_table(precise, seeds),
