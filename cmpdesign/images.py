@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError
 
 SMALLEST_PX = 16
-LARGEST_PX = 1 << 28
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 

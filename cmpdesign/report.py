@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from cmpdesign.checks import Finding, check_design
 from cmpdesign.design import Design
 from cmpdesign.layout import COLORS, Layout
 from cmpdesign.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
-from cmpdesign.writers.atomic import write_file
 
 
 @dataclass(frozen=True)
@@ -99,12 +97,3 @@ def report_to_json(figures: Report, products: Mapping[str, Mapping[str, Any]] | 
         "generator": f"cmpdesign {__version__}",
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-
-
-def write_report(figures: Report, path: str | Path) -> None:
-    """Write ``report_to_json`` to a file.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    write_file(path, report_to_json(figures))

@@ -11,7 +11,6 @@ from .reference import BLACK, Reference
 
 NEIGHBOURS = 6  # around a marker at most
 NEAR = 18  # in its two rings at most
-MONOMIALS = 9  # of a cubic without its constant, in two variables
 
 
 class Topology(NamedTuple):

@@ -17,9 +17,6 @@ Columns = dict[str, NDArray[Any]]
 
 FRAME_STATUS = ("", "tracked", "lost", "unreadable", "other size")
 REASON = "U120"
-# A frame's columns have one value a frame; a marker's have one for every frame and marker.
-FRAME_COLUMNS = ("frame", "time_s", "frame_status", "reason", "start", "elapsed_ms")
-MARKER_COLUMNS = ("status", "xy_px", "cov_px2", "displacement_px", "displacement_mm")
 # In the long form, pairs become columns of their own.
 LONG_COLUMNS = (
     "frame", "time_s", "frame_status", "reason", "marker", "layer", "index", "status", "x_px", "y_px",

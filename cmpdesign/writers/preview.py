@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import BLACK, COLORS, Layout
-from cmpdesign.writers.atomic import write_file
 
 LONG_SIDE_PX = 1000
 MARGIN_PX = 70
@@ -24,15 +21,6 @@ _TEXT = (60, 52, 44)
 _FAINT = (150, 142, 134)
 
 Image = NDArray[np.uint8]
-
-
-def write_preview(layout: Layout, path: str | Path) -> None:
-    """Write ``layout_to_png`` to a file.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    write_file(path, layout_to_png(layout))
 
 
 def layout_to_png(layout: Layout) -> bytes:
