@@ -1,0 +1,121 @@
+"""Runs trials on several cores, noting each; the figures depend on neither their number nor their order."""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.evaluate.journal import Journal
+
+# One thread a process: the processes share the cores, and sums come out the same on every machine.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One thing to try.
+
+    Attributes:
+        key: its name in the journal, unique in a run.
+        values: what the work needs to know, as JSON values.
+    """
+
+    key: str
+    values: Mapping[str, Any]
+
+
+Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+
+
+def rng(seed: int, name: str, index: int) -> np.random.Generator:
+    """The stream of random numbers of one trial: the same whichever process draws it, and when."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode("utf-8")), index])
+
+
+def run(
+    work: Work, trials: Sequence[Trial], journal: Journal, *, workers: int, title: str, show: bool = True
+) -> list[Mapping[str, Any]]:
+    """The results of all trials, in their order; those that the journal holds are not tried again.
+
+    Args:
+        work: a picklable function of a trial's values -> JSON values.
+        workers: processes; 1 works in this one.
+        title: what the progress bar is called.
+        show: a bar on stderr, where a terminal shows it.
+
+    Raises:
+        CmpDesignError: fewer than one worker, or two trials with one key.
+        OutputError: the journal cannot be written.
+    """
+    if workers < 1:
+        raise CmpDesignError(f"workers is {workers}; it must be at least 1")
+    if len({trial.key for trial in trials}) < len(trials):
+        raise CmpDesignError("two trials have the same name")
+    open_trials = [trial for trial in trials if trial.key not in journal.results]
+    with _bar(title, len(trials), len(trials) - len(open_trials), show) as advance:
+        for key, result in _results(work, open_trials, workers):
+            journal.add(key, result)
+            advance()
+    return [journal.results[trial.key] for trial in trials]
+
+
+def _results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tuple[str, Any]]:
+    """(key, result) as they come in."""
+    if workers == 1 or len(trials) < 2:
+        for trial in trials:
+            yield trial.key, _tried(work, trial.values)
+        return
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from multiprocessing import get_context
+
+    with _single_threaded(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        keys = {pool.submit(_tried, work, dict(trial.values)): trial.key for trial in trials}
+        try:
+            for done in as_completed(keys):
+                yield keys[done], done.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _tried(work: Work, values: Mapping[str, Any]) -> Any:
+    """One result, through JSON, so that it is the same whether it comes from here or from the journal."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    return json.loads(json.dumps(work(values), allow_nan=False))
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Processes started in here compute on one thread each."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _bar(title: str, total: int, done: int, show: bool) -> Iterator[Callable[[], None]]:
+    """A progress bar on stderr where a terminal shows it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    terminal = Console(stderr=True)
+    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=terminal, disable=not (show and terminal.is_terminal)) as progress:
+        task = progress.add_task(title, total=total, completed=done)
+        yield lambda: progress.advance(task)

@@ -1,0 +1,110 @@
+"""The former method's recognition: squares of a checkerboard from their contours.
+
+    image -> adaptive threshold -> light and dark squares, freed from each other by erosion -> contours -> quads
+
+Neighbouring squares of one shade touch at their corners, and blur joins them there. So the mask is eroded, and
+the quads' corners are put back by as much, as in the quad-based chessboard finder of OpenCV (V. Vezhnevets); of a
+few erosions the one that leaves the most quads is taken. Squares that stick all the same have a contour
+with more than four corners and are lost, and with them whatever hangs on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+EROSIONS = (1, 2, 3, 4)
+CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+# A quad's area and its corners' distance from its outline, in units of the square at rest.
+AREA = (0.1, 3.0)
+STRAIGHT = 0.12
+RED_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Quads:
+    """Squares found in an image.
+
+    Attributes:
+        corners_px: (Q, 4, 2) float64, clockwise as the image shows them (y points down).
+        light: (Q,) bool, the squares lighter than what surrounds them, the reference cell among them.
+        reference: the row of the colored reference cell; None where it was not found.
+    """
+
+    corners_px: NDArray[np.float64]
+    light: NDArray[np.bool_]
+    reference: int | None
+
+
+def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
+    """The squares of a checkerboard whose edges are about ``edge_px`` long at rest."""
+    # The brightest channel: there the colored reference cell is light, too.
+    value = np.ascontiguousarray(bgr.max(axis=2))
+    block = 2 * round(edge_px) + 1
+    mask = cv2.adaptiveThreshold(value, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, block, 0)
+    light = _best(mask, edge_px)
+    dark = _best(cv2.bitwise_not(mask), edge_px)
+    corners = np.concatenate([light, dark])
+    shade = np.arange(len(corners)) < len(light)
+    return Quads(corners, shade, _reference(bgr, light))
+
+
+def _best(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
+    """(Q, 4, 2) from the erosion that leaves the most quads; the weakest of equals."""
+    found = [_quads(cv2.erode(mask, CROSS, iterations=times), times, edge_px) for times in EROSIONS]
+    return max(found, key=len)
+
+
+def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[np.float64]:
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    kept = [quad for contour in contours if (quad := _quad(contour, edge_px)) is not None]
+    if not kept:
+        return np.empty((0, 4, 2))
+    return _grown(np.stack(kept), float(eroded_px))
+
+
+def _quad(contour: NDArray[np.int32], edge_px: float) -> NDArray[np.float64] | None:
+    """(4, 2) corners of a contour that is a convex quadrilateral of about the right size; None for any other."""
+    area = cv2.contourArea(contour)
+    if not AREA[0] * edge_px**2 < area < AREA[1] * edge_px**2:
+        return None
+    outline = cv2.approxPolyDP(contour, STRAIGHT * np.sqrt(area), True)
+    if len(outline) != 4 or not cv2.isContourConvex(outline):
+        return None
+    corners = outline[:, 0].astype(np.float64)
+    x, y = corners.T
+    turn = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+    # With y down, a positive area is clockwise to the eye.
+    return corners if turn > 0 else corners[::-1]
+
+
+def _grown(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
+    """Quads (Q, 4, 2), clockwise with y down, with every side moved outward."""
+    along = np.roll(quads, -1, axis=1) - quads
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    normal = np.stack([along[..., 1], -along[..., 0]], axis=2)  # outward of the side from corner i
+    before = np.roll(normal, 1, axis=1)
+    # The mitre: the point whose distances from both sides through the corner grow by ``by_px``.
+    cosine = (normal * before).sum(axis=2, keepdims=True)
+    return np.asarray(quads + by_px * (normal + before) / np.maximum(1 + cosine, 0.3))
+
+
+def _reference(bgr: NDArray[np.uint8], light: NDArray[np.float64]) -> int | None:
+    """The light quad that is decidedly red; None when none is, or more than one."""
+    centres = light.mean(axis=1)
+    shares = [_redness(bgr, centre) for centre in centres]
+    red = np.flatnonzero(np.asarray(shares) > RED_SHARE)
+    return int(red[0]) if len(red) == 1 else None
+
+
+def _redness(bgr: NDArray[np.uint8], centre: NDArray[np.float64]) -> float:
+    """How much red exceeds the other channels around a point, as a share of red."""
+    x, y = np.rint(centre).astype(int)
+    patch = bgr[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].reshape(-1, 3).astype(np.float64)
+    if not len(patch):
+        return 0.0
+    blue, green, red = patch.mean(axis=0)
+    return float((red - max(green, blue)) / max(red, 1.0))
