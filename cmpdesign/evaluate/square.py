@@ -78,9 +78,7 @@ def joined(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
     return node.reshape(-1, 4).astype(np.int64), places
 
 
-def number(
-    quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Points
-) -> dict[int, int]:
+def number(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Points) -> dict[int, int]:
     """Node -> marker id, outward from the reference cell through shared corners, breadth first.
 
     A quad of the same shade touches in one corner, one of the other shade in two. A quad that contradicts what is
@@ -96,7 +94,7 @@ def number(
     assert quads.reference is not None
     first = int(layout.reference_marker)
     # ids[quad] are its corners' ids, in the order of its corners in the image.
-    start = _start(quads.corners_px[quads.reference], axes_px, first, side)
+    start = reference_ids(quads.corners_px[quads.reference], axes_px, first, side)
     numbers = dict(zip(nodes[quads.reference].tolist(), start, strict=True))
     ids, queue = {quads.reference: start}, deque([quads.reference])
     while queue:
@@ -131,7 +129,7 @@ def _ids(row: int, column: int, role: int, turn: int, side: int) -> list[int] | 
     return [(row + down) * side + column + right for down, right in steps]
 
 
-def _start(corners_px: Points, axes_px: Points, first: int, side: int) -> list[int]:
+def reference_ids(corners_px: Points, axes_px: Points, first: int, side: int) -> list[int]:
     """The reference cell's ids: its corners are told by the directions known from rest."""
     expected = np.array([-axes_px[0] - axes_px[1], axes_px[0] - axes_px[1], axes_px.sum(axis=0)])
     expected = np.vstack([expected, axes_px[1] - axes_px[0]])

@@ -11,6 +11,7 @@ with more than four corners and are lost, and with them whatever hangs on them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -44,9 +45,11 @@ def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
     # The brightest channel: there the colored reference cell is light, too.
     value = np.ascontiguousarray(bgr.max(axis=2))
     block = 2 * round(edge_px) + 1
-    mask = cv2.adaptiveThreshold(value, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, block, 0)
+    mask = np.asarray(
+        cv2.adaptiveThreshold(value, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, block, 0), np.uint8
+    )
     light = _best(mask, edge_px)
-    dark = _best(cv2.bitwise_not(mask), edge_px)
+    dark = _best(~mask, edge_px)
     corners = np.concatenate([light, dark])
     shade = np.arange(len(corners)) < len(light)
     return Quads(corners, shade, _reference(bgr, light))
@@ -54,19 +57,20 @@ def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
 
 def _best(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
     """(Q, 4, 2) from the erosion that leaves the most quads; the weakest of equals."""
-    found = [_quads(cv2.erode(mask, CROSS, iterations=times), times, edge_px) for times in EROSIONS]
-    return max(found, key=len)
+    return max((_quads(mask, times, edge_px) for times in EROSIONS), key=len)
 
 
 def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[np.float64]:
-    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    contours, _ = cv2.findContours(
+        cv2.erode(mask, CROSS, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
+    )
     kept = [quad for contour in contours if (quad := _quad(contour, edge_px)) is not None]
     if not kept:
         return np.empty((0, 4, 2))
     return _grown(np.stack(kept), float(eroded_px))
 
 
-def _quad(contour: NDArray[np.int32], edge_px: float) -> NDArray[np.float64] | None:
+def _quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
     """(4, 2) corners of a contour that is a convex quadrilateral of about the right size; None for any other."""
     area = cv2.contourArea(contour)
     if not AREA[0] * edge_px**2 < area < AREA[1] * edge_px**2:
