@@ -1,0 +1,68 @@
+"""``evaluate angles``: how far a cell may deform or turn before it is lost (the article, eqs. 1 and 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from cmpdesign.evaluate.runner import Trial
+
+SIDES = (3, 4, 6)
+EDGES_PX = (20, 50, 100, 400)
+STEP_DEG = 0.5
+
+
+def change_limit_deg(sides: int) -> float:
+    """The article's eq. 1: how much a corner's inner angle may grow."""
+    return 360 / sides
+
+
+def turn_limit_deg(sides: int) -> float:
+    """The article's eq. 2: how far a cell may turn."""
+    return 180 / sides
+
+
+def trials() -> list[Trial]:
+    """One for every shape of cell, size and deformation."""
+    return [
+        Trial(f"{kind}-{sides}-{edge_px}", {"kind": kind, "sides": sides, "edge_px": edge_px})
+        for kind in ("shape", "turn")
+        for sides in SIDES
+        for edge_px in EDGES_PX
+    ]
+
+
+def work(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The first angle, in steps of half a degree, at which a cell is lost."""
+    from cmpdesign.evaluate.cells import number_holds, shape_holds
+
+    holds, limit = (
+        (shape_holds, change_limit_deg) if values["kind"] == "shape" else (number_holds, turn_limit_deg)
+    )
+    sides, edge_px = int(values["sides"]), float(values["edge_px"])
+    return {"first_lost_deg": first_lost_deg(lambda angle: holds(sides, edge_px, angle), limit(sides) + 30)}
+
+
+def first_lost_deg(holds: Callable[[float], bool], until_deg: float) -> float | None:
+    """The first angle from 0, in steps of ``STEP_DEG``, at which it does not hold; None when it always does."""
+    for step in range(int(until_deg / STEP_DEG) + 1):
+        if not holds(step * STEP_DEG):
+            return step * STEP_DEG
+    return None
+
+
+def figures(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """report.json's members: by n, the formula's limits and the measured ones by edge length."""
+    document: dict[str, Any] = {}
+    for trial, result in zip(trials(), results, strict=True):
+        sides = trial.values["sides"]
+        cell = document.setdefault(
+            f"n{sides}",
+            {
+                "shape_change_deg": {"formula": change_limit_deg(sides), "measured": {}},
+                "rotation_deg": {"formula": turn_limit_deg(sides), "measured": {}},
+            },
+        )
+        name = "shape_change_deg" if trial.values["kind"] == "shape" else "rotation_deg"
+        cell[name]["measured"][f"{trial.values['edge_px']}px"] = result["first_lost_deg"]
+    return {"cells": document}
