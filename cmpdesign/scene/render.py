@@ -184,8 +184,8 @@ def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engin
 def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Truth:
     """Of one view as it is; of a tuple of views with a leading axis."""
     layout, lift = scene.layout, seen[0].xyz_from_layout
-    virtual_mm = layout.virtual_xy_mm.reshape(-1, 2)
-    parts = [_seen(scene, view, gone, virtual_mm) for view in seen]
+    xyz = lift(layout.marker_xy_mm), lift(layout.virtual_xy_mm.reshape(-1, 2))
+    parts = [_seen(scene, view, gone, *xyz) for view in seen]
     columns = {name: [part[name] for part in parts] for name in parts[0]}
     several = isinstance(scene.camera, tuple)
     flat = [view.h for view in seen if view.h is not None]
@@ -193,15 +193,17 @@ def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Tru
         **{name: np.stack(values) if several else values[0] for name, values in columns.items()},
         mirrored=np.array([view.mirrored for view in seen]) if several else seen[0].mirrored,
         H=None if len(flat) < len(seen) else np.stack(flat) if several else flat[0],
-        marker_xyz_mm=lift(layout.marker_xy_mm),
-        virtual_xyz_mm=lift(virtual_mm).reshape(*layout.virtual_xy_mm.shape[:2], 3),
+        marker_xyz_mm=xyz[0],
+        virtual_xyz_mm=xyz[1].reshape(*layout.virtual_xy_mm.shape[:2], 3),
     )
 
 
-def _seen(scene: Scene, view: View, gone: NDArray[np.bool_], virtual_mm: Points) -> dict[str, NDArray[Any]]:
+def _seen(
+    scene: Scene, view: View, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
+) -> dict[str, NDArray[Any]]:
     """What one view has its own values of."""
     layout, step_mm = scene.layout, 1e-4 * pitch_mm(scene.layout)
-    marker_xy_px = view.image_from_layout(layout.marker_xy_mm)
+    marker_xy_px = view.project(marker_xyz_mm)
     inside = view.contains(marker_xy_px)
     samples = _cell_samples(scene)
     away = view.hides(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
@@ -213,7 +215,7 @@ def _seen(scene: Scene, view: View, gone: NDArray[np.bool_], virtual_mm: Points)
     return {
         "marker_xy_px": marker_xy_px,
         "visible": inside & touching & ~hidden,
-        "virtual_xy_px": view.image_from_layout(virtual_mm).reshape(layout.virtual_xy_mm.shape),
+        "virtual_xy_px": view.project(virtual_xyz_mm).reshape(layout.virtual_xy_mm.shape),
         "cell_visible": inside[layout.cell_corners].all(axis=1) & ~damaged,
     }
 

@@ -24,8 +24,8 @@ class View:
     """One view of a scene.
 
     Attributes:
-        image_from_layout: (N, 2) mm to px of the whole image.
         xyz_from_layout: (N, 2) mm to (N, 3) mm, the surface in space.
+        project: (N, 3) mm to (N, 2) px of the whole image.
         area: x, y, width, height of its part of the image.
         mirrored: the pattern's back is seen.
         h: (3, 3) image from layout; None where straight lines do not stay straight.
@@ -33,8 +33,8 @@ class View:
         folds: where the surface turns away from the camera; None: nowhere.
     """
 
-    image_from_layout: Map
     xyz_from_layout: Map
+    project: Map
     area: Area
     mirrored: bool
     h: Points | None
@@ -50,6 +50,10 @@ class View:
         """The area's place in planes (3, H, W)."""
         x, y, width, height = self.area
         return slice(None), slice(y, y + height), slice(x, x + width)
+
+    def image_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to px of the whole image."""
+        return self.project(self.xyz_from_layout(xy_mm))
 
     def area_from_layout(self, xy_mm: Points) -> Points:
         """(N, 2) mm to px, counted from the area's own top left pixel."""
@@ -89,7 +93,7 @@ class View:
         """(N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
         assert self.camera is not None
         xyz = self.xyz_from_layout(xy_mm)
-        xy_px = project_3d(self.camera, xyz) - self.area[:2]
+        xy_px = self.project(xyz) - self.area[:2]
         return np.column_stack([xy_px, depth_mm(self.camera, xyz)])
 
     def contains(self, xy_px: Points) -> NDArray[np.bool_]:
@@ -169,7 +173,11 @@ class _Lift:
     def __call__(self, xy_mm: Points) -> Points:
         """(N, 2) mm to (N, 3) mm."""
         at = xy_mm if self.surface is None else self.surface(xy_mm)
-        return at if at.shape[1] == 3 else np.column_stack([at, np.zeros(len(at))])
+        if at.shape[1] == 3:
+            return at
+        xyz = np.zeros((len(at), 3))
+        xyz[:, :2] = at
+        return xyz
 
 
 def _lift(scene: Scene) -> _Lift:
@@ -188,15 +196,14 @@ def _view(scene: Scene, camera: Camera | Pinhole, area: Area, lift: _Lift, size:
         return _planar_view(scene, camera, area, lift, size)
     at = camera if isinstance(camera, Pinhole) else pinhole(camera, scene.layout, size)
     h = at.homography if lift.surface is None else None
-    view = View(lambda xy_mm: project_3d(at, lift(xy_mm)), lift, area, at.mirrored, h, at)
+    view = View(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
     if not view.curved:
         return view
     return replace(view, folds=find_folds(scene.layout, view.depth_from_layout, view.sign, area[2:]))
 
 
 def _planar_view(scene: Scene, camera: Camera, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
-    h, surface = homography(camera, scene.layout, size), lift.surface
+    h = homography(camera, scene.layout, size)
+    straight = h if lift.surface is None else None
     mirrored = is_mirrored(camera, scene.layout)
-    if surface is None:
-        return View(lambda xy_mm: project(h, xy_mm), lift, area, mirrored, h)
-    return View(lambda xy_mm: project(h, surface(xy_mm)), lift, area, mirrored, None)
+    return View(lift, lambda xyz_mm: project(h, xyz_mm[:, :2]), area, mirrored, straight)
