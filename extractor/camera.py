@@ -119,9 +119,10 @@ class View:
     def fold_radius(self) -> float:
         """The normalised radius at which the radial distortion turns back; infinite where it never does."""
         k1, k2, _, _, k3 = self.distortion
-        squares = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
-        real = squares[(abs(squares.imag) < 1e-9 * abs(squares)) & (squares.real > 0)].real
-        return float(np.sqrt(real.min())) if len(real) else np.inf
+        inverse_squares = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])  # of the radius: weak ones do not overflow
+        real = inverse_squares.real[abs(inverse_squares.imag) <= 1e-9 * abs(inverse_squares)]
+        largest = float(real.max(initial=0.0))
+        return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
 
     def at(self, rotation: Array, shift: Array) -> View:
         """The same view with this pose."""

@@ -36,6 +36,7 @@ class Field:
         if corners.shape[1] == 4:
             corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
         self.triangles: NDArray[np.int32] = corners
+        self._last: tuple[bytes, Array] | None = None
         self._near = _two_rings(np.asarray(layout.edges), len(self.xy_mm))
         self._edge_mm = float(np.linalg.norm(np.diff(self.xy_mm[layout.edges], axis=1)[:, 0], axis=1).mean())
 
@@ -46,40 +47,38 @@ class Field:
         return cKDTree(self.xy_mm[self.triangles].mean(axis=1))
 
     def gradients(self, values: Array) -> Array:
-        """(M, k, 2): derivatives by the layout's x and y of values (M, k) with NaN where unknown; NaN likewise.
-
-        Least squares over the known markers of two rings, weighted by the inverse square of their distance.
-        """
+        """(M, k, 2): derivatives by the layout's x and y of values (M, k) with NaN where unknown; NaN likewise."""
         known = finite(values)
-        have = (self._near >= 0) & known[self._near] & known[:, None]
-        step = np.where(have[..., None], self.xy_mm[self._near] - self.xy_mm[:, None], 0.0) / self._edge_mm
-        rise = np.where(have[..., None], values[self._near] - values[:, None], 0.0)
-        count = have.sum(axis=1)
-        out = np.full((*values.shape, 2), np.nan)
-        for terms, needed in ((2, 2), (5, QUADRATIC), (9, CUBIC)):
-            some = np.flatnonzero(known & (count >= needed))
-            if len(some):
-                self._fit(step[some], rise[some], have[some], terms, some, out)
-        return out
+        stencil = self._stencil(known)
+        rise = np.where(known[self._near][..., None], values[self._near] - values[:, None], 0.0)
+        return np.asarray(np.swapaxes(stencil @ rise, 1, 2))
+
+    def _stencil(self, known: NDArray[np.bool_]) -> Array:
+        """(M, 2, K): weights of the differences to the known markers of two rings; NaN where these tell nothing.
+
+        Least squares, weighted by the inverse square of the distance. From frame to frame the same ones are known.
+        """
+        key = known.tobytes()
+        if self._last is None or self._last[0] != key:
+            have = (self._near >= 0) & known[self._near] & known[:, None]
+            step = np.where(have[..., None], self.xy_mm[self._near] - self.xy_mm[:, None], 0.0)
+            out = np.full((len(known), 2, have.shape[1]), np.nan)
+            for terms, needed in ((2, 2), (5, QUADRATIC), (9, CUBIC)):
+                some = np.flatnonzero(have.sum(axis=1) >= needed)
+                self._fit(step / self._edge_mm, have, terms, some, out)
+            self._last = key, out
+        return self._last[1]
 
     def _fit(
-        self,
-        step: Array,
-        rise: Array,
-        have: NDArray[np.bool_],
-        terms: int,
-        some: NDArray[np.intp],
-        out: Array,
+        self, step: Array, have: NDArray[np.bool_], terms: int, some: NDArray[np.intp], out: Array
     ) -> None:
-        """Write the gradients of polynomials with this many terms, where the neighbours determine them."""
-        x, y = step[..., 0], step[..., 1]
+        """Write the weights that polynomials with this many terms give, where the neighbours determine them."""
+        x, y = np.moveaxis(step[some], 2, 0)
         rows = np.stack([x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3][:terms], axis=2)
-        weight = have / np.maximum(x * x + y * y, 1e-12)
-        design = np.swapaxes(rows * weight[..., None], 1, 2)
+        design = np.swapaxes(rows * (have[some] / np.maximum(x * x + y * y, 1e-12))[..., None], 1, 2)
         gram = design @ rows
         sound = np.linalg.cond(gram) < MAX_CONDITION
-        solved = np.linalg.solve(gram[sound], design[sound] @ rise[sound])
-        out[some[sound]] = np.swapaxes(solved[:, :2], 1, 2) / self._edge_mm
+        out[some[sound]] = np.linalg.solve(gram[sound], design[sound])[:, :2] / self._edge_mm
 
     def normals(self, xyz_mm: Array) -> Array:
         """(M, 3) unit normals of the surface through (M, 3), out of the front; NaN where unknown."""

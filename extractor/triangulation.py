@@ -134,8 +134,9 @@ def _solve(
     xyz, damping = start.copy(), np.zeros(len(start))
     away, by_point, by_pose = _residuals(views, xyz, xy_px, seen)
     for _ in range(ITERATIONS):
-        normal = np.einsum("vnia,vnij,vnjb->nab", by_point, weight, by_point)
-        gradient = np.einsum("vnia,vnij,vnj->na", by_point, weight, away)
+        design = np.swapaxes(by_point, 2, 3) @ weight
+        normal = (design @ by_point).sum(axis=0)
+        gradient = (design @ away[..., None]).sum(axis=0)[..., 0]
         step = _solved(normal * (1 + damping[:, None, None] * np.eye(3)), gradient)
         there = _residuals(views, xyz + step, xy_px, seen)
         better = _cost(there[0], weight) <= _cost(away, weight) * (1 + 1e-12)
@@ -145,10 +146,10 @@ def _solve(
         damping = np.where(better, damping / 10, np.maximum(10 * damping, 1e-3))
         if not (np.einsum("na,na->n", step, gradient) > CONVERGED**2).any():
             break
-    normal = np.einsum("vnia,vnij,vnjb->nab", by_point, weight, by_point)
-    out.xyz_mm[use], out.cov_mm2[use] = xyz, _inverse(normal)
-    toward = -np.einsum("nab,vnib,vnij,vnjk->navk", out.cov_mm2[use], by_point, weight, by_pose)
-    out.by_pose[use] = toward.reshape(len(use), 3, -1)
+    design = np.swapaxes(by_point, 2, 3) @ weight
+    out.xyz_mm[use], out.cov_mm2[use] = xyz, _inverse((design @ by_point).sum(axis=0))
+    toward = -out.cov_mm2[use] @ (design @ by_pose)
+    out.by_pose[use] = np.moveaxis(toward, 0, 2).reshape(len(use), 3, -1)
     out.misfit[use] = _misfit(away, by_point, by_pose, weight, seen, out.by_pose[use], cov_pose)
 
 
@@ -168,12 +169,13 @@ def _residuals(
 
 
 def _cost(away: Array, weight: Array) -> Array:
-    return np.asarray(np.einsum("vni,vnij,vnj->n", away, weight, away))
+    return np.asarray((away[:, :, None] @ weight @ away[..., None]).sum(axis=0)[:, 0, 0])
 
 
 def _solved(normal: Array, gradient: Array) -> Array:
     """Solutions of 3 x 3 systems in their own scale; 0 where singular."""
-    return np.asarray(np.einsum("nab,nb->na", np.nan_to_num(_inverse(normal), posinf=0, neginf=0), gradient))
+    inverse = np.nan_to_num(_inverse(normal), posinf=0, neginf=0)
+    return np.asarray((inverse @ gradient[..., None])[..., 0])
 
 
 def _inverse(normal: Array) -> Array:
@@ -197,10 +199,10 @@ def _misfit(
     """(N,) RMS of what is left over, in the deviations that pixels and poses allow."""
     freedom = 2.0 * seen.sum(axis=0) - 3
     if cov_pose is not None and cov_pose.any():
-        moved = np.einsum("vnia,nak->vnik", by_point, point_by_pose)
+        moved = by_point @ point_by_pose
         for v in range(len(seen)):
             moved[v, :, :, 6 * v : 6 * v + 6] += by_pose[v]
-        spread = np.einsum("vnik,kl,vnjl->vnij", moved, cov_pose, moved)
+        spread = moved @ cov_pose @ np.swapaxes(moved, 2, 3)
         freedom = freedom + np.einsum("vnij,vnji->n", weight, spread)
     return np.asarray(np.sqrt(_cost(away, weight) / freedom))
 
