@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from .camera import Array, finite
 from .reference import Reference
 
-CUBIC, QUADRATIC = 13, 7  # known neighbours for the polynomials of 9 and 5 terms; fewer get the plane
-MAX_CONDITION = 1e7
+CUBIC, QUADRATIC = 10, 5  # known neighbours for the polynomials of 9 and 5 terms; fewer get the plane
+MAX_CONDITION = 1e3  # of the normal equations; whole rings have 4 to 170
 CANDIDATES = 12  # triangles whose centroids are nearest, one of which holds a point
 INSIDE = -1e-9
 
