@@ -12,11 +12,12 @@ from cmpdesign.scene.damage import Blob, Damage, Glare, Scratch
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import Led, Light, colored_leds
 from cmpdesign.scene.optics import Optics
+from cmpdesign.scene.pinhole import Pinhole
 from cmpdesign.scene.render import Rendered, render
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.sensor import Sensor
 from cmpdesign.scene.standard import STANDARD_SIZE, standard_layout, standard_scene
-from cmpdesign.scene.surface import Press, Shear, Surface, Twist, composed
+from cmpdesign.scene.surface import Dent, Press, Shear, Surface, Twist, composed
 from cmpdesign.scene.truth import Truth, load_truth, save_truth
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "Busy",
     "Camera",
     "Damage",
+    "Dent",
     "Glare",
     "Gradient",
     "Led",
@@ -32,6 +34,7 @@ __all__ = [
     "Optics",
     "Paper",
     "Picture",
+    "Pinhole",
     "Plain",
     "Press",
     "Rendered",

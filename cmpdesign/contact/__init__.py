@@ -1,0 +1,33 @@
+"""Contact: what an object does to the soft layer that carries the pattern.
+
+elastomer + object + motion -> displacement and traction of the surface
+"""
+
+from __future__ import annotations
+
+from cmpdesign.contact.elastomer import Elastomer
+from cmpdesign.contact.errors import ContactError
+from cmpdesign.contact.heightmap import HeightMap
+from cmpdesign.contact.motion import Motion
+from cmpdesign.contact.objects import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
+from cmpdesign.contact.result import Contact, Relief
+from cmpdesign.contact.solve import solve, solve_path
+
+__all__ = [
+    "Ball",
+    "Contact",
+    "ContactError",
+    "Cube",
+    "Cylinder",
+    "Elastomer",
+    "HeightMap",
+    "Indenter",
+    "Motion",
+    "Punch",
+    "Relief",
+    "Rib",
+    "Ring",
+    "Wedge",
+    "solve",
+    "solve_path",
+]
