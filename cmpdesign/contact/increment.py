@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.green import green
 from cmpdesign.contact.grid import Grid
-from cmpdesign.contact.kernels import compliances
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects import Indenter
 from cmpdesign.contact.operator import Operator
@@ -82,13 +81,6 @@ class Problem:
         """Displacement (3, ny, nx) of all cells."""
         rows, columns = self.grid.shape
         return self.operator((slice(0, rows), slice(0, columns)))(traction_mpa)
-
-    @property
-    def largest(self) -> float:
-        """A bound on the operator's eigenvalues, in mm/MPa."""
-        c = compliances(np.geomspace(1e-3, 1e2, 600) / self.elastomer.thickness_mm, self.elastomer)
-        middle, half = (c.zz + c.ll) / 2, np.hypot((c.zz - c.ll) / 2, c.xz)
-        return 1.02 * float(max((middle + half).max(), c.sh.max()))
 
 
 def advance(problem: Problem, state: State, motion: Motion) -> State:
@@ -168,7 +160,7 @@ def _pressed(
         target,
         Pressure(touchable),
         start,
-        largest=problem.largest,
+        largest=operator.largest_normal,
         tolerance_mm=TOLERANCE * motion.press_mm,
     )
     found = np.zeros_like(traction)
@@ -181,15 +173,15 @@ def _rubbed(
     problem: Problem, traction: Array, height: Array, wanted: Array, motion: Motion, box: Box
 ) -> tuple[Array, int, float]:
     """Tractions with friction up to the friction coefficient times the pressure so far."""
-    inside = (..., *box)
+    operator, inside = problem.operator(box), (..., *box)
     touchable = np.isfinite(height[box])
     target = np.concatenate([wanted[inside], (np.where(touchable, height[box], 0.0) - motion.press_mm)[None]])
     t, applied, left = minimise(
-        problem.operator(box),
+        operator,
         target,
         Friction.at(touchable, problem.friction, traction[(2, *box)]),
         traction[inside],
-        largest=problem.largest,
+        largest=operator.largest,
         tolerance_mm=TOLERANCE * motion.press_mm,
     )
     found = np.zeros_like(traction)

@@ -33,6 +33,10 @@ class Operator:
         self._xy = spectrum(green.xy, True, True)
         self._xz = spectrum(green.xz, False, True)
         self._yz = spectrum(green.yz, True, False)
+        # Gershgorin's bounds on the eigenvalues, in mm/MPa: of all three directions, and of z alone.
+        xx, yy, zz, xy, xz, yz = map(abs, (self._xx, self._yy, self._zz, self._xy, self._xz, self._yz))
+        self.largest = float(max((xx + xy + xz).max(), (yy + xy + yz).max(), (zz + xz + yz).max()))
+        self.largest_normal = float(zz.max())
 
     def __call__(self, traction_mpa: Array) -> Array:
         """Displacement (3, rows, columns) in mm of the traction (3, rows, columns) in MPa."""

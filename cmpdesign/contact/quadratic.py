@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MOST_ITERATIONS = 2000
 # Applications of the operator between two renewals of the limit, and the change of the limit that is taken for none.
-RENEW_AFTER, STEADY = 10, 2e-3
+RENEW_AFTER, STEADY = 10, 5e-4
 # Gradient steps are this long over the largest eigenvalue; up to 2 they descend.
 STEP = 1.9
 
@@ -160,10 +160,15 @@ def minimise(
         applied += 1
         way = float(np.sum(inside * ahead)) / float(np.sum(ahead * answer))
         full = t - way * ahead
-        t = allowed.project(full)
-        if np.array_equal(t, full):
-            gap = gap - way * answer
+        cut = allowed.project(full)
+        if np.array_equal(cut, full):
+            t, gap = full, gap - way * answer
             continue
-        t = allowed.project(t - step * (apply(t) - b))
-        gap, ahead = apply(t) - b, None
+        cut = allowed.project(cut - step * (apply(cut) - b))
+        new_gap, ahead = apply(cut) - b, None
         applied += 2
+        if np.sum(cut * (new_gap - b)) > np.sum(t * (gap - b)):  # twice the energy; a gradient step lowers it
+            cut = allowed.project(t - step * gap)
+            new_gap = apply(cut) - b
+            applied += 1
+        t, gap = cut, new_gap
