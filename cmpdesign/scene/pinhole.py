@@ -209,6 +209,8 @@ def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
     at = xyz_mm @ camera.R_camera_from_layout.T + camera.t_camera_from_layout_mm
     depth = at[:, 2]
     if not np.all(depth > NEAREST_MM):
+        if not np.isfinite(depth).all():
+            raise SceneError(f"{_who(camera)}the surface is not finite everywhere; mend the map")
         worst = int(np.argmin(depth))
         place = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
         raise SceneError(
@@ -219,6 +221,11 @@ def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
     if any(camera.distortion):
         xy = distorted(camera, xy)
     return np.asarray(xy * np.asarray(camera.focal_px) + np.asarray(camera.centre_px))
+
+
+def depth_mm(camera: Pinhole, xyz_mm: Points) -> Points:
+    """(N,) how far before the camera, along its axis, points (N, 3) mm of the layout frame lie."""
+    return np.asarray(xyz_mm @ camera.R_camera_from_layout[2] + camera.t_camera_from_layout_mm[2])
 
 
 def distorted(camera: Pinhole, xy: Points) -> Points:

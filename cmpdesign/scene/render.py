@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import BLACK
+from cmpdesign.scene.camera import pitch_mm
 from cmpdesign.scene.coverage import Engine, coverage
 from cmpdesign.scene.damage import Blob, Damage, Scratch, bled, missing
 from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.folds import add_hidden_parts
 from cmpdesign.scene.light import gain
 from cmpdesign.scene.optics import point_spread
 from cmpdesign.scene.paths import Segments, join, segments
@@ -29,10 +31,11 @@ BACKGROUND, MISSING, BLEED, NOISE = range(4)
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
-    """An image (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor), and its truth."""
+    """An image (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor), its truth, and what it cannot be trusted in."""
 
     image: NDArray[np.uint8] | NDArray[np.uint16]
     truth: Truth
+    warnings: tuple[str, ...] = ()
 
 
 def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine = "compiled") -> Rendered:
@@ -53,7 +56,8 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     for glare in scene.damage.glare if scene.damage else ():
         planes = planes + glare.plane(size)
     image = expose(scene.sensor or Sensor(), planes, _noise_rng(scene))
-    return Rendered(image, _truth(scene, seen, gone))
+    warnings = (*scene.warnings, *(view.warning for view in seen if view.folds))
+    return Rendered(image, _truth(scene, seen, gone), warnings)
 
 
 def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
@@ -113,21 +117,44 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
 
     # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
     black = _bgr(scene.ink(BLACK))
-    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
-        -1, 3
-    )
+    inks_of = _over_black(scene, drawn)
     values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
     values[0, 3] = 1.0
-    values[1:, :3] = over_black
+    values[1:, :3] = inks_of[drawn]
     if bleed_mm:
         values[1:, 4] = 1.0
-    covered = coverage(join([ground, cells]), values, view.area[2:], point_spread(scene.blur_px), engine)
+    covered = coverage(
+        join([ground, cells]), values, view.area[2:], point_spread(scene.blur_px), engine, view.orientation
+    )
+    if view.folds is not None:
+        _require_clean(scene)
+        sheets = np.column_stack([inks_of, np.ones(len(inks_of))])
+        add_hidden_parts(covered, view.folds, sheets, scene.blur_px)
 
     inks, ground_share = covered[:3], covered[3]
     if bleed_mm:
         inks = inks / np.maximum(covered[4], 1.0)
     black_plane = black.astype(np.float32)[:, None, None]
     return np.asarray(inks + behind + ground_share * (black_plane - behind), dtype=np.float32)
+
+
+def _over_black(scene: Scene, drawn: NDArray[np.int64]) -> Points:
+    """(C + 1, 3) B, G, R over black of the cells that are drawn; 0 of the others, and of the border (last)."""
+    color, black = scene.layout.cell_color, _bgr(scene.ink(BLACK))
+    over = np.zeros((len(color) + 1, 3))
+    for ink in np.unique(color[drawn]):
+        over[drawn[color[drawn] == ink]] = _bgr(scene.ink(int(ink))) - black
+    return over
+
+
+def _require_clean(scene: Scene) -> None:
+    """Hidden parts are drawn from cells as designed."""
+    damage = scene.damage
+    if damage and (damage.bleed_mm or damage.blobs or damage.scratches):
+        raise SceneError(
+            "a part of the surface turns away from the camera; with that, bleed_mm, blobs and scratches cannot be "
+            "drawn: take them out of the damage or take a smaller displacement"
+        )
 
 
 def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -158,8 +185,8 @@ def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engin
 def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Truth:
     """Of one view as it is; of a tuple of views with a leading axis."""
     layout, lift = scene.layout, seen[0].xyz_from_layout
-    virtual_mm = layout.virtual_xy_mm.reshape(-1, 2)
-    parts = [_seen(scene, view, gone, virtual_mm) for view in seen]
+    xyz = lift(layout.marker_xy_mm), lift(layout.virtual_xy_mm.reshape(-1, 2))
+    parts = [_seen(scene, view, gone, *xyz) for view in seen]
     columns = {name: [part[name] for part in parts] for name in parts[0]}
     several = isinstance(scene.camera, tuple)
     flat = [view.h for view in seen if view.h is not None]
@@ -167,24 +194,29 @@ def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Tru
         **{name: np.stack(values) if several else values[0] for name, values in columns.items()},
         mirrored=np.array([view.mirrored for view in seen]) if several else seen[0].mirrored,
         H=None if len(flat) < len(seen) else np.stack(flat) if several else flat[0],
-        marker_xyz_mm=lift(layout.marker_xy_mm),
-        virtual_xyz_mm=lift(virtual_mm).reshape(*layout.virtual_xy_mm.shape[:2], 3),
+        marker_xyz_mm=xyz[0],
+        virtual_xyz_mm=xyz[1].reshape(*layout.virtual_xy_mm.shape[:2], 3),
     )
 
 
-def _seen(scene: Scene, view: View, gone: NDArray[np.bool_], virtual_mm: Points) -> dict[str, NDArray[Any]]:
+def _seen(
+    scene: Scene, view: View, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
+) -> dict[str, NDArray[Any]]:
     """What one view has its own values of."""
-    layout = scene.layout
-    marker_xy_px = view.image_from_layout(layout.marker_xy_mm)
+    layout, step_mm = scene.layout, 1e-4 * pitch_mm(scene.layout)
+    marker_xy_px = view.project(marker_xyz_mm)
     inside = view.contains(marker_xy_px)
-    damaged = gone | (_covered(scene, view, _cell_samples(scene)).mean(axis=1) >= 0.5)
+    samples = _cell_samples(scene)
+    away = view.hides(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
+    damaged = gone | ((_covered(scene, view, samples) | away).mean(axis=1) >= 0.5)
     touching = np.zeros(len(marker_xy_px), dtype=np.bool_)
     touching[layout.cell_corners[(layout.cell_color != BLACK) & ~damaged]] = True
     hidden = _covered(scene, view, layout.marker_xy_mm[:, None])[:, 0]
+    hidden |= view.hides(layout.marker_xy_mm, step_mm)
     return {
         "marker_xy_px": marker_xy_px,
         "visible": inside & touching & ~hidden,
-        "virtual_xy_px": view.image_from_layout(virtual_mm).reshape(layout.virtual_xy_mm.shape),
+        "virtual_xy_px": view.project(virtual_xyz_mm).reshape(layout.virtual_xy_mm.shape),
         "cell_visible": inside[layout.cell_corners].all(axis=1) & ~damaged,
     }
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.scene.camera import Camera, homography, is_mirrored, pinhole, pitch_mm, project
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.pinhole import Area, Pinhole, project_3d
+from cmpdesign.scene.folds import Folds, find_folds, hidden
+from cmpdesign.scene.pinhole import Area, Pinhole, depth_mm, project_3d
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.surface import determinant, points_to_check, require_no_fold
 
@@ -23,18 +24,22 @@ class View:
     """One view of a scene.
 
     Attributes:
-        image_from_layout: (N, 2) mm to px of the whole image.
         xyz_from_layout: (N, 2) mm to (N, 3) mm, the surface in space.
+        project: (N, 3) mm to (N, 2) px of the whole image.
         area: x, y, width, height of its part of the image.
         mirrored: the pattern's back is seen.
         h: (3, 3) image from layout; None where straight lines do not stay straight.
+        camera: None where the surface stays in the layout's plane and depth means nothing.
+        folds: where the surface turns away from the camera; None: nowhere.
     """
 
-    image_from_layout: Map
     xyz_from_layout: Map
+    project: Map
     area: Area
     mirrored: bool
     h: Points | None
+    camera: Pinhole | None = None
+    folds: Folds | None = None
 
     @property
     def curved(self) -> bool:
@@ -46,10 +51,50 @@ class View:
         x, y, width, height = self.area
         return slice(None), slice(y, y + height), slice(x, x + width)
 
+    def image_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to px of the whole image."""
+        return self.project(self.xyz_from_layout(xy_mm))
+
     def area_from_layout(self, xy_mm: Points) -> Points:
         """(N, 2) mm to px, counted from the area's own top left pixel."""
         at = self.image_from_layout(xy_mm)
         return at - self.area[:2] if any(self.area[:2]) else at
+
+    @property
+    def sign(self) -> float:
+        """Of the Jacobian determinant of ``image_from_layout`` where the surface faces the camera."""
+        return 1.0 if self.mirrored else -1.0
+
+    @property
+    def orientation(self) -> float | None:
+        """Of polygons that are counter-clockwise in the layout; None where all of them face the camera anyway."""
+        return self.sign if self.folds is not None else None
+
+    @property
+    def warning(self) -> str:
+        """That a part turns away, how much and where; empty where none does."""
+        if self.folds is None:
+            return ""
+        x, y = self.folds.place_mm
+        name = f"view {self.camera.name}: " if self.camera and self.camera.name else ""
+        return (
+            f"{name}{100 * self.folds.share:.2g} % of the pattern turn away from the camera, among others at "
+            f"({x:.3g}, {y:.3g}) mm; what they hide is marked as not visible"
+        )
+
+    def hides(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
+        """Which of the points (N, 2) mm of the layout lie behind another part of the surface, or turn away."""
+        if self.folds is None:
+            return np.zeros(len(xy_mm), dtype=np.bool_)
+        facing = self.sign * determinant(self.image_from_layout, xy_mm, step_mm) > 0
+        return hidden(self.folds, self.depth_from_layout(xy_mm), facing)
+
+    def depth_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
+        assert self.camera is not None
+        xyz = self.xyz_from_layout(xy_mm)
+        xy_px = self.project(xyz) - self.area[:2]
+        return np.column_stack([xy_px, depth_mm(self.camera, xyz)])
 
     def contains(self, xy_px: Points) -> NDArray[np.bool_]:
         """Which of the points (N, 2) px of the image lie in the area."""
@@ -120,27 +165,30 @@ def _of(camera: Camera | Pinhole) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Lift:
-    """The surface as it was given, whether it leads out of the plane, and where it is checked."""
+    """The surface as it was given, and whether it leads out of the plane."""
 
     surface: Map | None
     spatial: bool
-    checked_mm: Points
-    step_mm: float
 
     def __call__(self, xy_mm: Points) -> Points:
         """(N, 2) mm to (N, 3) mm."""
         at = xy_mm if self.surface is None else self.surface(xy_mm)
-        return at if at.shape[1] == 3 else np.column_stack([at, np.zeros(len(at))])
+        if at.shape[1] == 3:
+            return at
+        xyz = np.zeros((len(at), 3))
+        xyz[:, :2] = at
+        return xyz
 
 
 def _lift(scene: Scene) -> _Lift:
     layout, surface = scene.layout, scene.surface
-    checked = points_to_check(layout.marker_xy_mm, layout.cell_corners)
-    step_mm = 1e-4 * pitch_mm(layout)
-    spatial = surface is not None and surface(checked[:1]).shape[1] == 3
-    if surface is not None and not spatial:
-        require_no_fold(surface, checked, step_mm)
-    return _Lift(surface, spatial, checked, step_mm)
+    if surface is None:
+        return _Lift(None, False)
+    spatial = surface(layout.marker_xy_mm[:1]).shape[1] == 3
+    if not spatial:
+        checked = points_to_check(layout.marker_xy_mm, layout.cell_corners)
+        require_no_fold(surface, checked, 1e-4 * pitch_mm(layout))
+    return _Lift(surface, spatial)
 
 
 def _view(scene: Scene, camera: Camera | Pinhole, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
@@ -148,27 +196,14 @@ def _view(scene: Scene, camera: Camera | Pinhole, area: Area, lift: _Lift, size:
         return _planar_view(scene, camera, area, lift, size)
     at = camera if isinstance(camera, Pinhole) else pinhole(camera, scene.layout, size)
     h = at.homography if lift.surface is None else None
-    view = View(lambda xy_mm: project_3d(at, lift(xy_mm)), lift, area, at.mirrored, h)
-    if view.curved:
-        _require_facing(view, lift, _of(camera))
-    return view
+    view = View(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
+    if not view.curved:
+        return view
+    return replace(view, folds=find_folds(scene.layout, view.depth_from_layout, view.sign, area[2:]))
 
 
 def _planar_view(scene: Scene, camera: Camera, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
-    h, surface = homography(camera, scene.layout, size), lift.surface
+    h = homography(camera, scene.layout, size)
+    straight = h if lift.surface is None else None
     mirrored = is_mirrored(camera, scene.layout)
-    if surface is None:
-        return View(lambda xy_mm: project(h, xy_mm), lift, area, mirrored, h)
-    return View(lambda xy_mm: project(h, surface(xy_mm)), lift, area, mirrored, None)
-
-
-def _require_facing(view: View, lift: _Lift, of: str) -> None:
-    """The map's Jacobian determinant has the sign of the surface at rest everywhere."""
-    jacobian = determinant(view.image_from_layout, lift.checked_mm, lift.step_mm)
-    facing = jacobian if view.mirrored else -jacobian
-    if not (facing > 0).all():
-        x, y = lift.checked_mm[int(np.argmin(np.where(np.isnan(facing), -np.inf, facing)))]
-        raise SceneError(
-            f"the surface turns away from the camera{of} at ({x:.3g}, {y:.3g}) mm of the layout; "
-            "take a smaller displacement, a larger radius or a camera that looks more steeply"
-        )
+    return View(lift, lambda xyz_mm: project(h, xyz_mm[:, :2]), area, mirrored, straight)
