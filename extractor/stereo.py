@@ -174,6 +174,11 @@ class Reconstructor:
             problem=problem,
         )
 
+    @property
+    def rest_positions_mm(self) -> Array:
+        """(M + E m, 3) float64, where all points were at rest, the virtual ones last."""
+        return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
+
     def _placed(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
         views = self.rig.views
         if rest is None:

@@ -18,7 +18,8 @@ from .camera import Array, View, finite
 
 ITERATIONS = 12
 CONVERGED = 1e-5  # of a standard deviation
-GATE_SIGMAS = 5.0
+GATE_SIGMAS = 6.0
+DOUBT_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
 SOUND = 1e-14  # half the squared angle between two rays, below which they are one
 
 
@@ -40,7 +41,7 @@ class Points:
 
     Attributes:
         xyz_mm: (N, 3) float64, NaN where there is none.
-        cov_mm2: (N, 3, 3) float64, from the pixels' covariances alone.
+        cov_mm2: (N, 3, 3) float64, from the pixels' covariances alone; times the square of a misfit above 3.
         by_pose: (N, 3, 6 V) float64: how they move with errors of the views' poses.
         misfit: (N,) float64: the residual left over, in standard deviations of its own; NaN where nothing is.
         reason: (N,) uint8, a ``PointReason`` each.
@@ -208,7 +209,9 @@ def _misfit(
 
 
 def _judge(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate_sigmas: float) -> None:
-    """Take back what cannot be believed."""
+    """Widen the covariance of what is doubtful, take back what cannot be believed."""
+    doubtful = use[out.misfit[use] > DOUBT_SIGMAS]
+    out.cov_mm2[doubtful] *= out.misfit[doubtful, None, None] ** 2
     cov = out.cov_mm2[use]
     worst = np.full(len(use), np.inf)
     sound = finite(cov, 2)

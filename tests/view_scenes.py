@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import MappingProxyType
+from typing import Any
 
 import cv2
 import numpy as np
-from conftest import small_text
+from conftest import small_layout, small_text
 from numpy.typing import NDArray
 
+from cmpdesign.scene import Optics, Pinhole, Plain, Rendered, Scene, Sensor, render
+from cmpdesign.scene.standard import BLACK_RGB, INKS
 from extractor import Markers, Reference, Rig, Status, View, parse_layout
 
 Array = NDArray[np.float64]
 
+PITCH_MM = 1.5  # of the small layouts
 DISTORTION = (-0.12, 0.05, 0.001, -0.0015, 0.01)
 
 
@@ -116,3 +121,85 @@ def pressed(xy_mm: Array, depth_mm: float = 1.0) -> Array:
     dent = np.exp(-(((xy_mm - (1.0, -0.5)) / 3.0) ** 2).sum(axis=1))
     moved = np.column_stack([0.3 * dent * xy_mm[:, 0], 0.2 * dent, -depth_mm * dent])
     return np.column_stack([xy_mm, np.zeros(len(xy_mm))]) + moved
+
+
+HALF = (480, 360)  # of the binocular image
+SMALL = 8  # layers
+
+
+def contact(xy_mm: Array) -> Array:
+    """A dent as wide as contacts are, with sideways motion."""
+    dent = np.exp(-(((xy_mm - (1.0, -0.5)) / 5.0) ** 2).sum(axis=1))
+    return np.column_stack([xy_mm + np.outer(dent, (0.6, -0.3)), -1.5 * dent])
+
+
+def binocular(
+    layers: int = SMALL, *, mirror: bool = False, half: tuple[int, int] = HALF
+) -> tuple[Pinhole, ...]:
+    """Two views from the back that share one image, as mirrors make them: the left and the right half."""
+    width, height = half
+    return tuple(
+        Pinhole.looking(
+            (2 * width, height),
+            distance_mm=2.8 * PITCH_MM * layers,
+            field_of_view_deg=50.0,
+            tilt_deg=20.0,
+            azimuth_deg=azimuth,
+            roll_deg=roll,
+            back=True,
+            mirror=mirror,
+            distortion=(-0.05, 0.02, 0.0005, -0.0003, 0.0),
+            area_px=(k * width, 0, width, height),
+            name=name,
+        )
+        for k, (name, azimuth, roll) in enumerate((("left", 180.0, 2.0), ("right", 0.0, -1.0)))
+    )
+
+
+def binocular_scene(surface: Callable[[Array], Array] | None = None, seed: int = 0, **options: Any) -> Scene:
+    layers = options.pop("layers", SMALL)
+    return Scene(
+        layout=small_layout("honeycomb", layers),
+        camera=binocular(layers, **options),
+        surface=surface,
+        background=Plain(BLACK_RGB),
+        optics=Optics(0.8),
+        sensor=Sensor(noise=2.0),
+        inks=INKS,
+        seed=seed,
+    )
+
+
+def binocular_shot(
+    surface: Callable[[Array], Array] | None = None, seed: int = 0, **options: Any
+) -> Rendered:
+    width, height = options.get("half", HALF)
+    return render(binocular_scene(surface, seed, **options), size=(2 * width, height))
+
+
+def rig_of(cameras: tuple[Pinhole, ...]) -> Rig:
+    """What a rig file would say: intrinsics and areas, no poses."""
+    return Rig(
+        tuple(
+            View(
+                c.name,
+                c.focal_px,
+                c.centre_px,
+                c.distortion,
+                c.area_px,
+                np.linalg.det(c.R_camera_from_layout) < 0,
+            )
+            for c in cameras
+        )
+    )
+
+
+def rig_text(rig: Rig) -> str:
+    """The rig as a file's text."""
+    tables = [
+        f'[[view]]\nname = "{view.name}"\nfocal_px = {list(view.focal_px)}\ncentre_px = {list(view.centre_px)}\n'
+        f"distortion = {list(view.distortion)}\narea_px = {list(view.area_px or ())}\n"
+        f"mirrored = {str(view.mirrored).lower()}\n"
+        for view in rig.views
+    ]
+    return "\n".join(tables)

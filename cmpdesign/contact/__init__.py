@@ -12,11 +12,13 @@ from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
 from cmpdesign.contact.result import Contact, Relief
 from cmpdesign.contact.solve import solve, solve_path
+from cmpdesign.contact.table import ContactSetup, contact_from
 
 __all__ = [
     "Ball",
     "Contact",
     "ContactError",
+    "ContactSetup",
     "Cube",
     "Cylinder",
     "Elastomer",
@@ -28,6 +30,7 @@ __all__ = [
     "Rib",
     "Ring",
     "Wedge",
+    "contact_from",
     "solve",
     "solve_path",
 ]

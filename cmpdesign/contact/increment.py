@@ -1,10 +1,9 @@
 """One increment of a contact with Coulomb friction.
 
 
-Normal and tangential tractions act on each other (C_xz), so every increment is solved for all three at once. Coulomb's
-cone depends on the pressure that is sought; it is found by fixed point: solve with |shear| <= mu * (pressure so far),
-take the new pressure, until both agree (Panagiotopoulos). Within one increment a cell in contact sticks to the place
-of the object that it touched before, or slips against its friction. A cell that comes into contact sticks where it is.
+Normal and tangential tractions act on each other (C_xz), so every increment is solved for all three at once. Within one
+increment a cell in contact sticks to the place of the object that it touched before, or slips against its friction. A
+cell that comes into contact sticks where it is.
 
 The theory is linear: the object's height over a point of the surface is read at the point's place before the press.
 Only how far it has slid over the object since is followed, so that a sliding contact moves on.
@@ -21,19 +20,16 @@ from numpy.typing import NDArray
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.green import green
 from cmpdesign.contact.grid import Grid
-from cmpdesign.contact.kernels import compliances
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects import Indenter
 from cmpdesign.contact.operator import Operator
-from cmpdesign.contact.quadratic import Cone, Pressure, minimise
+from cmpdesign.contact.quadratic import Friction, Pressure, minimise
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Box = tuple[slice, slice]
 # The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
 TOLERANCE = 1e-4
-# Friction's fixed point ends when the pressure changes by less than this share.
-STEADY, MOST_ROUNDS = 2e-3, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +82,6 @@ class Problem:
         rows, columns = self.grid.shape
         return self.operator((slice(0, rows), slice(0, columns)))(traction_mpa)
 
-    @property
-    def largest(self) -> float:
-        """A bound on the operator's eigenvalues, in mm/MPa."""
-        c = compliances(np.geomspace(1e-3, 1e2, 600) / self.elastomer.thickness_mm, self.elastomer)
-        middle, half = (c.zz + c.ll) / 2, np.hypot((c.zz - c.ll) / 2, c.xz)
-        return 1.02 * float(max((middle + half).max(), c.sh.max()))
-
 
 def advance(problem: Problem, state: State, motion: Motion) -> State:
     """The state after one more increment. Starts with the cells that may touch, takes in what else would."""
@@ -100,7 +89,7 @@ def advance(problem: Problem, state: State, motion: Motion) -> State:
         nothing = np.zeros_like(state.traction_mpa)
         return State(motion, nothing, nothing, nothing[:2])
     height = problem.height_mm(_ridden(problem, state, motion))
-    near = height < 1.3 * motion.press_mm
+    near = height < 1.15 * motion.press_mm
     if not near.any():
         nothing = np.zeros_like(state.traction_mpa)
         return State(motion, nothing, nothing, state.settled_mm)
@@ -134,16 +123,15 @@ def _solved(problem: Problem, state: State, motion: Motion, box: Box) -> tuple[S
     height = problem.height_mm(_ridden(problem, state, motion))
     traction, applied, left = _pressed(problem, state.traction_mpa, height, motion, box)
     pressing = motion.part(0, 1) == state.motion.part(0, 1)
-    wanted = _wanted(grid, state, motion, centre)
-    for _ in range(MOST_ROUNDS if problem.friction > 0 else 0):
-        before = traction[2]
-        traction, more, left = _rubbed(problem, traction, height, wanted, motion, box)
-        applied += more
-        if not pressing:
-            moved = grid.xy_mm + problem.answer_mm(traction)[:2] - state.settled_mm
-            height = problem.height_mm(motion.brought_back(moved, centre))
-        if np.abs(traction[2] - before).sum() <= STEADY * np.abs(traction[2]).sum():
-            break
+    if problem.friction > 0:
+        wanted = _wanted(grid, state, motion, centre)
+        # Where the object slides its height over a point changes; it is looked up again with what has slid so far.
+        for last in (True,) if pressing else (False, True):
+            traction, more, left = _rubbed(problem, traction, height, wanted, motion, box)
+            applied += more
+            if not last:
+                moved = grid.xy_mm + problem.answer_mm(traction)[:2] - state.settled_mm
+                height = problem.height_mm(motion.brought_back(moved, centre))
     displacement = problem.answer_mm(traction)
     settled = state.settled_mm + (displacement - state.displacement_mm)[:2] if pressing else state.settled_mm
     found = State(motion, traction, displacement, settled, state.iterations + applied, left)
@@ -172,7 +160,7 @@ def _pressed(
         target,
         Pressure(touchable),
         start,
-        largest=problem.largest,
+        largest=operator.largest_normal,
         tolerance_mm=TOLERANCE * motion.press_mm,
     )
     found = np.zeros_like(traction)
@@ -185,17 +173,15 @@ def _rubbed(
     problem: Problem, traction: Array, height: Array, wanted: Array, motion: Motion, box: Box
 ) -> tuple[Array, int, float]:
     """Tractions with friction up to the friction coefficient times the pressure so far."""
-    inside = (..., *box)
-    pressure = -traction[(2, *box)]
-    limit = np.where(pressure > 0, np.inf, 0.0) if problem.sticks else problem.friction * pressure
+    operator, inside = problem.operator(box), (..., *box)
     touchable = np.isfinite(height[box])
     target = np.concatenate([wanted[inside], (np.where(touchable, height[box], 0.0) - motion.press_mm)[None]])
     t, applied, left = minimise(
-        problem.operator(box),
+        operator,
         target,
-        Cone(touchable, limit),
+        Friction.at(touchable, problem.friction, traction[(2, *box)]),
         traction[inside],
-        largest=problem.largest,
+        largest=operator.largest,
         tolerance_mm=TOLERANCE * motion.press_mm,
     )
     found = np.zeros_like(traction)

@@ -5,6 +5,8 @@ layout + surface + camera + light + optics + sensor + damage -> image + truth
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from cmpdesign.scene.background import Busy, Gradient, Paper, Picture, Plain
 from cmpdesign.scene.bound import cramer_rao
 from cmpdesign.scene.camera import Camera
@@ -18,7 +20,12 @@ from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.sensor import Sensor
 from cmpdesign.scene.standard import STANDARD_SIZE, standard_layout, standard_scene
 from cmpdesign.scene.surface import Dent, Press, Shear, Surface, Twist, composed
-from cmpdesign.scene.truth import Truth, load_truth, save_truth
+from cmpdesign.scene.truth import Truth, load_truth, load_truths, save_truth, save_truths
+
+if TYPE_CHECKING:
+    from cmpdesign.scene.file import SceneFile as SceneFile
+    from cmpdesign.scene.file import load_scene as load_scene
+
 
 __all__ = [
     "STANDARD_SIZE",
@@ -40,6 +47,7 @@ __all__ = [
     "Rendered",
     "Scene",
     "SceneError",
+    "SceneFile",
     "Scratch",
     "Sensor",
     "Shear",
@@ -49,9 +57,21 @@ __all__ = [
     "colored_leds",
     "composed",
     "cramer_rao",
+    "load_scene",
     "load_truth",
+    "load_truths",
     "render",
     "save_truth",
+    "save_truths",
     "standard_layout",
     "standard_scene",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Scene files need pydantic, which scenes made in Python do not."""
+    if name not in ("SceneFile", "load_scene"):
+        raise AttributeError(f"module 'cmpdesign.scene' has no attribute {name!r}")
+    from cmpdesign.scene import file
+
+    return getattr(file, name)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import Layout
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 from cmpdesign.scene.pinhole import Pinhole
 
 
@@ -26,6 +27,8 @@ class Camera:
             image's longer side.
         mirrored: looks at the pattern's back; None: as the layout was designed.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     pitch_px: float = 20.0
     rotation_deg: float = 0.0

@@ -56,7 +56,8 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     for glare in scene.damage.glare if scene.damage else ():
         planes = planes + glare.plane(size)
     image = expose(scene.sensor or Sensor(), planes, _noise_rng(scene))
-    return Rendered(image, _truth(scene, seen, gone), tuple(view.warning for view in seen if view.folds))
+    warnings = (*scene.warnings, *(view.warning for view in seen if view.folds))
+    return Rendered(image, _truth(scene, seen, gone), warnings)
 
 
 def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:

@@ -40,6 +40,7 @@ class Scene:
         inks: RGB 0 to 255 by color name, over the layout's palette.
         seed: of everything random; the same scene gives the same bytes.
         frame: its number in a sequence; only the noise depends on it.
+        warnings: what makes its parts doubtful, handed on with the image.
     """
 
     layout: Layout
@@ -53,6 +54,7 @@ class Scene:
     inks: Mapping[str, RGB] = field(default_factory=dict)
     seed: int = 0
     frame: int = 0
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.camera, tuple) and not self.camera:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 Points = NDArray[np.float64]
 
@@ -39,6 +39,8 @@ class Press:
     exactly ``depth_mm``. It folds where depth_mm / radius_mm leaves (-0.61, 1.36).
     """
 
+    __pydantic_config__: ClassVar = STRICT
+
     radius_mm: float
     depth_mm: float
     centre_mm: tuple[float, float] = (0.0, 0.0)
@@ -54,6 +56,8 @@ class Press:
 @dataclass(frozen=True)
 class Twist:
     """Turns points about a centre, counter-clockwise by ``angle_deg`` there, fading as exp(-r^2 / 2)."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     radius_mm: float
     angle_deg: float
@@ -75,6 +79,8 @@ class Twist:
 class Shear:
     """Drags points by ``shift_mm`` at a centre, fading as exp(-r^2 / 2), as a contact drags the skin."""
 
+    __pydantic_config__: ClassVar = STRICT
+
     radius_mm: float
     shift_mm: tuple[float, float]
     centre_mm: tuple[float, float] = (0.0, 0.0)
@@ -94,6 +100,8 @@ class Dent:
     The depth is depth_mm * exp(-r^2 / 2), r = distance / radius_mm: the simplest surface in space. It stands for no
     contact; ``cmpdesign.contact`` has those.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     radius_mm: float
     depth_mm: float
