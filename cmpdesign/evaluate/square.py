@@ -183,9 +183,18 @@ def _agrees(corner_nodes: list[int], ids: list[int], numbers: dict[int, int]) ->
 
 
 def refined(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
-    """(N, 2) the places where gradients meet (cv2.cornerSubPix); as they were where it runs away."""
-    if not len(places):
-        return places
+    """(N, 2) the places where gradients meet (cv2.cornerSubPix); as they were where it runs away.
+
+    NaN outside the image.
+    """
+    inside = ((places >= 0) & (places <= np.array(bgr.shape[1::-1]) - 1)).all(axis=1)
+    found = np.full(places.shape, np.nan)
+    if inside.any():
+        found[inside] = _sub_pixel(bgr, places[inside], edge_px)
+    return found
+
+
+def _sub_pixel(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
     window = max(round(WINDOW * edge_px), MIN_WINDOW_PX)
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)

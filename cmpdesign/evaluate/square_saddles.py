@@ -39,15 +39,25 @@ class SaddleReader(SquareReader):
         first = quads.corners_px[quads.reference]
         ids = reference_ids(first, self.axes_px, int(self.layout.reference_marker), side)
         saddles = find_saddles(bgr, self.edge_px)
-        placed = grow(saddles, dict(zip(ids, first, strict=True)), side, self.axes_px * self.edge_px)
+        start = {divmod(marker, side): place for marker, place in zip(ids, first, strict=True)}
+        placed = grow(saddles, start, side, self.axes_px * self.edge_px)
         if placed:
-            found = np.array(sorted(placed), dtype=np.int64)
-            xy_px[found] = refined(bgr, np.array([placed[i] for i in found.tolist()]), self.edge_px)
+            found = np.array([row * side + column for row, column in sorted(placed)], dtype=np.int64)
+            places = np.array([placed[place] for place in sorted(placed)])
+            xy_px[found] = refined(bgr, places, self.edge_px)
         return xy_px
 
 
-def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> Points:
-    """(N, 2) the strong local maxima of the negative Hessian determinant of the smoothed brightness, in px."""
+@dataclass(frozen=True, eq=False)
+class Saddles:
+    """Saddle points: (N, 2) their places in px, and (N, 2, 2) the second derivatives there."""
+
+    xy_px: Points
+    bend: Points
+
+
+def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> Saddles:
+    """The strong local maxima of the negative Hessian determinant of the smoothed brightness."""
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)
     smooth = cv2.GaussianBlur(gray, (0, 0), max(SMOOTH * edge_px, 1.0))
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
@@ -56,42 +66,55 @@ def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> Points:
     highest = cv2.dilate(response, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     strong = float(np.quantile(response[(response == highest) & (response > 0)], 0.9))
     rows, columns = np.nonzero((response == highest) & (response > WEAK * strong))
-    return np.stack([columns, rows], axis=1).astype(np.float64)
+    bend = np.stack([xx, xy, xy, yy], axis=-1)[rows, columns].reshape(-1, 2, 2).astype(np.float64)
+    return Saddles(np.stack([columns, rows], axis=1).astype(np.float64), bend)
 
 
-def grow(saddles: Points, start: dict[int, Points], side: int, steps_px: Points) -> dict[int, Points]:
-    """Marker id -> place, outward from the places ``start`` of the reference cell's markers.
+def grow(saddles: Saddles, start: dict[Place, Points], side: int, steps_px: Points) -> dict[Place, Points]:
+    """(row, column) -> place, outward from the places ``start`` of the reference cell's markers.
 
     The nearest saddle within ``REACH`` of where a neighbour is expected is taken, the best fitting first, each once.
+    It must bend as its place in the lattice says: light and dark cells alternate.
     """
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(saddles)
+    tree = cKDTree(saddles.xy_px)
+    turn = np.sign(steps_px[0, 0] * steps_px[1, 1] - steps_px[0, 1] * steps_px[1, 0])
+    top_left = min(start)
     placed: dict[Place, Points] = {}
     used: set[int] = set()
     queue: list[tuple[float, Place, int]] = []
 
-    def offer(place: Place, expected: Points, step_px: float) -> None:
+    def offer(place: Place, expected: Points, across: Points) -> None:
+        step_px = float(np.linalg.norm(across))
         apart, saddle = tree.query(expected, distance_upper_bound=REACH * step_px)
-        if np.isfinite(apart):
+        if not np.isfinite(apart):
+            return
+        down = turn * np.array([-across[1], across[0]])
+        light_below = across @ saddles.bend[saddle] @ down > 0
+        if light_below == ((sum(place) - sum(top_left)) % 2 == 0):
             heappush(queue, (float(apart) / step_px, place, int(saddle)))
 
-    for marker, xy in start.items():
-        offer(divmod(marker, side), xy, float(np.linalg.norm(steps_px[0])))
+    right_px = start[top_left[0], top_left[1] + 1] - start[top_left]
+    for place, xy in start.items():
+        offer(place, xy, right_px)
     while queue:
         _, place, saddle = heappop(queue)
         if place in placed or saddle in used:
             continue
-        placed[place] = saddles[saddle]
+        placed[place] = saddles.xy_px[saddle]
         used.add(saddle)
         if len(placed) < len(start):
             continue
-        for down, right in STEPS:
-            near = place[0] + down, place[1] + right
-            if near not in placed and min(near) >= 0 and max(near) < side:
-                step = _step(place, (down, right), placed, steps_px)
-                offer(near, placed[place] + step, float(np.linalg.norm(step)))
-    return {row * side + column: xy for (row, column), xy in placed.items()}
+        # The start's markers wait for each other, since their steps tell how the cell is turned.
+        for known in placed if len(placed) == len(start) else (place,):
+            for down, right in STEPS:
+                near = known[0] + down, known[1] + right
+                if near not in placed and min(near) >= 0 and max(near) < side:
+                    step = _step(known, (down, right), placed, steps_px)
+                    across = step if right else turn * np.array([step[1], -step[0]])
+                    offer(near, placed[known] + step, (down + right) * across)
+    return placed
 
 
 def _step(place: Place, way: Place, placed: dict[Place, Points], steps_px: Points) -> Points:
