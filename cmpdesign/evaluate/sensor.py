@@ -136,7 +136,9 @@ class SimulatedSensor:
             SensorError: the file has no such pattern.
         """
         if method not in self.table.patterns:
-            raise SensorError(f"the sensor has no [patterns.{method}]; give one to compare {', '.join(METHODS)}")
+            raise SensorError(
+                f"the sensor has no [patterns.{method}]; give one to compare {', '.join(METHODS)}"
+            )
         return self.table.patterns[method]
 
 
