@@ -1,0 +1,22 @@
+"""What the article reports of the same experiments, on manufactured sensors (its section IV)."""
+
+from __future__ import annotations
+
+# Section IV-B and Fig. 11a: how much smaller the multicolor pattern's edge fitting error is.
+EDGE_ERROR_CHANGE_PERCENT = {"press": -61.2, "press_shear": -58.1}
+# Section IV-B and Fig. 11b: how much larger its response is.
+RESPONSE_CHANGE_PERCENT = {"shear_x": 17.6, "shear_y": 12.2}
+# Table I: successes in ten trials a mode.
+TRIALS = 10
+SUCCESSES = {
+    "twist": {"square": 7, "multicolor": 9, "multicolor_repair": 10},
+    "shear_x": {"square": 6, "multicolor": 7, "multicolor_repair": 10},
+    "shear_y": {"square": 6, "multicolor": 10, "multicolor_repair": 10},
+}
+
+
+def change_percent(square: float | None, multicolor: float | None) -> float | None:
+    """How the multicolor pattern's figure differs from the square one's, in percent of that."""
+    if square is None or multicolor is None or square == 0:
+        return None
+    return round(100 * (multicolor - square) / square, 2)

@@ -1,0 +1,111 @@
+"""``evaluate precision``: five objects pressed by 2 mm, and the edge fitting error of a cube (section IV-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cmpdesign.evaluate import article, cube
+from cmpdesign.evaluate.contacts import Load, surface
+from cmpdesign.evaluate.runner import Trial, rng
+from cmpdesign.evaluate.statistics import number, spread
+
+DEFAULT_TRIALS = 10
+OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge")
+PRESS_MM, REACH_MM = 2.0, 4.0
+METHODS = cube.SHOWN
+EDGE_MODES = ("press", "press_shear")
+VARIANTS = ("read", "with_virtual", "perfect")
+
+
+def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
+    """``count`` places for every object, and for the cube in both modes."""
+    common = {"sensor": sensor_text, "seed": seed}
+    objects = [
+        Trial(f"{name}-{i}", {**common, "object": name, "index": i}) for name in OBJECTS for i in range(count)
+    ]
+    return objects + cube_trials(EDGE_MODES, count, sensor_text, seed)
+
+
+def cube_trials(modes: Sequence[str], count: int, sensor_text: str, seed: int) -> list[Trial]:
+    return [
+        Trial(f"cube-{mode}-{i}", {"sensor": sensor_text, "seed": seed, "mode": mode, "index": i})
+        for mode in modes
+        for i in range(count)
+    ]
+
+
+def work(values: Mapping[str, Any]) -> dict[str, Any]:
+    """One object or cube at one place, with both patterns."""
+    if "mode" in values:
+        return cube.work(values)
+    from cmpdesign.evaluate.conditions import middle
+    from cmpdesign.evaluate.instrument import instrument
+    from cmpdesign.evaluate.shapes import compared
+
+    text = values["sensor"]
+    random = rng(values["seed"], values["object"], values["index"])
+    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
+    pressed = surface(text, Load(values["object"], PRESS_MM), (float(x), float(y)))
+    seed = int(random.integers(2**31))
+    found: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
+    for method in METHODS:
+        one = instrument(text, method)
+        found[method] = compared(one, pressed, middle(one.sensor.table.conditions), seed)
+    return found
+
+
+def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """report.json's members."""
+    pairs = list(zip(trials, results, strict=True))
+    shapes = {
+        name: {
+            method: _errors([r[method] for t, r in pairs if t.values.get("object") == name])
+            for method in METHODS
+        }
+        for name in OBJECTS
+    }
+    edges = {
+        mode: edge_figures([r for t, r in pairs if t.values.get("mode") == mode], mode) for mode in EDGE_MODES
+    }
+    return {"shape_error_mm": shapes, "edge_fit_error_mm": edges}
+
+
+def _errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    names = ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "covered", "measured")
+    return {name: spread([one[name] for one in found]).to_json() for name in names}
+
+
+def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
+    """The mean edge fitting error of both patterns, its distribution, and what else would have come out."""
+    document: dict[str, Any] = {}
+    for method in METHODS:
+        errors = edge_errors_mm(found, method, "read")
+        document[method] = number(spread(errors).mean)
+    document["change_percent"] = article.change_percent(document["square"], document["multicolor"])
+    document["article_change_percent"] = article.EDGE_ERROR_CHANGE_PERCENT[mode]
+    document["distribution"] = {
+        method: {
+            "error": spread(edge_errors_mm(found, method, "read")).to_json(),
+            "side_mm": [number(one[method]["read"]["side_mm"] or float("nan")) for one in found],
+        }
+        for method in METHODS
+    }
+    variants = {variant: {m: edge_errors_mm(found, m, variant) for m in METHODS} for variant in VARIANTS[1:]}
+    variants["mean_extent"] = {
+        m: edge_errors_mm(found, m, "read", "mean_extent_mm") for m in METHODS
+    }
+    document["variants"] = {
+        name: {m: number(spread(errors).mean) for m, errors in one.items()} for name, one in variants.items()
+    }
+    for one in document["variants"].values():
+        one["change_percent"] = article.change_percent(one["square"], one["multicolor"])
+    return document
+
+
+def edge_errors_mm(
+    found: Sequence[Mapping[str, Any]], method: str, variant: str, measure: str = "side_mm"
+) -> list[float]:
+    """By how much the fitted square's side misses the cube's, where there is one."""
+    sides = [one[method][variant][measure] for one in found]
+    return [abs(side - cube.SIDE_MM) for side in sides if side is not None]

@@ -1,0 +1,146 @@
+"""``evaluate reliability``: how often a pattern is read under a ball that presses, then twists or shears (Table I)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.evaluate import article
+from cmpdesign.evaluate.contacts import Load, Moved, surface
+from cmpdesign.evaluate.instrument import Instrument, instrument
+from cmpdesign.evaluate.runner import Trial, rng
+from cmpdesign.evaluate.statistics import Share, spread
+
+if TYPE_CHECKING:
+    from cmpdesign.evaluate.conditions import Drawn
+    from cmpdesign.scene import Rendered
+    from cmpdesign.scene.truth import Truth
+
+Points = NDArray[np.float64]
+DEFAULT_TRIALS = 300
+REACH_MM = 4.0  # the ball's centre lies within this of the pattern's middle, in x and y
+MODES = {
+    "twist": Load("large_ball", 2.0, twist_deg=-30.0),
+    "shear_x": Load("large_ball", 2.0, shear_mm=(1.5, 0.0)),
+    "shear_y": Load("large_ball", 2.0, shear_mm=(0.0, 1.5)),
+}
+METHODS = ("square", "square_saddles", "multicolor", "multicolor_repair")
+
+# A marker belongs to the contact's area when it moves by at least this share of the largest movement.
+AREA = 0.1
+# It is right when it lies this near to its true place, in edges at rest: far below the next marker's.
+TOLERANCE = 0.25
+CRITERIA = {
+    "strict": "in both views every visible marker of the contact's area has its number and its place, and nowhere does "
+    "a marker have a wrong place",
+    "area_95": "the same with 95 % of the visible markers of the contact's area",
+    "no_wrong": "at least half of the visible markers of the contact's area, and nowhere a wrong place",
+}
+DEFINITION = (
+    f"Successful: {CRITERIA['strict']}. A place is right within {TOLERANCE:g} edges at rest of the true one; the "
+    f"contact's area is where the surface has moved by at least {AREA:.0%} of the largest movement."
+)
+
+
+def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
+    """``count`` random positions and lights for every mode; the same ones for all patterns."""
+    return [
+        Trial(f"{mode}-{i}", {"sensor": sensor_text, "seed": seed, "mode": mode, "index": i})
+        for mode in MODES
+        for i in range(count)
+    ]
+
+
+def work(values: Mapping[str, Any]) -> dict[str, Any]:
+    """What each method reads of one contact."""
+    from cmpdesign.evaluate.conditions import draw
+    from extractor.types import Status
+
+    text, mode = values["sensor"], values["mode"]
+    random = rng(values["seed"], mode, values["index"])
+    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
+    pressed = surface(text, MODES[mode], (float(x), float(y)))
+    ranges = instrument(text, "square").sensor.table.conditions
+    drawn = draw(ranges, random, instrument(text, "square").half_window_mm)
+    seed = int(random.integers(2**31))
+
+    found: dict[str, Any] = {}
+    square, multicolor = instrument(text, "square"), instrument(text, "multicolor")
+    picture, dirty = _picture(square, drawn, seed, pressed)
+    for method in ("square", "square_saddles"):
+        read = instrument(text, method).read(picture.image)
+        found[method] = judged(square, pressed, picture.truth, np.stack([m.xy_px for m in read]))
+    picture, dirty_too = _picture(multicolor, drawn, seed, pressed)
+    read = multicolor.read(picture.image)
+    places, status = np.stack([m.xy_px for m in read]), np.stack([m.status for m in read])
+    measured = np.where((status == Status.MEASURED)[..., None], places, np.nan)
+    found["multicolor"] = judged(multicolor, pressed, picture.truth, measured)
+    found["multicolor_repair"] = judged(multicolor, pressed, picture.truth, places)
+    return {"methods": found, "centre_mm": [float(x), float(y)], "specks_drawn": bool(dirty and dirty_too)}
+
+
+def _picture(one: Instrument, drawn: Drawn, seed: int, pressed: Moved) -> tuple[Rendered, bool]:
+    """The picture; without the specks where the surface turns away from a camera, as dirt cannot be drawn there."""
+    from dataclasses import replace
+
+    from cmpdesign.scene import SceneError
+
+    try:
+        return one.picture(drawn, seed, pressed), True
+    except SceneError:
+        if drawn.damage is None:
+            raise
+        return one.picture(replace(drawn, damage=None), seed, pressed), False
+
+
+def judged(one: Instrument, pressed: Moved, truth: Truth, places: Points) -> dict[str, Any]:
+    """What is right and wrong of places (V, M, 2) read in all views together."""
+    moved_mm = np.linalg.norm(pressed.displacement_mm(one.layout.marker_xy_mm), axis=1)
+    area = moved_mm >= AREA * moved_mm[one.layout.present].max()
+    needed = np.asarray(truth.visible) & area
+    away_px = np.linalg.norm(places - truth.marker_xy_px, axis=2)
+    tolerance_px = TOLERANCE * one.edge_px
+    known = np.isfinite(away_px)
+    right = known & (away_px <= tolerance_px)
+    rms_px = float(np.sqrt(np.mean(away_px[right] ** 2))) if right.any() else None
+    return {
+        "needed": int(needed.sum()),
+        "right": int((needed & right).sum()),
+        "wrong": int((known & ~right).sum()),
+        "visible": int(np.asarray(truth.visible).sum()),
+        "visible_right": int((np.asarray(truth.visible) & right).sum()),
+        "rms_px": rms_px,
+    }
+
+
+def holds(criterion: str, one: Mapping[str, Any]) -> bool:
+    """Whether a method's reading of one contact is successful, by a criterion of ``CRITERIA``."""
+    share = {"strict": 1.0, "area_95": 0.95, "no_wrong": 0.5}[criterion]
+    return one["wrong"] == 0 and one["right"] >= share * one["needed"]
+
+
+def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """report.json's members."""
+    modes: dict[str, Any] = {}
+    for mode in MODES:
+        found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
+        modes[mode] = {method: _method([r["methods"][method] for r in found]) for method in METHODS}
+        for method, successes in article.SUCCESSES[mode].items():
+            modes[mode][method]["article"] = Share(article.TRIALS, successes).to_json()
+    undrawn = sum(not result["specks_drawn"] for result in results)
+    return {"definition": DEFINITION, "criteria": CRITERIA, "modes": modes, "trials_without_specks": undrawn}
+
+
+def _method(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    counts = {name: Share(len(found), sum(holds(name, one) for one in found)).to_json() for name in CRITERIA}
+    return {
+        **counts["strict"],
+        "by_criterion": counts,
+        "right_in_area_percent": spread([100 * one["right"] / max(one["needed"], 1) for one in found]).to_json(),
+        "wrong_markers": sum(one["wrong"] for one in found),
+        "trials_with_wrong": sum(one["wrong"] > 0 for one in found),
+        "rms_px": spread([one["rms_px"] for one in found]).to_json(),
+    }

@@ -1,0 +1,50 @@
+"""``evaluate response``: how much of a shear the markers in contact show (Fig. 11b)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cmpdesign.evaluate import article, cube
+from cmpdesign.evaluate.precision import cube_trials
+from cmpdesign.evaluate.runner import Trial
+from cmpdesign.evaluate.statistics import number, spread
+
+DEFAULT_TRIALS = 10
+METHODS = cube.SHOWN
+CASES = {"shear_x": "press_shear_x", "shear_y": "press_shear"}
+work = cube.work
+
+
+def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
+    """``count`` places of the cube for both directions."""
+    return cube_trials(tuple(CASES.values()), count, sensor_text, seed)
+
+
+def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """report.json's members: by direction, mean displacement of the edge points over the shear."""
+    document: dict[str, Any] = {}
+    for case, mode in CASES.items():
+        found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
+        means = {method: number(spread(values(found, method, "read")).mean) for method in METHODS}
+        others = {
+            variant: {method: number(spread(values(found, method, variant)).mean) for method in METHODS}
+            for variant in ("with_virtual", "perfect")
+        }
+        for one in others.values():
+            one["change_percent"] = article.change_percent(one["square"], one["multicolor"])
+        document[case] = {
+            **means,
+            "change_percent": article.change_percent(means["square"], means["multicolor"]),
+            "article_change_percent": article.RESPONSE_CHANGE_PERCENT[case],
+            "distribution": {
+                method: spread(values(found, method, "read")).to_json() for method in METHODS
+            },
+            "variants": others,
+        }
+    return {"response": document}
+
+
+def values(found: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
+    """The responses of a method, where it has one."""
+    return [one[method][variant]["response"] for one in found if one[method][variant]["response"] is not None]
