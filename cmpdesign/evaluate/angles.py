@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate.runner import Trial
+from cmpdesign.evaluate.runner import Options, Trial
 
+RULE = (
+    "A cell is recognised when the n corners that stand out most of its contour are convex, each by at least 1.5 px, "
+    "and its outline fits them; a corner gets the number of the corner at rest in whose direction it lies."
+)
 SIDES = (3, 4, 6)
 EDGES_PX = (20, 50, 100, 400)
 STEP_DEG = 0.5
@@ -22,8 +26,8 @@ def turn_limit_deg(sides: int) -> float:
     return 180 / sides
 
 
-def trials() -> list[Trial]:
-    """One for every shape of cell, size and deformation."""
+def trials(options: Options) -> list[Trial]:
+    """One for every shape of cell, size and deformation; nothing in them is random."""
     return [
         Trial(f"{kind}-{sides}-{edge_px}", {"kind": kind, "sides": sides, "edge_px": edge_px})
         for kind in ("shape", "turn")
@@ -51,10 +55,10 @@ def first_lost_deg(holds: Callable[[float], bool], until_deg: float) -> float | 
     return None
 
 
-def figures(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """report.json's members: by n, the formula's limits and the measured ones by edge length."""
     document: dict[str, Any] = {}
-    for trial, result in zip(trials(), results, strict=True):
+    for trial, result in zip(trials, results, strict=True):
         sides = trial.values["sides"]
         cell = document.setdefault(
             f"n{sides}",
@@ -65,4 +69,4 @@ def figures(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         )
         name = "shape_change_deg" if trial.values["kind"] == "shape" else "rotation_deg"
         cell[name]["measured"][f"{trial.values['edge_px']}px"] = result["first_lost_deg"]
-    return {"cells": document}
+    return {"rule": RULE, "cells": document}

@@ -1,8 +1,9 @@
 """Single cells under the two deformations of the article's Fig. 4, drawn and recognised.
 
-The rule of recognition: the n corners that stand out most of a cell's contour are convex, each stands out by at least
-1.5 px from the line between its neighbours, and the contour leaves the cell that they span by 3 px or
-2 % of its size at most. The rule of tracking: a corner gets the number of that corner at rest whose direction from the cell's centre is nearest.
+The rule of recognition: the n corners that stand out most of a cell's contour are convex, each by 1.5 px or more
+from the line between its neighbours, and the contour leaves the cell that they span by at most 3 px or 2 % of its
+size. The rule of tracking: a corner gets the number of that corner at rest whose direction from the cell's centre is
+nearest.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     pressed = surface(text, MODES[mode], centre_mm)
     found: dict[str, Any] = {"centre_mm": list(centre_mm)}
     for method in SHOWN:
-        one = instrument(text, method)
+        one = instrument(text, method, values["preset"])
         seed = int(rng(values["seed"], f"cube-{mode}", values["index"]).integers(2**31))
         picture = one.picture(middle(one.sensor.table.conditions), seed, pressed)
         shape = one.reconstructor.reconstruct(one.read(picture.image))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from types import MappingProxyType
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from cmpdesign.scene import Rendered
     from extractor import Markers, Reference
     from extractor.camera import View
+    from extractor.refine import Preset
     from extractor.stereo import Reconstructor
 
 Points = NDArray[np.float64]
-READERS = ("contours", "saddles", "colors")
 # What a corner of the square pattern is taken to be known to, for want of a covariance of its own.
 SQUARE_SIGMA_PX = 0.1
 REST_SEED = 0
@@ -38,11 +38,13 @@ class Instrument:
         sensor: the simulated sensor.
         layout: the pattern, its outline's middle at the origin: there the cameras look.
         reader: "contours" or "saddles" for a square pattern, "colors" for a triangular one.
+        preset: the extractor's, for a triangular pattern.
     """
 
     sensor: SimulatedSensor
     layout: Layout
     reader: str
+    preset: Preset = "balanced"
 
     @cached_property
     def reference(self) -> Reference:
@@ -119,7 +121,7 @@ class Instrument:
         if self.reader == "colors":
             from extractor import Extractor
 
-            extract = Extractor(self.reference).extract
+            extract = Extractor(self.reference, self.preset).extract
             return [extract] * len(self.sensor.rig.views)
         return [_square_reader(self, view) for view in self.sensor.rig.views]
 
@@ -176,14 +178,19 @@ def _moved(layout: Layout, by_mm: Points) -> Layout:
 
 
 @lru_cache(maxsize=8)
-def instrument(sensor_text: str, method: str) -> Instrument:
+def instrument(sensor_text: str, method: str, preset: Preset = "balanced") -> Instrument:
     """The instrument of a method: "square", "square_saddles" or "multicolor", with the sensor's own patterns."""
     sensor = parse_sensor(sensor_text)
     pattern = sensor.pattern("multicolor" if method.startswith("multicolor") else "square")
-    reader = {"square": "contours", "square_saddles": "saddles"}.get(method, "colors")
-    return instrument_of(sensor, pattern, reader)
+    design = Design.model_validate(dict(pattern))
+    return instrument_of(sensor, design, preset, saddles=method == "square_saddles")
 
 
-def instrument_of(sensor: SimulatedSensor, pattern: Mapping[str, Any], reader: str) -> Instrument:
-    """A pattern, given as a design's fields, on a sensor."""
-    return Instrument(sensor, centred(build_layout(Design.model_validate(dict(pattern)))), reader)
+def instrument_of(
+    sensor: SimulatedSensor, design: Design, preset: Preset = "balanced", *, saddles: bool = False
+) -> Instrument:
+    """A design on a sensor, with the reader that its cells ask for."""
+    layout = centred(build_layout(design))
+    if layout.cell_corners.shape[1] == 3:
+        return Instrument(sensor, layout, "colors", preset)
+    return Instrument(sensor, layout, "saddles" if saddles else "contours", preset)

@@ -7,10 +7,9 @@ from typing import Any
 
 from cmpdesign.evaluate import article, cube
 from cmpdesign.evaluate.contacts import Load, surface
-from cmpdesign.evaluate.runner import Trial, rng
+from cmpdesign.evaluate.runner import Options, Trial, rng
 from cmpdesign.evaluate.statistics import number, spread
 
-DEFAULT_TRIALS = 10
 OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0
 METHODS = cube.SHOWN
@@ -18,20 +17,21 @@ EDGE_MODES = ("press", "press_shear")
 VARIANTS = ("read", "with_virtual", "perfect")
 
 
-def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
-    """``count`` places for every object, and for the cube in both modes."""
-    common = {"sensor": sensor_text, "seed": seed}
+def trials(options: Options) -> list[Trial]:
+    """As many places for every object, and for the cube in both modes."""
     objects = [
-        Trial(f"{name}-{i}", {**common, "object": name, "index": i}) for name in OBJECTS for i in range(count)
+        Trial(f"{name}-{i}", {**options.values, "object": name, "index": i})
+        for name in OBJECTS
+        for i in range(options.trials)
     ]
-    return objects + cube_trials(EDGE_MODES, count, sensor_text, seed)
+    return objects + cube_trials(EDGE_MODES, options)
 
 
-def cube_trials(modes: Sequence[str], count: int, sensor_text: str, seed: int) -> list[Trial]:
+def cube_trials(modes: Sequence[str], options: Options) -> list[Trial]:
     return [
-        Trial(f"cube-{mode}-{i}", {"sensor": sensor_text, "seed": seed, "mode": mode, "index": i})
+        Trial(f"cube-{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in modes
-        for i in range(count)
+        for i in range(options.trials)
     ]
 
 
@@ -50,7 +50,7 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     seed = int(random.integers(2**31))
     found: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
     for method in METHODS:
-        one = instrument(text, method)
+        one = instrument(text, method, values["preset"])
         found[method] = compared(one, pressed, middle(one.sensor.table.conditions), seed)
     return found
 
@@ -92,9 +92,7 @@ def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any
         for method in METHODS
     }
     variants = {variant: {m: edge_errors_mm(found, m, variant) for m in METHODS} for variant in VARIANTS[1:]}
-    variants["mean_extent"] = {
-        m: edge_errors_mm(found, m, "read", "mean_extent_mm") for m in METHODS
-    }
+    variants["mean_extent"] = {m: edge_errors_mm(found, m, "read", "mean_extent_mm") for m in METHODS}
     document["variants"] = {
         name: {m: number(spread(errors).mean) for m, errors in one.items()} for name, one in variants.items()
     }

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cmpdesign.evaluate import article
 from cmpdesign.evaluate.contacts import Load, Moved, surface
 from cmpdesign.evaluate.instrument import Instrument, instrument
-from cmpdesign.evaluate.runner import Trial, rng
+from cmpdesign.evaluate.runner import Options, Trial, rng
 from cmpdesign.evaluate.statistics import Share, spread
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from cmpdesign.scene.truth import Truth
 
 Points = NDArray[np.float64]
-DEFAULT_TRIALS = 300
 REACH_MM = 4.0  # the ball's centre lies within this of the pattern's middle, in x and y
 MODES = {
     "twist": Load("large_ball", 2.0, twist_deg=-30.0),
@@ -45,12 +44,12 @@ DEFINITION = (
 )
 
 
-def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
-    """``count`` random positions and lights for every mode; the same ones for all patterns."""
+def trials(options: Options) -> list[Trial]:
+    """As many random positions and lights for every mode; the same ones for all patterns."""
     return [
-        Trial(f"{mode}-{i}", {"sensor": sensor_text, "seed": seed, "mode": mode, "index": i})
+        Trial(f"{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in MODES
-        for i in range(count)
+        for i in range(options.trials)
     ]
 
 
@@ -63,15 +62,18 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     random = rng(values["seed"], mode, values["index"])
     x, y = random.uniform(-REACH_MM, REACH_MM, 2)
     pressed = surface(text, MODES[mode], (float(x), float(y)))
-    ranges = instrument(text, "square").sensor.table.conditions
-    drawn = draw(ranges, random, instrument(text, "square").half_window_mm)
+    ranges = instrument(text, "square", values["preset"]).sensor.table.conditions
+    drawn = draw(ranges, random, instrument(text, "square", values["preset"]).half_window_mm)
     seed = int(random.integers(2**31))
 
     found: dict[str, Any] = {}
-    square, multicolor = instrument(text, "square"), instrument(text, "multicolor")
+    square, multicolor = (
+        instrument(text, "square", values["preset"]),
+        instrument(text, "multicolor", values["preset"]),
+    )
     picture, dirty = _picture(square, drawn, seed, pressed)
     for method in ("square", "square_saddles"):
-        read = instrument(text, method).read(picture.image)
+        read = instrument(text, method, values["preset"]).read(picture.image)
         found[method] = judged(square, pressed, picture.truth, np.stack([m.xy_px for m in read]))
     picture, dirty_too = _picture(multicolor, drawn, seed, pressed)
     read = multicolor.read(picture.image)
@@ -119,7 +121,7 @@ def judged(one: Instrument, pressed: Moved, truth: Truth, places: Points) -> dic
 def holds(criterion: str, one: Mapping[str, Any]) -> bool:
     """Whether a method's reading of one contact is successful, by a criterion of ``CRITERIA``."""
     share = {"strict": 1.0, "area_95": 0.95, "no_wrong": 0.5}[criterion]
-    return one["wrong"] == 0 and one["right"] >= share * one["needed"]
+    return bool(one["wrong"] == 0 and one["right"] >= share * one["needed"])
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -139,7 +141,9 @@ def _method(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         **counts["strict"],
         "by_criterion": counts,
-        "right_in_area_percent": spread([100 * one["right"] / max(one["needed"], 1) for one in found]).to_json(),
+        "right_in_area_percent": spread(
+            [100 * one["right"] / max(one["needed"], 1) for one in found]
+        ).to_json(),
         "wrong_markers": sum(one["wrong"] for one in found),
         "trials_with_wrong": sum(one["wrong"] > 0 for one in found),
         "rms_px": spread([one["rms_px"] for one in found]).to_json(),

@@ -7,18 +7,17 @@ from typing import Any
 
 from cmpdesign.evaluate import article, cube
 from cmpdesign.evaluate.precision import cube_trials
-from cmpdesign.evaluate.runner import Trial
+from cmpdesign.evaluate.runner import Options, Trial
 from cmpdesign.evaluate.statistics import number, spread
 
-DEFAULT_TRIALS = 10
 METHODS = cube.SHOWN
 CASES = {"shear_x": "press_shear_x", "shear_y": "press_shear"}
 work = cube.work
 
 
-def trials(count: int, sensor_text: str, seed: int) -> list[Trial]:
-    """``count`` places of the cube for both directions."""
-    return cube_trials(tuple(CASES.values()), count, sensor_text, seed)
+def trials(options: Options) -> list[Trial]:
+    """As many places of the cube for both directions."""
+    return cube_trials(tuple(CASES.values()), options)
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -37,9 +36,7 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
             **means,
             "change_percent": article.change_percent(means["square"], means["multicolor"]),
             "article_change_percent": article.RESPONSE_CHANGE_PERCENT[case],
-            "distribution": {
-                method: spread(values(found, method, "read")).to_json() for method in METHODS
-            },
+            "distribution": {method: spread(values(found, method, "read")).to_json() for method in METHODS},
             "variants": others,
         }
     return {"response": document}

@@ -32,6 +32,37 @@ class Trial:
     values: Mapping[str, Any]
 
 
+@dataclass(frozen=True)
+class Options:
+    """What a user chooses for a run.
+
+    Attributes:
+        trials: how many of each kind.
+        seed: of everything random.
+        sensor_text: the sensor file's content.
+        preset: the extractor's.
+        workers: processes.
+    """
+
+    trials: int
+    seed: int = 0
+    sensor_text: str = ""
+    preset: str = "balanced"
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("trials", "workers"):
+            if getattr(self, name) < 1:
+                raise CmpDesignError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        if self.seed < 0:
+            raise CmpDesignError(f"seed is {self.seed}; it must be 0 or more")
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """What every trial is told; it decides the results, so the journal is only good for the same."""
+        return {"sensor": self.sensor_text, "seed": self.seed, "preset": self.preset}
+
+
 Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
@@ -52,11 +83,9 @@ def run(
         show: a bar on stderr, where a terminal shows it.
 
     Raises:
-        CmpDesignError: fewer than one worker, or two trials with one key.
+        CmpDesignError: two trials have one key.
         OutputError: the journal cannot be written.
     """
-    if workers < 1:
-        raise CmpDesignError(f"workers is {workers}; it must be at least 1")
     if len({trial.key for trial in trials}) < len(trials):
         raise CmpDesignError("two trials have the same name")
     open_trials = [trial for trial in trials if trial.key not in journal.results]

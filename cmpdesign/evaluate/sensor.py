@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from cmpdesign.errors import CmpDesignError
 
@@ -23,6 +23,7 @@ Share = Annotated[float, Field(ge=0, lt=1)]
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
 Counts = tuple[Annotated[int, Field(ge=0, le=100)], Annotated[int, Field(ge=0, le=100)]]
 METHODS = ("square", "multicolor")
+OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge", "large_ball", "cube")
 
 
 class SensorError(CmpDesignError, ValueError):
@@ -50,6 +51,22 @@ class ContactTable(_Table):
     steps: int = Field(8, ge=1, le=1000)
 
 
+class LoadTable(_Table):
+    """One contact of the set that designs are compared with; a positive twist is counter-clockwise from the front."""
+
+    object: str
+    press_mm: float = Field(ge=0)
+    shear_mm: tuple[float, float] = (0.0, 0.0)
+    twist_deg: float = Field(0.0, ge=-180, le=180)
+
+    @field_validator("object")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in OBJECTS:
+            raise ValueError(f"{value!r} is no object; there are {', '.join(OBJECTS)}")
+        return value
+
+
 class Conditions(_Table):
     """What differs from trial to trial; ranges are drawn from evenly."""
 
@@ -58,7 +75,7 @@ class Conditions(_Table):
     gradient: Share = 0.0
     vignetting: tuple[Share, Share] = (0.0, 0.0)
     lamps: Counts = (0, 0)
-    lamp_level: float = Field(0.0, ge=0)
+    lamp_level: Annotated[float, Field(ge=0)] = 0.0
     blur_px: tuple[Annotated[float, Field(ge=0.1, le=20)], Annotated[float, Field(ge=0.1, le=20)]] = (1, 1)
     noise: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] = (2.0, 2.0)
     specks: Counts = (0, 0)
@@ -83,7 +100,8 @@ class SensorTable(_Table):
     patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
     elastomer: ElastomerTable
     contact: ContactTable
-    conditions: Conditions = Field(default_factory=Conditions)
+    load: tuple[LoadTable, ...] = ()
+    conditions: Conditions = Conditions()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,129 @@
+"""``evaluate designs``: any designs on one sensor, under its set of contacts: error, yield, and what they cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from cmpdesign.design import Design
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.evaluate.contacts import Load, surface
+from cmpdesign.evaluate.instrument import Instrument, instrument_of
+from cmpdesign.evaluate.runner import Options, Trial, rng
+from cmpdesign.evaluate.sensor import parse_sensor
+from cmpdesign.evaluate.statistics import number, spread
+
+REACH_MM = 4.0
+MEASURES = ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "covered", "measured")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A design that takes part, and what it is called."""
+
+    name: str
+    design: Design
+
+    @property
+    def text(self) -> str:
+        """The design as canonical JSON."""
+        return json.dumps(self.design.model_dump(mode="json"), sort_keys=True)
+
+
+def entries(designs: Mapping[str, Design]) -> list[Entry]:
+    """The designs in the order given.
+
+    Raises:
+        CmpDesignError: none.
+    """
+    if not designs:
+        raise CmpDesignError("no design to compare; give templates or TOML files")
+    return [Entry(name, design) for name, design in designs.items()]
+
+
+def trials(options: Options, designs: Sequence[Entry]) -> list[Trial]:
+    """As many places and lights for every contact of the sensor's set and every design.
+
+    Raises:
+        CmpDesignError: the sensor has no contacts.
+    """
+    loads = parse_sensor(options.sensor_text).table.load
+    if not loads:
+        raise CmpDesignError("the sensor has no [[load]] table; give the contacts to compare designs with")
+    return [
+        Trial(f"{entry.name}-{load}-{i}", {**options.values, "design": entry.text, "load": load, "index": i})
+        for entry in designs
+        for load in range(len(loads))
+        for i in range(options.trials)
+    ]
+
+
+@lru_cache(maxsize=8)
+def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
+    sensor, design = parse_sensor(sensor_text), Design.model_validate_json(design_text)
+    return instrument_of(sensor, design, preset)  # type: ignore[arg-type]
+
+
+def work(values: Mapping[str, Any]) -> dict[str, Any]:
+    """One design under one contact; the place and the light are the same for all designs."""
+    from cmpdesign.evaluate.conditions import draw
+    from cmpdesign.evaluate.shapes import compared
+
+    one = _instrument(values["sensor"], values["design"], values["preset"])
+    load = one.sensor.table.load[values["load"]]
+    random = rng(values["seed"], f"load-{values['load']}", values["index"])
+    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
+    shear = (float(load.shear_mm[0]), float(load.shear_mm[1]))
+    pressed = surface(
+        values["sensor"], Load(load.object, load.press_mm, shear, load.twist_deg), (float(x), float(y))
+    )
+    clean = one.sensor.table.conditions.model_copy(update={"specks": (0, 0)})
+    drawn = draw(clean, random, one.half_window_mm)
+    return compared(one, pressed, drawn, int(random.integers(2**31)))
+
+
+def figures(
+    trials: Sequence[Trial], results: Sequence[Mapping[str, Any]], designs: Sequence[Entry]
+) -> dict[str, Any]:
+    """report.json's members: one entry a design."""
+    document = {}
+    for entry in designs:
+        found = [r for t, r in zip(trials, results, strict=True) if t.values["design"] == entry.text]
+        errors = {name: spread([one[name] for one in found]).to_json() for name in MEASURES}
+        document[entry.name] = {**costs(entry.design), **errors}
+    return {"designs": document}
+
+
+def costs(design: Design) -> dict[str, Any]:
+    """What a design is and what it takes to make: density, smallest feature, laser time."""
+    from cmpdesign.build import build_layout
+    from cmpdesign.measures import cell_areas_mm2, cell_widths_mm
+
+    layout = build_layout(design)
+    markers = int(layout.present.sum())
+    return {
+        "pattern": layout.pattern,
+        "pitch_mm": number(float(layout.parameters["pitch_mm"])),
+        "markers": markers,
+        "markers_per_cm2": number(100 * markers / float(cell_areas_mm2(layout).sum()), 3),
+        "smallest_feature_mm": number(float(cell_widths_mm(layout).min())),
+        "laser_time_s": laser_time_s(design),
+    }
+
+
+def laser_time_s(design: Design) -> float | None:
+    """How long the design's laser job takes; None where it cannot be made, with its own machine and material."""
+    from cmpdesign.build import build_layout
+    from cmpdesign.errors import DesignError
+    from cmpdesign.laser.setup import complete
+    from cmpdesign.writers.laser.figures import timing
+    from cmpdesign.writers.laser.job import make_job
+
+    try:
+        job = make_job(design.name, build_layout(design), complete(design.laser))
+    except DesignError:
+        return None
+    return number(sum(timing(job, one).time_s for one in job.passes), 3)

@@ -1,0 +1,309 @@
+"""What each report shows of its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cmpdesign.evaluate import plots
+from cmpdesign.evaluate.page import Plot, Section, Table
+from cmpdesign.evaluate.reliability import METHODS
+
+Document = Mapping[str, Any]
+
+WHY_TITLE = "Why our figures differ from the article's"
+WHY = (
+    "The article measured two manufactured sensors at ten places; here one sensor is simulated with either "
+    "pattern, whose edges are as drawn: no color has run, no two squares stick but by the blur of the lens.",
+    "The square pattern is read by adaptive threshold, erosion, contours and sub-pixel corners. What the former method "
+    "did in detail the article does not say; a reader that tries several erosions loses less to sticking.",
+    "The elastomer is linear, and loads of this size strain it by far more than linear theory predicts well. With the "
+    "friction assumed, the cube's face sticks almost everywhere, so that all markers under it move with it.",
+    "Geometry of the optics, image size, light and thickness of the elastomer are assumed: the article states none of "
+    "them.",
+)
+
+
+def text(value: float | None, digits: int = 3, unit: str = "") -> str:
+    return "none" if value is None else f"{value:.{digits}f}{unit}"
+
+
+def percent(value: float | None) -> str:
+    return "none" if value is None else f"{value:+.1f} %"
+
+
+def conditions(document: Document) -> Section:
+    return Section(
+        "Conditions",
+        [
+            f"{document['generator']}, seed {document['seed']}, {document['trials']} trials of each kind, the "
+            f"extractor's preset {document['preset']!r}. Simulated from end to end: contact, picture, extraction, "
+            "reconstruction. The same seed gives the same figures."
+        ],
+    )
+
+
+def why() -> Section:
+    return Section(WHY_TITLE, points=WHY)
+
+
+def reliability(document: Document) -> list[Section]:
+    modes = document["modes"]
+    rows = [
+        [f"{mode.replace('_', ' ')}: {method.replace('_', ' ')}", *_share(one), *_others(one), _article(one)]
+        for mode, methods in modes.items()
+        for method, one in methods.items()
+    ]
+    table = Table(
+        "Successful trials; 95 % intervals after Wilson.",
+        (
+            "mode: method",
+            "successful",
+            "share",
+            "95 % interval",
+            "with 95 % of the area",
+            "no wrong",
+            "right in the area",
+            "wrong markers",
+            "the article",
+        ),
+        rows,
+    )
+    plot = Plot("Shares of successful trials, with 95 % intervals.", plots.shares(modes, METHODS))
+    return [
+        conditions(document),
+        Section(
+            "Successful extractions",
+            [
+                document["definition"],
+                "A ball of radius 20 mm presses by 2 mm, then turns by 30 degrees clockwise, or shears by 1.5 mm in x "
+                "or y. Place, light, blur, noise and specks are drawn for every trial; all methods see the same ones. "
+                "'Square saddles' is a stronger reader of the square pattern than its users had.",
+            ],
+            tables=[table],
+            plots=[plot],
+        ),
+        why(),
+    ]
+
+
+def _share(one: Document) -> list[str]:
+    low, high = one["interval_95"]
+    share = one["share"]
+    counts = f"{one['successful']} of {one['trials']}"
+    return [counts, f"{100 * share:.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %"]
+
+
+def _others(one: Document) -> list[str]:
+    other = one["by_criterion"]
+    return [
+        f"{100 * other['area_95']['share']:.1f} %",
+        f"{100 * other['no_wrong']['share']:.1f} %",
+        text(one["right_in_area_percent"]["mean"], 2, " %"),
+        str(one["wrong_markers"]),
+    ]
+
+
+def _article(one: Document) -> str:
+    return f"{one['article']['successful']} of {one['article']['trials']}" if "article" in one else ""
+
+
+def precision(document: Document) -> list[Section]:
+    return [
+        conditions(document),
+        _edge_section(document["edge_fit_error_mm"]),
+        _shape_section(document),
+        why(),
+    ]
+
+
+def _edge_section(edges: Document) -> Section:
+    rows = []
+    for mode, one in edges.items():
+        label = mode.replace("_", " + ")
+        cells = [text(one["square"]), text(one["multicolor"]), percent(one["change_percent"])]
+        rows.append([label, *cells, percent(one["article_change_percent"])])
+        for name, other in one["variants"].items():
+            cells = [text(other["square"]), text(other["multicolor"]), percent(other["change_percent"])]
+            rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
+    table = Table(
+        "Edge fitting error, mm: by how much the fitted square's side misses 15 mm, mean over the places.",
+        ("mode", "square", "multicolor", "change", "the article"),
+        rows,
+    )
+    sides = {
+        mode: {
+            m: [abs(s - 15) for s in d["side_mm"] if s is not None] for m, d in one["distribution"].items()
+        }
+        for mode, one in edges.items()
+    }
+    return Section(
+        "Edge fitting error",
+        [
+            "A cube of 15 mm presses by 1 mm, or presses by 1 mm and shears by 1 mm in y, at ten places 4 mm apart. "
+            "Markers that move by more than half of the largest displacement (in z, or along the shear) are its edge "
+            "points; the square around them, lying as the cube does, has the larger of their width and height."
+        ],
+        tables=[table],
+        plots=[Plot("Every place's error, and the means.", plots.boxes(sides, "error, mm"))],
+    )
+
+
+VARIANTS = {
+    "with_virtual": "virtual markers too",
+    "perfect": "markers read without error",
+    "mean_extent": "mean of width and height",
+}
+
+
+def _shape_section(document: Document) -> Section:
+    shapes = document["shape_error_mm"]
+    rows = [
+        [
+            f"{name}: {method}",
+            *(text(_um(one[key]["mean"]), 1) for key in ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm")),
+            text(_um(one["marker_median_mm"]["mean"]), 1),
+            *(_whole(one[key]["mean"]) for key in ("covered", "measured")),
+        ]
+        for name, methods in shapes.items()
+        for method, one in methods.items()
+    ]
+    headings = (
+        "object: pattern",
+        "surface",
+        "its depth",
+        "markers, RMS",
+        "markers, median",
+        "area covered",
+        "markers measured",
+    )
+    table = Table("Errors in micrometres, means over the places.", headings, rows)
+    errors = {
+        name: {method: _um(one["surface_rms_mm"]["mean"]) for method, one in methods.items()}
+        for name, methods in shapes.items()
+    }
+    return Section(
+        "Shapes of five objects",
+        [
+            "Each object is pressed by 2 mm. The displacement that the pattern's smooth field gives is compared with "
+            "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement."
+        ],
+        tables=[table],
+        plots=[Plot("Error of the reconstructed surface, RMS.", plots.bars(errors, "RMS, µm"))],
+    )
+
+
+def _um(value: float | None) -> float | None:
+    return None if value is None else 1000 * value
+
+
+def _whole(share: float | None) -> str:
+    return "none" if share is None else f"{100 * share:.1f} %"
+
+
+def response(document: Document) -> list[Section]:
+    rows: list[Sequence[str]] = []
+    for case, one in document["response"].items():
+        label = case.replace("_", " ")
+        cells = [text(one["square"]), text(one["multicolor"]), percent(one["change_percent"])]
+        rows.append([label, *cells, percent(one["article_change_percent"])])
+        for name, other in one["variants"].items():
+            cells = [text(other["square"]), text(other["multicolor"]), percent(other["change_percent"])]
+            rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
+    table = Table(
+        "Mean displacement of the edge points over the shear of 1 mm.",
+        ("direction", "square", "multicolor", "change", "the article"),
+        rows,
+    )
+    means = {
+        case: {m: one[m] for m in ("square", "multicolor")} for case, one in document["response"].items()
+    }
+    plot = Plot("Response by direction.", plots.bars(means, "displacement / shear"))
+    return [
+        conditions(document),
+        Section(
+            "Response",
+            [
+                "A cube of 15 mm presses by 1 mm and shears by 1 mm, in x or y, at ten places 4 mm apart. The response "
+                "is the mean displacement, along the shear, of the markers that move by more than half of the largest."
+            ],
+            tables=[table],
+            plots=[plot],
+        ),
+        why(),
+    ]
+
+
+def angles(document: Document) -> list[Section]:
+    sections = []
+    for name, title, equation in (
+        ("shape_change_deg", "Shape change", "eq. 1: 360 / n"),
+        ("rotation_deg", "Rotation", "eq. 2: 180 / n"),
+    ):
+        cells = {int(key.removeprefix("n")): one[name] for key, one in document["cells"].items()}
+        measured = {
+            sides: {int(size.removesuffix("px")): angle for size, angle in one["measured"].items()}
+            for sides, one in cells.items()
+        }
+        formula = {sides: one["formula"] for sides, one in cells.items()}
+        sizes = list(next(iter(measured.values())))
+        rows = [
+            [f"n = {n}", text(formula[n], 1), *(text(measured[n][size], 1) for size in sizes)]
+            for n in measured
+        ]
+        table = Table(
+            "The first angle lost, in degrees.", ("cell", equation, *(f"{size} px" for size in sizes)), rows
+        )
+        plot = Plot("First angle lost; dashed: the formula.", plots.thresholds(measured, formula))
+        sections.append(Section(title, tables=[table], plots=[plot]))
+    rule = [
+        document["rule"],
+        "The formulas are limits of geometry; a cell of few pixels is lost earlier, since its flattened corner no "
+        "longer stands out of its contour.",
+    ]
+    return [Section("Rule", rule), *sections]
+
+
+def designs(document: Document) -> list[Section]:
+    found = document["designs"]
+    rows = [
+        [
+            name,
+            text(one["pitch_mm"]),
+            str(one["markers"]),
+            text(one["markers_per_cm2"], 1),
+            text(_um(one["surface_rms_mm"]["mean"]), 1),
+            text(_um(one["marker_rms_mm"]["mean"]), 1),
+            text(_um(one["marker_median_mm"]["mean"]), 1),
+            _whole(one["measured"]["mean"]),
+            text(one["smallest_feature_mm"]),
+            text(one["laser_time_s"], 0),
+        ]
+        for name, one in found.items()
+    ]
+    headings = (
+        "design",
+        "pitch, mm",
+        "markers",
+        "per cm²",
+        "surface RMS, µm",
+        "markers RMS, µm",
+        "median, µm",
+        "measured",
+        "smallest feature, mm",
+        "laser, s",
+    )
+    points = {
+        name: (one["markers_per_cm2"], _um(one["surface_rms_mm"]["mean"]) or 0.0)
+        for name, one in found.items()
+        if one["surface_rms_mm"]["mean"] is not None
+    }
+    return [
+        conditions(document),
+        Section(
+            "Designs",
+            ["All designs see the same contacts at the same places in the same light."],
+            tables=[Table("Means over all contacts and places.", headings, rows)],
+            plots=[Plot("Error against density.", plots.error_over_density(points))],
+        ),
+    ]
