@@ -10,7 +10,8 @@ STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c2126; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .8rem; border-bottom: 1px solid #d7dce0; text-align: right; }
+th, td { padding: .25rem .8rem; border-bottom: 1px solid #d7dce0; text-align: right; white-space: nowrap; }
+th { white-space: normal; }
 th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8a949c; font-weight: 600; }
 figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; }
 caption, figcaption { color: #5a646c; text-align: left; font-size: .9rem; }

@@ -112,7 +112,10 @@ def thresholds(measured: Mapping[int, Mapping[int, float | None]], formula: Mapp
             points = [(size, angle) for size, angle in found.items() if angle is not None]
             axes.plot(*zip(*points, strict=True), "o-", color=shade, ms=4, label=f"n = {sides}")
             axes.axhline(formula[sides], color=shade, ls="--", lw=0.8)
+        sizes = sorted({size for found in measured.values() for size in found})
         axes.set_xscale("log")
+        axes.set_xticks(sizes, [str(size) for size in sizes])
+        axes.set_xticks([], minor=True)
         axes.set_xlabel("edge, px")
         axes.set_ylabel("first angle lost, degrees")
         axes.set_ylim(bottom=0)

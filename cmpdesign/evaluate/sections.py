@@ -36,7 +36,7 @@ def conditions(document: Document) -> Section:
     return Section(
         "Conditions",
         [
-            f"{document['generator']}, seed {document['seed']}, {document['trials']} trials of each kind, the "
+            f"{document['generator']}, seed {document['seed']}, trials of each kind: {document['trials']}, the "
             f"extractor's preset {document['preset']!r}. Simulated from end to end: contact, picture, extraction, "
             "reconstruction. The same seed gives the same figures."
         ],
@@ -186,7 +186,8 @@ def _shape_section(document: Document) -> Section:
         "Shapes of five objects",
         [
             "Each object is pressed by 2 mm. The displacement that the pattern's smooth field gives is compared with "
-            "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement."
+            "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement. Where "
+            "a marker has no place, its cells give no surface: an error counts only the area covered."
         ],
         tables=[table],
         plots=[Plot("Error of the reconstructed surface, RMS.", plots.bars(errors, "RMS, µm"))],

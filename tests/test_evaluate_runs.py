@@ -1,0 +1,112 @@
+"""Runs: a journal that survives crashes, and results that depend on neither order nor processes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.evaluate.journal import NAME, Journal, fingerprint
+from cmpdesign.evaluate.runner import Options, Trial, rng, run
+
+CONDITIONS = {"experiment": "test", "seed": 3}
+TRIALS = [Trial(f"draw-{i}", {"seed": 3, "index": i}) for i in range(6)]
+
+
+def drawn(values: Mapping[str, Any]) -> dict[str, Any]:
+    """A trial that is nothing but its random numbers."""
+    return {"value": float(rng(values["seed"], "draw", values["index"]).normal())}
+
+
+def interrupted(values: Mapping[str, Any]) -> dict[str, Any]:
+    if values["index"] == 3:
+        raise KeyboardInterrupt
+    return drawn(values)
+
+
+def all_of(folder: Path, work: Any = drawn, trials: list[Trial] = TRIALS, workers: int = 1) -> list[Any]:
+    with Journal(folder, CONDITIONS) as journal:
+        return run(work, trials, journal, workers=workers, title="test", show=False)
+
+
+def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
+    whole = all_of(tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        all_of(tmp_path / "cut", interrupted)
+    assert len((tmp_path / "cut" / NAME).read_text().splitlines()) == 4
+    tried = []
+
+    def watched(values: Mapping[str, Any]) -> dict[str, Any]:
+        tried.append(values["index"])
+        return drawn(values)
+
+    assert all_of(tmp_path / "cut", watched) == whole and tried == [3, 4, 5]
+    assert (tmp_path / "cut" / NAME).read_bytes() == (tmp_path / "whole" / NAME).read_bytes()
+
+
+def test_neither_order_nor_processes_matter(tmp_path: Path) -> None:
+    whole = all_of(tmp_path / "whole")
+    assert all_of(tmp_path / "two", workers=2) == whole
+    assert all_of(tmp_path / "back", trials=TRIALS[::-1]) == whole[::-1]
+    assert len({result["value"] for result in whole}) == len(TRIALS)
+
+
+@pytest.mark.parametrize("cut", range(1, 60, 7))
+def test_a_line_that_a_crash_cut_short_is_dropped(tmp_path: Path, cut: int) -> None:
+    whole = all_of(tmp_path)
+    path = tmp_path / NAME
+    data = path.read_bytes()
+    path.write_bytes(data[:-cut])
+    assert all_of(tmp_path) == whole
+    assert path.read_bytes() == data
+
+
+def test_a_torn_first_line_starts_anew(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_text('{"journal": 1, "finger')
+    assert len(all_of(tmp_path)) == len(TRIALS)
+
+
+def test_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
+    all_of(tmp_path)
+    before = (tmp_path / NAME).read_bytes()
+    with pytest.raises(CmpDesignError, match="other conditions"):
+        Journal(tmp_path, {**CONDITIONS, "seed": 4})
+    assert (tmp_path / NAME).read_bytes() == before
+    (tmp_path / NAME).write_text("not a journal\n")
+    with pytest.raises(CmpDesignError, match="is not the journal"):
+        Journal(tmp_path, CONDITIONS)
+
+
+def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written"):
+        Journal(tmp_path / "file", CONDITIONS)
+
+
+def test_more_trials_reuse_those_done(tmp_path: Path) -> None:
+    first = all_of(tmp_path, trials=TRIALS[:2])
+    assert all_of(tmp_path)[:2] == first
+    documents = [json.loads(line) for line in (tmp_path / NAME).read_text().splitlines()]
+    assert [document.get("trial") for document in documents[1:]] == [trial.key for trial in TRIALS]
+
+
+def test_bad_options_name_the_value() -> None:
+    with pytest.raises(CmpDesignError, match="workers is 0"):
+        Options(1, workers=0)
+    with pytest.raises(CmpDesignError, match="trials is 0"):
+        Options(0)
+    with pytest.raises(CmpDesignError, match="seed is -1"):
+        Options(1, -1)
+
+
+def test_two_trials_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(CmpDesignError, match="same name"):
+        all_of(tmp_path, trials=[TRIALS[0], TRIALS[0]])
+
+
+def test_the_fingerprint_knows_every_condition() -> None:
+    assert fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1}) != fingerprint({"a": 1, "b": 3})
