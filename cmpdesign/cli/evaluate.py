@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.terminal import console, printable
+from cmpdesign.cli.terminal import console, print_warning, printable
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from cmpdesign.evaluate.designs import Entry
 
+INTERRUPTED = 130
 PRESETS = ("fast", "balanced", "accurate")
 
 app = typer.Typer(
@@ -152,7 +153,11 @@ def _run(
     if preset not in PRESETS:
         raise CmpDesignError(f"--preset {preset}: unknown; there are {', '.join(PRESETS)}")
     options = Options(trials, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
-    document, files = evaluate(experiment(name, designs), options, output)
+    try:
+        document, files = evaluate(experiment(name, designs), options, output)
+    except KeyboardInterrupt:
+        print_warning("interrupted; the same command goes on where it stopped")
+        raise typer.Exit(INTERRUPTED) from None
     for path in files:
         console().print(f"wrote {printable(path)}")
     return document

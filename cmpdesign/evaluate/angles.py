@@ -13,7 +13,7 @@ RULE = (
 )
 SIDES = (3, 4, 6)
 EDGES_PX = (20, 50, 100, 400)
-STEP_DEG = 0.5
+STEP_DEG = 1.0
 
 
 def change_limit_deg(sides: int) -> float:
@@ -37,7 +37,7 @@ def trials(options: Options) -> list[Trial]:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The first angle, in steps of half a degree, at which a cell is lost."""
+    """The first angle, in steps of ``STEP_DEG``, at which a cell is lost."""
     from cmpdesign.evaluate.cells import number_holds, shape_holds
 
     holds, limit = (

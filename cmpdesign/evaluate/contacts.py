@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cmpdesign.contact import Contact, Indenter, Motion
 
 Points = NDArray[np.float64]
+REST = "rest"  # no object at all
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Load:
     """An object and what it does.
 
     Attributes:
-        object: a name in ``OBJECTS``.
+        object: a name that ``indenter`` knows, or ``REST``.
         press_mm, shear_mm, twist_deg: as ``contact.Motion``; a positive twist is counter-clockwise from the front.
     """
 
@@ -93,9 +94,13 @@ class Moved:
         return moved
 
 
+def _flat(xy_mm: Points) -> Points:
+    return np.column_stack([xy_mm, np.zeros(len(xy_mm))])
+
+
 @lru_cache(maxsize=16)
 def _relief(sensor_text: str, load: Load) -> Callable[[Points], Points]:
-    return solved(sensor_text, load).surface()
+    return solved(sensor_text, load).surface() if load.object != REST else _flat
 
 
 def surface(sensor_text: str, load: Load, centre_mm: tuple[float, float]) -> Moved:

@@ -12,12 +12,12 @@ from cmpdesign.design import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.contacts import Load, surface
 from cmpdesign.evaluate.instrument import Instrument, instrument_of
+from cmpdesign.evaluate.precision import MEASURES
 from cmpdesign.evaluate.runner import Options, Trial, rng
 from cmpdesign.evaluate.sensor import parse_sensor
 from cmpdesign.evaluate.statistics import number, spread
 
 REACH_MM = 4.0
-MEASURES = ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "covered", "measured")
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmpdesign.evaluate import article, cube
-from cmpdesign.evaluate.contacts import Load, surface
+from cmpdesign.evaluate.contacts import REST, Load, surface
 from cmpdesign.evaluate.runner import Options, Trial, rng
 from cmpdesign.evaluate.statistics import number, spread
 
-OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge")
+OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0
 METHODS = cube.SHOWN
 EDGE_MODES = ("press", "press_shear")
+MEASURES = (
+    "surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "over_sigma", "over_sigma_median",
+    "covered", "measured",
+)  # fmt: skip
 VARIANTS = ("read", "with_virtual", "perfect")
 
 
@@ -72,8 +76,7 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
 
 
 def _errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    names = ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "covered", "measured")
-    return {name: spread([one[name] for one in found]).to_json() for name in names}
+    return {name: spread([one[name] for one in found]).to_json() for name in MEASURES}
 
 
 def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:

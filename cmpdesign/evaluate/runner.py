@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -105,13 +106,23 @@ def _results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tupl
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
-    with _single_threaded(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with (
+        _single_threaded(),
+        ProcessPoolExecutor(
+            workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent
+        ) as pool,
+    ):
         keys = {pool.submit(_tried, work, dict(trial.values)): trial.key for trial in trials}
         try:
             for done in as_completed(keys):
                 yield keys[done], done.result()
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    """Ctrl-C reaches all processes of a terminal; a worker ends its trial, and its parent gives it no other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _tried(work: Work, values: Mapping[str, Any]) -> Any:

@@ -13,6 +13,7 @@ from cmpdesign.evaluate.instrument import Instrument
 
 Points = NDArray[np.float64]
 STEP_MM = 0.25  # of the grid on which surfaces are compared
+CHI_SQUARE_MEDIAN_3 = 2.365973884375338  # of three degrees of freedom
 AREA = 0.1  # the area compared: where the surface has moved by at least this share of the largest movement
 
 
@@ -22,8 +23,9 @@ def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[s
     Returns:
         ``surface_rms_mm`` of the displacement's length and ``depth_rms_mm`` of its z, on a grid over the contact's
         area; ``covered``, the share of that grid where the pattern gives a surface; ``marker_rms_mm`` and
-        ``marker_median_mm`` of the markers' places; ``measured``, the share of the visible markers that have one.
-        None where nothing was read.
+        ``marker_median_mm`` of the markers' places; ``measured``, the share of the visible markers that have one;
+        ``over_sigma``, the RMS of the places' errors in units of their own stated covariance, and
+        ``over_sigma_median``, its typical value (both 1 where the covariance is true). None where nothing was read.
     """
     picture = one.picture(drawn, seed, pressed)
     shape = one.reconstructor.reconstruct(one.read(picture.image))
@@ -43,6 +45,7 @@ def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[s
         "covered": float(known.mean()) if len(known) else 0.0,
         "marker_rms_mm": _rms(away[np.isfinite(away)]),
         "marker_median_mm": float(np.nanmedian(away)) if np.isfinite(away).any() else None,
+        **_over_sigma(shape.xyz_mm - truth.marker_xyz_mm, shape.cov_mm2),
         "measured": float((visible & np.isfinite(away)).sum() / max(int(visible.sum()), 1)),
     }
 
@@ -55,6 +58,19 @@ def grid_mm(one: Instrument) -> Points:
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     triangle, _ = one.reconstructor.field.find(grid)
     return np.asarray(grid[triangle >= 0])
+
+
+def _over_sigma(error_mm: Points, cov_mm2: Points) -> dict[str, float | None]:
+    """Errors (M, 3) in units of covariances (M, 3, 3): RMS, and the median over a true normal's median."""
+    known = np.isfinite(error_mm[:, 0])
+    if not known.any():
+        return {"over_sigma": None, "over_sigma_median": None}
+    inverse = np.linalg.inv(cov_mm2[known])
+    square = np.einsum("ni,nij,nj->n", error_mm[known], inverse, error_mm[known])
+    return {
+        "over_sigma": float(np.sqrt(square.mean() / 3)),
+        "over_sigma_median": float(np.sqrt(np.median(square) / CHI_SQUARE_MEDIAN_3)),
+    }
 
 
 def _rms(values: Points) -> float | None:
