@@ -109,6 +109,10 @@ def test_response(sensor_file: Path, tmp_path: Path) -> None:
     assert list(response) == ["shear_x", "shear_y"]
     for one in response.values():
         assert 0.5 < one["square"] < 1.5 and 0.5 < one["multicolor"] < 1.5
+    other = tmp_path / "two"
+    evaluate("response", "-o", other, "--trials", 1, "--workers", 2, "--sensor", sensor_file)
+    for name in ("report.json", "report.html"):
+        assert (other / name).read_bytes() == (tmp_path / name).read_bytes()
 
 
 def test_designs(sensor_file: Path, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,9 +14,6 @@ import numpy as np
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.journal import Journal
-
-# One thread a process: the processes share the cores, and sums come out the same on every machine.
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -106,12 +102,9 @@ def _results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tupl
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
-    with (
-        _single_threaded(),
-        ProcessPoolExecutor(
-            workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent
-        ) as pool,
-    ):
+    with ProcessPoolExecutor(
+        workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent
+    ) as pool:
         keys = {pool.submit(_tried, work, dict(trial.values)): trial.key for trial in trials}
         try:
             for done in as_completed(keys):
@@ -126,26 +119,21 @@ def _leave_interrupts_to_the_parent() -> None:
 
 
 def _tried(work: Work, values: Mapping[str, Any]) -> Any:
-    """One result, through JSON, so that it is the same whether it comes from here or from the journal."""
+    """One result, through JSON, so that it is the same whether it comes from here or from the journal.
+
+    On one thread: the processes share the cores, and sums come out the same however many there are.
+    """
     import cv2
 
-    cv2.setNumThreads(1)
-    return json.loads(json.dumps(work(values), allow_nan=False))
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Processes started in here compute on one thread each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        from threadpoolctl import threadpool_limits
+    except ModuleNotFoundError as error:
+        raise CmpDesignError(
+            "evaluation needs threadpoolctl, which is not installed; install cmpdesign[evaluate]"
+        ) from error
+    cv2.setNumThreads(1)
+    with threadpool_limits(1):
+        return json.loads(json.dumps(work(values), allow_nan=False))
 
 
 @contextmanager

@@ -190,8 +190,8 @@ def _shape_section(document: Document) -> Section:
         [
             "Each object is pressed by 2 mm. The displacement that the pattern's smooth field gives is compared with "
             "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement. Where "
-            "a marker has no place, its cells give no surface: an error counts only the area covered. Sigma is what the "
-            "reconstruction states of itself: 1 where it is true. At rest nothing is pressed."
+            "a marker has no place, its cells give no surface: an error counts only the area covered. Sigma is what "
+            "the reconstruction states of itself: 1 where it is true. At rest nothing is pressed."
         ],
         tables=[table],
         plots=[Plot("Error of the reconstructed surface, RMS.", plots.bars(errors, "RMS, µm"))],
