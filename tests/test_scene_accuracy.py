@@ -57,9 +57,8 @@ def test_the_comparison_sees_a_hundredth_of_a_pixel() -> None:
     clean = replace(flat, sensor=Sensor(bits=16), optics=Optics(1.0))
     view = views(clean, SIZE)[0]
     here = reference(clean, view, WINDOW)
-    there = render(replace(moved, sensor=Sensor(bits=16), optics=Optics(1.0)), size=SIZE).image[
-        40:120, 60:140
-    ]
+    drawn = render(replace(moved, sensor=Sensor(bits=16), optics=Optics(1.0)), size=SIZE).image
+    there = drawn[50:110, 70:130]
     assert np.abs(there / 257 - here).max() > 0.3
     shifts = edge_shifts(there / 257 - here, here, clean.layout, view, WINDOW)
     assert 0.004 < np.sqrt((shifts**2).mean()) < 0.01
