@@ -127,10 +127,10 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the results here")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    window = Window(260, 180, 120, 120) if options.quick else Window(160, 90, 320, 300)
+    window = Window(260, 180, 120, 120) if options.quick else Window(220, 140, 200, 200)
     judged = scenes()
     # The two views' first one lies in the left half.
-    windows = {name: window if "two" not in name else replace(window, x=80, width=160) for name in judged}
+    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in judged}
     errors = [
         error(name, scene, blur_px, windows[name], SIZE)
         for name, scene in judged.items()

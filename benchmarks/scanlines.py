@@ -22,6 +22,7 @@ Points = NDArray[np.float64]
 
 POINTS, LINES = 512, 48
 REACH_SIGMA = 7.0
+BAND_ROWS = 30  # at once, for the memory's sake
 MIDDLE_PX = 3.5  # around a gridline's middle: the pixels that tell where it lies
 
 
@@ -50,6 +51,14 @@ class Error:
 
 def reference(scene: Scene, view: View, window: Window) -> Points:
     """(height, width, 3) BGR in 8-bit steps: the inks over black, seen by every pixel of the window."""
+    bands = []
+    for top in range(0, window.height, BAND_ROWS):
+        rows = min(BAND_ROWS, window.height - top)
+        bands.append(_band(scene, view, Window(window.x, window.y + top, window.width, rows)))
+    return np.concatenate(bands)
+
+
+def _band(scene: Scene, view: View, window: Window) -> Points:
     layout, blur = scene.layout, scene.blur_px
     cells = np.flatnonzero(layout.cell_color != BLACK)
     black = np.asarray(scene.ink(BLACK)[::-1], dtype=np.float64)
