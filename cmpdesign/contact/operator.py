@@ -36,10 +36,14 @@ class Operator:
         self._yz = spectrum(green.yz, True, False)
         self._found = np.empty((3, *self._zz.shape), dtype=np.complex128)
         self._part = np.empty(self._zz.shape, dtype=np.complex128)
-        # Gershgorin's bounds on the eigenvalues, in mm/MPa: of all three directions, and of z alone.
-        xx, yy, zz, xy, xz, yz = map(abs, (self._xx, self._yy, self._zz, self._xy, self._xz, self._yz))
-        self.largest = float(max((xx + xy + xz).max(), (yy + xy + yz).max(), (zz + xz + yz).max()))
-        self.largest_normal = float(zz.max())
+        self.largest = self._largest()
+        self.largest_normal = float(np.abs(self._zz).max())
+
+    def _largest(self) -> float:
+        """A bound on all eigenvalues in mm/MPa: of the plane's block, then of that with z."""
+        plane = (self._xx + self._yy) / 2 + np.hypot((self._xx - self._yy) / 2, self._xy)
+        both = (plane + self._zz) / 2 + np.hypot((plane - self._zz) / 2, np.hypot(self._xz, self._yz))
+        return float(both.max())
 
     def __call__(self, traction_mpa: Array) -> Array:
         """Displacement (3, rows, columns) in mm of the traction (3, rows, columns) in MPa."""
@@ -58,7 +62,8 @@ class Operator:
 
     def normal(self, traction_z_mpa: Array) -> Array:
         """Displacement z (rows, columns) in mm of the traction z (rows, columns) in MPa alone."""
-        return self._back(self._forward(traction_z_mpa[None]) * self._zz)[0]
+        found: Array = self._back(self._forward(traction_z_mpa[None]) * self._zz)[0]
+        return found
 
     def _forward(self, values: Array) -> Spectrum:
         """The padded spectrum; the padding's rows are not transformed along x, as they are empty."""
