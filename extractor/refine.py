@@ -14,50 +14,28 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
-from .synthesis import (
-    AA,
-    AB,
-    BB,
-    BLUR,
-    BLUR_CURVATURE,
-    MISFIT,
-    PIXELS,
-    SHARE_A,
-    SHARE_B,
-    A,
-    B,
-    clear,
-    draw_cells,
-    edge_contrasts,
-    read_gridlines,
-)
+from .stepping import MIN_NOISE, PRIOR_BEYOND_PX, box_of, middles, moved, trust, votes, widening
+from .synthesis import AA, A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
-MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
-PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
 BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
 UNEXPLAINED = (
     25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
 )
-WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
 MAX_WIDEN = 0.3  # of the blur, in one step
-# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
-# normal density and N its integral.
-CONTRAST_TO_BLUR = 1.79
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
@@ -185,46 +163,42 @@ class Refiner:
 
     def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
-        box = _box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape)
-        model = self._buffer(image.shape)
+        box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        clear(model, box)
-        draw_cells(
-            fit.xy,
-            mesh.cells,
-            mesh.cell_edges,
-            mesh.edges,
-            lines,
-            levels.cell,
-            levels.slope,
-            sigma,
-            box,
-            model,
-        )
+        model = self._drawn(fit, lines, box, image.shape)
         bettered = self._level_step(image, model, fit, frame)
-        middles = 0.5 * (fit.xy[mesh.edges[:, 0]] + fit.xy[mesh.edges[:, 1]])
-        black = black_at(levels.black, middles, *frame)
+        middle = middles(lines)
+        black = black_at(levels.black, middle, *frame)
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
-        side = self._side_changes(levels, bettered, middles, frame)
-        off = np.einsum("ec,ec->e", contrasts, side)
-        to_a, to_b = sums[:, A] - off * sums[:, SHARE_A], sums[:, B] - off * sums[:, SHARE_B]
-        use, noise = _trust(sums, to_a, to_b)
-        noise = float(noise) if np.isfinite(noise) else fit.noise
-        fit = fit._replace(noise=noise, levels=bettered)
+        changes = bettered.cell - levels.cell, bettered.black - levels.black
+        to_a, to_b = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
+        use, noise = trust(sums, to_a, to_b)
+        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
+        widen = float(
+            np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
+        )
+        fit = fit._replace(noise=float(noise) if np.isfinite(noise) else fit.noise, levels=bettered)
         shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
-        sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
-        return self._moved(fit._replace(sigma=sigma), shift, information)
+        return self._moved(fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX)), shift, information)
+
+    def _drawn(
+        self, fit: Fit, lines: NDArray[np.float64], box: NDArray[np.int64], shape: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """The pattern over black, in a buffer of the image's size."""
+        mesh, levels = self._mesh, fit.levels
+        model = self._buffer(shape)
+        clear(model, box)
+        sides = mesh.cells, mesh.cell_edges, mesh.edges, lines
+        draw_cells(fit.xy, *sides, levels.cell, levels.slope, fit.sigma, box, model)
+        return model
 
     def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
-        """The fit after a step; the deviations of ``moved`` are those with all other markers known."""
-        xx, xy, yy = information.diagonal.T
-        x, y = np.where(fit.beyond, 0.0, shift.T)
-        moved = float(np.sqrt(np.max(x * x * xx + 2 * x * y * xy + y * y * yy, initial=0.0)))
-        measured = fit.xy + shift
-        xy_px, beyond, maps = self._completed(np.where(_weak(information)[:, None], np.nan, measured))
+        """The fit after a step."""
+        measured, guiding, steps = moved(fit.xy, shift, information.diagonal, fit.beyond)
+        xy_px, beyond, maps = self._completed(guiding)
         return fit._replace(
-            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=moved
+            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=float(steps)
         )
 
     def _level_step(
@@ -236,35 +210,6 @@ class Refiner:
         black = cell_means(image, model, fit.xy, mesh.black, 0.0)
         drawn[:, :3] += levels.cell
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
-
-    def _blur_step(
-        self,
-        sums: NDArray[np.float64],
-        use: NDArray[np.float64],
-        contrasts: NDArray[np.float64],
-        lines: NDArray[np.float64],
-        fit: Fit,
-        sigma: float,
-    ) -> float:
-        """The blur, by how far the gridlines' pixels say that it is another, once the levels are bettered."""
-        mesh, levels = self._mesh, fit.levels
-        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        strength = np.maximum((contrasts * contrasts).sum(axis=1), 1e-9)
-        change = (contrasts * (now - contrasts)).sum(axis=1) / strength
-        curvature = use * sums[:, BLUR_CURVATURE]
-        total = curvature.sum()
-        if total <= 0:
-            return sigma
-        widen = ((use * sums[:, BLUR]).sum() + CONTRAST_TO_BLUR * sigma * (curvature * change).sum()) / total
-        return max(sigma + float(np.clip(widen, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
-
-    def _side_changes(
-        self, old: Levels, new: Levels, middles: NDArray[np.float64], frame: Frame
-    ) -> NDArray[np.float64]:
-        """(E, 3): the change of level of a gridline's two sides together."""
-        black = black_at(new.black - old.black, middles, *frame)
-        change = np.concatenate([new.cell - old.cell, np.zeros((1, 3))])
-        return np.asarray(np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1)))
 
     def _solve(
         self,
@@ -317,39 +262,3 @@ class Refiner:
         xy[lost] = np.nan
         cov[lost] = np.nan
         return xy, cov
-
-
-@compiled
-def _trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines whose pixels the pattern explains once they are moved, and the noise."""
-    count = sums.shape[0]
-    misfit, use = np.full(count, np.nan), np.zeros(count)
-    for e in range(count):
-        if sums[e, PIXELS] <= 8:
-            continue
-        aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
-        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
-        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
-        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (3 * sums[e, PIXELS] - 2)
-    usual = max(np.nanmedian(misfit), MIN_NOISE**2)
-    for e in range(count):
-        if np.isfinite(misfit[e]):
-            limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
-            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
-    return use, np.sqrt(usual)
-
-
-def _weak(information: Information) -> NDArray[np.bool_]:
-    """(M,) markers that the image says far less about than about most, in one direction at least."""
-    xx, xy, yy = information.diagonal.T
-    least = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-    shown = least > 4 * PRIOR_BEYOND_PX**-2
-    return np.asarray(least < WEAK * np.median(least[shown])) if shown.any() else ~shown
-
-
-def _box(xy: NDArray[np.float64], margin: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """(4,) x from, y from, x to, y to: the pattern's part of the image."""
-    known = xy[np.isfinite(xy[:, 0])]
-    low, high = np.floor(known.min(axis=0) - margin), np.ceil(known.max(axis=0) + margin) + 1
-    size = np.array([shape[1], shape[0]])
-    return np.concatenate([np.clip(low, 0, size), np.clip(high, 0, size)]).astype(np.int64)
