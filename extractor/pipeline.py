@@ -14,7 +14,7 @@ from .attach import attach
 from .cells import Cells, find_cells
 from .color import find_target, nominal_hues_deg, segment, to_colors
 from .errors import LayoutError
-from .image import estimate_noise, prepare
+from .image import prepare
 from .mesh import build_mesh
 from .numbering import Numbering, number
 from .placing import Places, place
@@ -135,7 +135,7 @@ class Extractor:
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
         size = (bgr.shape[1], bgr.shape[0])
-        refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
+        refined = stages.done("refine", self._refine(bgr, places))
         repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, size))
         virtual, virtual_status = stages.done(
             "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)

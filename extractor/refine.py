@@ -11,48 +11,77 @@ import threading
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
+from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Frame, Levels, black_at, cell_means, smooth_levels
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
-from .stepping import MIN_NOISE, PRIOR_BEYOND_PX, box_of, middles, moved, trust, votes, widening
-from .synthesis import AA, A, B, clear, draw_cells, edge_contrasts, read_gridlines
+from .stepping import (
+    MIN_NOISE,
+    PRIOR_BEYOND_PX,
+    box_of,
+    middles,
+    moved,
+    short_edge,
+    trust,
+    trusted_markers,
+    votes,
+    widening,
+)
+from .synthesis import A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
+MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
+MIN_EDGE_PX = 8.0  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
-BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
+BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
 UNEXPLAINED = (
     25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
 )
 MAX_WIDEN = 0.3  # of the blur, in one step
+# how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
+JUDGED_BY_PIXELS = 3, 8, 0.0
+JUDGED_BY_STATIONS = 1, 4, 1.0
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
 class Steps(NamedTuple):
-    """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most, until the
-    no marker moves by more than ``enough`` of its standard deviations."""
+    """What a preset does.
 
-    profiles: tuple[int, ...]
+    Attributes:
+        profiles: stations per gridline at most, in the first and the last round of profiles.
+        finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
+        sharp: blur, as a share of the edges, below which an image needs no synthesis,
+        reduced: unless it could be reduced by so much, which makes synthesis cheap.
+        synthesis: steps of synthesis at most.
+        enough: no more steps once no marker moves by more than so many of its standard deviations.
+    """
+
+    profiles: tuple[int, int]
+    finest: float
+    sharp: float
+    reduced: float
     synthesis: int
     enough: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((3, 4, 24), 0, 0.0),
-    "balanced": Steps((2, 3), 4, 20.0),
-    "accurate": Steps((3, 4), 10, 0.7),
+    "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
+    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 10.0),
+    "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
 }
+FEW_STATIONS = 3  # in the last round of profiles, where synthesis follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +91,8 @@ class Refined:
     Attributes:
         xy_px: (M, 2) float64, NaN where nothing was measured.
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
-        explained: (M,) bool, the drawn pattern explains the image around the marker; where not, its place is from
-            profiles alone, and something lies on it.
+        explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
+            after synthesis, its place is from profiles alone).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
     """
@@ -73,6 +102,33 @@ class Refined:
     explained: NDArray[np.bool_]
     blur_px: float
     noise: float
+
+
+class Sight(NamedTuple):
+    """An image at 1/``scale`` of its size, and the coordinates of its polynomials."""
+
+    image: NDArray[np.uint8]
+    scale: int
+    frame: Frame
+
+    def places(self, places: Places) -> Places:
+        """Places of the full image in this one."""
+        xy = (places.xy_px + 0.5) / self.scale - 0.5
+        return Places(xy_px=xy, edge_px=places.edge_px / self.scale, cells=places.cells)
+
+    def full(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of this image in the full one."""
+        return (xy_px + 0.5) * self.scale - 0.5
+
+
+def sight(image: NDArray[np.uint8], scale: int) -> Sight:
+    """The image reduced by averaging ``scale`` x ``scale`` pixels."""
+    if scale > 1:
+        width, height = image.shape[1] // scale, image.shape[0] // scale
+        whole = image[: height * scale, : width * scale]
+        image = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
+    height, width = image.shape[:2]
+    return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
 
 
 class Fit(NamedTuple):
@@ -99,40 +155,60 @@ class Refiner:
         self._steps = STEPS[preset]
         self._kept = threading.local()
 
-    def __call__(self, image: NDArray[np.uint8], places: Places, noise: float) -> Refined:
+    def __call__(self, image: NDArray[np.uint8], places: Places) -> Refined:
         """Solve all markers together.
 
         Args:
             image: (H, W, 3) uint8 BGR.
             places: where the markers were found, to about a pixel.
-            noise: standard deviation of a channel, in grey levels; a first estimate.
 
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
-        mesh, height, width = self._mesh, image.shape[0], image.shape[1]
-        frame = Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
-        noise = max(noise, MIN_NOISE)
-        xy, beyond, maps = self._completed(places.xy_px)
+        edge = short_edge(places.xy_px, self._mesh.edges)
+        view = sight(image, self._scale(USUAL_SIGMA_PX, edge))
+        fit = self._begin(view, places)
+        scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
+        if scale != view.scale:
+            xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
+            view = sight(image, scale)
+            fit = self._begin(view, Places(xy, places.edge_px, places.cells))
+        return self._finish(view, fit, view.places(places), edge / view.scale)
+
+    def _scale(self, sigma_px: float, edge_px: float) -> int:
+        """By how much to reduce an image with this blur and edges."""
+        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
+
+    def _begin(self, view: Sight, places: Places) -> Fit:
+        """The inks' levels, the blur, and the first round of profiles."""
+        mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
+        xy, beyond, maps = self._completed(view.places(places).xy_px)
+        usual = USUAL_SIGMA_PX / view.scale
         levels = smooth_levels(
-            cell_means(image, NO_MODEL, xy, mesh.cells, USUAL_SIGMA_PX),
-            cell_means(image, NO_MODEL, xy, mesh.black, USUAL_SIGMA_PX),
+            cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
+            cell_means(view.image, NO_MODEL, xy, mesh.black, usual),
             xy,
             mesh,
             noise,
-            frame,
+            view.frame,
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
-        for stations in self._steps.profiles:
-            fit = self._profile_step(image, fit, frame, stations)
+        return self._profile_step(view, fit, self._steps.profiles[0])[0]
+
+    def _finish(self, view: Sight, fit: Fit, places: Places, edge_px: float) -> Refined:
+        """The last round of profiles, and synthesis where the blur asks for it."""
+        steps = self._steps
+        sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
+        fit, trusted = self._profile_step(view, fit, steps.profiles[1] if sharp else FEW_STATIONS)
+        if sharp:
+            return self._result(view, fit, fit, trusted, places)
         start = fit
-        if self._steps.synthesis:
-            fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
-        for _ in range(self._steps.synthesis):
-            fit = self._synthesis_step(image, fit, frame)
-            if fit.moved < self._steps.enough:
+        fit = fit._replace(sigma=_sharpened(fit.sigma))
+        for _ in range(steps.synthesis):
+            fit = self._synthesis_step(view, fit)
+            if fit.moved < steps.enough:
                 break
-        return self._result(fit, start, places)
+        return self._result(view, fit, start, trusted, places)
 
     def _completed(
         self, xy: NDArray[np.float64]
@@ -143,37 +219,36 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
-    def _profile_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int) -> Fit:
+    def _profile_step(self, view: Sight, fit: Fit, stations: int) -> tuple[Fit, NDArray[np.bool_]]:
+        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
         mesh, levels = self._mesh, fit.levels
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
-        contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        weights, room = unmixing(
-            lines, contrasts, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.black, *frame
-        )
-        sigma = fit.sigma
-        if sigma == 0.0:
-            blurs = profile_blurs(image, lines, weights, room, max(1, len(lines) // BLUR_EDGES))
+        sides = mesh.cells, mesh.edge_cells, levels.cell
+        contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
+        weights, room = unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame)
+        if fit.sigma == 0.0:
+            blurs = profile_blurs(view.image, lines, weights, room, max(1, len(lines) // BLUR_EDGES))
             seen = blurs[np.isfinite(blurs)]
-            sigma = max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
-        sums = read_profiles(image, lines, weights, room, sigma, stations)
-        use = (sums[:, AA] > 0).astype(np.float64)
-        fit = fit._replace(sigma=sigma)
+            fit = fit._replace(sigma=max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX))
+        sums = read_profiles(view.image, lines, weights, room, fit.sigma, stations)
+        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_STATIONS)
         shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
-        return self._moved(fit, shift, information)
+        return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
 
-    def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
+    def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
+        image, frame = view.image, view.frame
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
         box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         model = self._drawn(fit, lines, box, image.shape)
-        bettered = self._level_step(image, model, fit, frame)
+        bettered = self._level_step(view, model, fit)
         middle = middles(lines)
         black = black_at(levels.black, middle, *frame)
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        use, noise = trust(sums, to_a, to_b)
+        use, noise = trust(sums, to_a, to_b, *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
             np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
@@ -201,15 +276,13 @@ class Refiner:
             xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=float(steps)
         )
 
-    def _level_step(
-        self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
-    ) -> Levels:
+    def _level_step(self, view: Sight, model: NDArray[np.float32], fit: Fit) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
         mesh, levels = self._mesh, fit.levels
-        drawn = cell_means(image, model, fit.xy, mesh.cells, 0.0)
-        black = cell_means(image, model, fit.xy, mesh.black, 0.0)
+        drawn = cell_means(view.image, model, fit.xy, mesh.cells, 0.0)
+        black = cell_means(view.image, model, fit.xy, mesh.black, 0.0)
         drawn[:, :3] += levels.cell
-        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
+        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
 
     def _solve(
         self,
@@ -241,14 +314,22 @@ class Refiner:
             kept = self._kept.residual = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def _result(self, fit: Fit, start: Fit, places: Places) -> Refined:
+    def _result(
+        self, view: Sight, fit: Fit, start: Fit, trusted: NDArray[np.bool_], places: Places
+    ) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what the profiles had said."""
         xy, cov = self._sure(fit, places)
-        lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
-        if lost.any() and start is not fit:
-            profiled, wide = self._sure(start, places)
-            xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
-        return Refined(xy_px=xy, cov_px2=cov, explained=~lost, blur_px=fit.sigma, noise=fit.noise)
+        explained = trusted
+        if start is not fit:
+            lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
+            if lost.any():
+                profiled, wide = self._sure(start, places)
+                xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
+            explained = ~lost
+        scale = view.scale
+        return Refined(
+            view.full(xy), cov * scale**2, explained, blur_px=scale * fit.sigma, noise=fit.noise * scale
+        )
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
@@ -262,3 +343,8 @@ class Refiner:
         xy[lost] = np.nan
         cov[lost] = np.nan
         return xy, cov
+
+
+def _sharpened(sigma: float) -> float:
+    """The blur without that which the profiles' bilinear samples added."""
+    return float(max(np.sqrt(max(sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))

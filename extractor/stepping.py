@@ -12,6 +12,7 @@ from .synthesis import AA, AB, BB, BLUR, BLUR_CURVATURE, MISFIT, PIXELS, SHARE_A
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
 WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
+TRUSTED = 0.4  # of the gridlines around a marker, for it to be believed
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
 # normal density and N its integral.
 CONTRAST_TO_BLUR = 1.79
@@ -54,24 +55,55 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
 
 
 @compiled
-def trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines whose pixels the pattern explains once they are moved, and the noise (NaN where
-    nothing was read)."""
+def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved, and the noise (NaN where
+    nothing was read).
+
+    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``.
+    """
     count = sums.shape[0]
     misfit, use = np.full(count, np.nan), np.zeros(count)
     for e in range(count):
-        if sums[e, PIXELS] <= 8:
+        if sums[e, PIXELS] <= least:
+            use[e] = unjudged if sums[e, AA] > 0.0 else 0.0
             continue
         aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
         determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
         explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
-        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (3 * sums[e, PIXELS] - 2)
+        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
     usual = max(np.nanmedian(misfit), MIN_NOISE**2)
     for e in range(count):
         if np.isfinite(misfit[e]):
-            limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
+            limit = usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
     return use, np.sqrt(usual)
+
+
+@compiled
+def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
+    """(M,) bool: enough of the gridlines that end there are trusted."""
+    out = np.zeros(spokes.shape[0], np.bool_)
+    for m in range(spokes.shape[0]):
+        total, count = 0.0, 0
+        for e in spokes[m]:
+            if e >= 0:
+                total += use[e]
+                count += 1
+        out[m] = total > TRUSTED * count
+    return out
+
+
+@compiled
+def short_edge(xy, edges):  # type: ignore[no-untyped-def]
+    """The length in px that nine tenths of the gridlines exceed; 0 without any."""
+    length, count = np.empty(edges.shape[0]), 0
+    for e in range(edges.shape[0]):
+        a, b = edges[e]
+        own = np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
+        if np.isfinite(own):
+            length[count] = own
+            count += 1
+    return np.sort(length[:count])[count // 10] if count > 0 else 0.0
 
 
 @compiled
