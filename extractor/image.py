@@ -68,7 +68,7 @@ def _responses(image, every_row, every_column):  # type: ignore[no-untyped-def]
     counts = np.zeros(8 * 255 + 1, np.int64)
     for y in range(1, image.shape[0] - 1, every_row):
         for x in range(1, image.shape[1] - 1, every_column):
-            total = 0
+            total = np.int64(0)
             for dy in range(-1, 2):
                 column = np.int64(image[y + dy, x - 1, 1]) + np.int64(image[y + dy, x + 1, 1])
                 column -= 2 * np.int64(image[y + dy, x, 1])

@@ -130,10 +130,12 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
             off = bow(t, length, lines[e, LEAVE], lines[e, ARRIVE])
             x = lines[e, X] + t * length * lines[e, UX] + off * nx
             y = lines[e, Y] + t * length * lines[e, UY] + off * ny
-            product = 0.0
+            product, squares = 0.0, 0.0
             for m in range(-samples, samples + 1):
                 f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
-                product += kernel[m + samples] * (clamp(f, -0.3, 1.3) - step_profile[m + samples])
+                rest = clamp(f, -0.3, 1.3) - step_profile[m + samples]
+                product += kernel[m + samples] * rest
+                squares += rest * rest
             offset = product / norm
             if not abs(offset) < max(1.0, 0.15 * length):
                 continue
@@ -142,6 +144,6 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
             out[e, BB] += information * t * t
             out[e, A] += information * (1 - t) * offset
             out[e, B] += information * t * offset
-            out[e, MISFIT] += information * offset * offset
-            out[e, PIXELS] += 1.0
+            out[e, MISFIT] += information * squares / norm
+            out[e, PIXELS] += 2.0 * samples + 1.0
     return out

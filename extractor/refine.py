@@ -11,16 +11,16 @@ import threading
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
-from .levels import Frame, Levels, black_at, cell_means, smooth_levels
+from .levels import Levels, black_at, cell_means, smooth_levels
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
+from .sight import Sight, sight
 from .stepping import (
     MIN_NOISE,
     PRIOR_BEYOND_PX,
@@ -52,7 +52,7 @@ UNEXPLAINED = (
 MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
-JUDGED_BY_STATIONS = 1, 4, 1.0
+JUDGED_BY_SAMPLES = 1, 4, 1.0
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
@@ -78,10 +78,11 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 10.0),
+    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 8.0),
     "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
 }
 FEW_STATIONS = 3  # in the last round of profiles, where synthesis follows
+JUDGING_STATIONS = 16  # where it failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,33 +103,6 @@ class Refined:
     explained: NDArray[np.bool_]
     blur_px: float
     noise: float
-
-
-class Sight(NamedTuple):
-    """An image at 1/``scale`` of its size, and the coordinates of its polynomials."""
-
-    image: NDArray[np.uint8]
-    scale: int
-    frame: Frame
-
-    def places(self, places: Places) -> Places:
-        """Places of the full image in this one."""
-        xy = (places.xy_px + 0.5) / self.scale - 0.5
-        return Places(xy_px=xy, edge_px=places.edge_px / self.scale, cells=places.cells)
-
-    def full(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of this image in the full one."""
-        return (xy_px + 0.5) * self.scale - 0.5
-
-
-def sight(image: NDArray[np.uint8], scale: int) -> Sight:
-    """The image reduced by averaging ``scale`` x ``scale`` pixels."""
-    if scale > 1:
-        width, height = image.shape[1] // scale, image.shape[0] // scale
-        whole = image[: height * scale, : width * scale]
-        image = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
-    height, width = image.shape[:2]
-    return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
 
 
 class Fit(NamedTuple):
@@ -172,7 +146,7 @@ class Refiner:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sight(image, scale)
             fit = self._begin(view, Places(xy, places.edge_px, places.cells))
-        return self._finish(view, fit, view.places(places), edge / view.scale)
+        return self._finish(view, fit, _in(view, places), edge / view.scale)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
@@ -181,7 +155,7 @@ class Refiner:
     def _begin(self, view: Sight, places: Places) -> Fit:
         """The inks' levels, the blur, and the first round of profiles."""
         mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
-        xy, beyond, maps = self._completed(view.places(places).xy_px)
+        xy, beyond, maps = self._completed(view.reduced(places.xy_px))
         usual = USUAL_SIGMA_PX / view.scale
         levels = smooth_levels(
             cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
@@ -201,14 +175,14 @@ class Refiner:
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
         fit, trusted = self._profile_step(view, fit, steps.profiles[1] if sharp else FEW_STATIONS)
         if sharp:
-            return self._result(view, fit, fit, trusted, places)
+            return self._refined(view, fit, *self._sure(fit, places), trusted)
         start = fit
         fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
             fit = self._synthesis_step(view, fit)
             if fit.moved < steps.enough:
                 break
-        return self._result(view, fit, start, trusted, places)
+        return self._result(view, fit, start, places)
 
     def _completed(
         self, xy: NDArray[np.float64]
@@ -231,7 +205,7 @@ class Refiner:
             seen = blurs[np.isfinite(blurs)]
             fit = fit._replace(sigma=max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX))
         sums = read_profiles(view.image, lines, weights, room, fit.sigma, stations)
-        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_STATIONS)
+        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
         shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
         return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
 
@@ -314,22 +288,28 @@ class Refiner:
             kept = self._kept.residual = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def _result(
-        self, view: Sight, fit: Fit, start: Fit, trusted: NDArray[np.bool_], places: Places
-    ) -> Refined:
-        """What is sure; where the drawing does not explain the image, as in glare, what the profiles had said."""
+    def _result(self, view: Sight, fit: Fit, start: Fit, places: Places) -> Refined:
+        """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
-        explained = trusted
-        if start is not fit:
-            lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
-            if lost.any():
-                profiled, wide = self._sure(start, places)
-                xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
-            explained = ~lost
+        lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
+        if lost.any():
+            start, trusted = self._profile_step(view, start, JUDGING_STATIONS)
+            profiled, wide = self._sure(start, places)
+            use = lost & trusted
+            xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]
+        return self._refined(view, fit, xy, cov, ~lost)
+
+    def _refined(
+        self,
+        view: Sight,
+        fit: Fit,
+        xy: NDArray[np.float64],
+        cov: NDArray[np.float64],
+        explained: NDArray[np.bool_],
+    ) -> Refined:
+        """The markers at the image's full scale."""
         scale = view.scale
-        return Refined(
-            view.full(xy), cov * scale**2, explained, blur_px=scale * fit.sigma, noise=fit.noise * scale
-        )
+        return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
@@ -348,3 +328,8 @@ class Refiner:
 def _sharpened(sigma: float) -> float:
     """The blur without that which the profiles' bilinear samples added."""
     return float(max(np.sqrt(max(sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
+
+
+def _in(view: Sight, places: Places) -> Places:
+    """Places of the full image in a reduced one."""
+    return Places(view.reduced(places.xy_px), places.edge_px / view.scale, places.cells)

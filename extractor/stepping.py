@@ -71,7 +71,10 @@ def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped
         determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
         explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
         misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
-    usual = max(np.nanmedian(misfit), MIN_NOISE**2)
+    judged = misfit[np.isfinite(misfit)]
+    if judged.shape[0] == 0:
+        return use, np.nan
+    usual = max(np.median(judged), MIN_NOISE**2)
     for e in range(count):
         if np.isfinite(misfit[e]):
             limit = usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
