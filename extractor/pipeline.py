@@ -22,7 +22,7 @@ from .reference import Reference
 from .refine import PRESETS, Preset, Refiner
 from .regions import find_seeds, grow, large_enough
 from .repair import repair
-from .sight import sight
+from .sight import Sights
 from .tables import lattice_of
 from .topology import topology_of
 from .triangles import fit_triangles
@@ -100,17 +100,18 @@ class Extractor:
         bgr = stages.done("image", prepare(image))
         if bgr is None:
             return self._nothing(Reason.NO_COLOR, stages)
-        reason = Reason.NO_COLOR
+        reason, sights = Reason.NO_COLOR, Sights(bgr)
         for scale in _scales(bgr):
-            found = self._number(bgr, scale, stages)
+            found = self._number(sights, scale, stages)
             if isinstance(found, Found) and (scale == 1 or self._whole(bgr, found, stages)):
-                return self._measure(bgr, found, stages)
+                return self._measure(sights, found, stages)
             reason = found if isinstance(found, Reason) else reason
         return self._nothing(reason, stages)
 
-    def _number(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Found | Reason:
+    def _number(self, sights: Sights, scale: int, stages: Stages) -> Found | Reason:
         """Stages 1 to 7 at 1/``scale`` of the image's scale, or why they do not number anything."""
-        cells = self._recognise(bgr, scale, stages)
+        bgr = sights.at(1).image
+        cells = self._recognise(sights, scale, stages)
         if cells is None:
             return Reason.NO_COLOR
         mesh = stages.done("mesh", build_mesh(cells))
@@ -128,10 +129,9 @@ class Extractor:
         count = missed(bgr, found.cells, found.numbering, self._lattice)
         return int(stages.done("missed", count)) <= MAX_MISSED * len(self._lattice.ink)
 
-    def _recognise(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Cells | None:
+    def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
         """Stages 1 to 5; None where an ink is absent, or the cells are too small for a reduced scale."""
-        work = sight(bgr, scale).image
-        colors = stages.done("color", to_colors(work))
+        colors = stages.done("color", to_colors(sights.at(scale).image))
         target = stages.done("target", find_target(colors))
         segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
@@ -140,23 +140,21 @@ class Extractor:
         if scale > 1 and not large_enough(seeds):
             return None
         regions = stages.done("grow", grow(segmentation, seeds))
-        triangles = stages.done("triangles", fit_triangles(bgr, regions, scale))
+        triangles = stages.done("triangles", fit_triangles(sights.at(1).image, regions, scale))
         return stages.done("cells", find_cells(seeds, triangles, scale))  # type: ignore[no-any-return]
 
-    def _measure(self, bgr: NDArray[np.uint8], found: Found, stages: Stages) -> Markers:
+    def _measure(self, sights: Sights, found: Found, stages: Stages) -> Markers:
         """The places of what has been numbered, and what follows from them."""
         numbering = stages.done("attach", attach(found.cells, found.numbering, self._lattice))
-        size = (bgr.shape[1], bgr.shape[0])
-        places = stages.done("place", place(found.cells, numbering, self._lattice, size))
-        return self.finish(bgr, places, numbering.mirrored, numbering.origin, stages)
+        places = stages.done("place", place(found.cells, numbering, self._lattice, sights.size))
+        return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(
-        self, bgr: NDArray[np.uint8], places: Places, mirrored: bool, origin: Origin, stages: Stages
+        self, sights: Sights, places: Places, mirrored: bool, origin: Origin, stages: Stages
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        size = (bgr.shape[1], bgr.shape[0])
-        refined = stages.done("refine", self._refine(bgr, places))
-        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, size))
+        refined = stages.done("refine", self._refine(sights, places))
+        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, sights.size))
         virtual, virtual_status = stages.done(
             "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
         )

@@ -20,7 +20,7 @@ from .information import Information, assemble, covariances, gradient, solve
 from .levels import Levels, black_at, cell_means, smooth_levels
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
-from .sight import Sight, sight
+from .sight import Sight, Sights
 from .stepping import (
     MIN_NOISE,
     PRIOR_BEYOND_PX,
@@ -121,6 +121,19 @@ class Fit(NamedTuple):
     moved: float
 
 
+class Across(NamedTuple):
+    """What changes across the gridlines; moves of a pixel do not change it.
+
+    Attributes:
+        contrasts: (E, 3) differences of level.
+        weights, room: as ``unmixing`` gives them.
+    """
+
+    contrasts: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    room: NDArray[np.float64]
+
+
 class Refiner:
     """Refines the markers of one layout; its buffers are kept from image to image, one set a thread."""
 
@@ -129,30 +142,30 @@ class Refiner:
         self._steps = STEPS[preset]
         self._kept = threading.local()
 
-    def __call__(self, image: NDArray[np.uint8], places: Places) -> Refined:
+    def __call__(self, sights: Sights, places: Places) -> Refined:
         """Solve all markers together.
 
         Args:
-            image: (H, W, 3) uint8 BGR.
+            sights: the image.
             places: where the markers were found, to about a pixel.
 
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
         edge = short_edge(places.xy_px, self._mesh.edges)
-        view = sight(image, self._scale(USUAL_SIGMA_PX, edge))
-        fit = self._begin(view, places)
+        view = sights.at(self._scale(USUAL_SIGMA_PX, edge))
+        fit, across = self._begin(view, places)
         scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
-            view = sight(image, scale)
-            fit = self._begin(view, Places(xy, places.edge_px, places.cells))
-        return self._finish(view, fit, _in(view, places), edge / view.scale)
+            view = sights.at(scale)
+            fit, across = self._begin(view, Places(xy, places.edge_px, places.cells))
+        return self._finish(view, fit, across, _in(view, places), edge / view.scale)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
         return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
 
-    def _begin(self, view: Sight, places: Places) -> Fit:
+    def _begin(self, view: Sight, places: Places) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
         mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
         xy, beyond, maps = self._completed(view.reduced(places.xy_px))
@@ -167,13 +180,16 @@ class Refiner:
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
-        return self._profile_step(view, fit, self._steps.profiles[0])[0]
+        across = self._across(view, fit)
+        fit = fit._replace(sigma=self._blur(view, fit, across))
+        return self._profile_step(view, fit, across, self._steps.profiles[0])[0], across
 
-    def _finish(self, view: Sight, fit: Fit, places: Places, edge_px: float) -> Refined:
+    def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
-        fit, trusted = self._profile_step(view, fit, steps.profiles[1] if sharp else FEW_STATIONS)
+        stations = steps.profiles[1] if sharp else FEW_STATIONS
+        fit, trusted = self._profile_step(view, fit, across, stations)
         if sharp:
             return self._refined(view, fit, *self._sure(fit, places), trusted)
         start = fit
@@ -182,7 +198,7 @@ class Refiner:
             fit = self._synthesis_step(view, fit)
             if fit.moved < steps.enough:
                 break
-        return self._result(view, fit, start, places)
+        return self._result(view, fit, start, across, places)
 
     def _completed(
         self, xy: NDArray[np.float64]
@@ -193,21 +209,34 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
-    def _profile_step(self, view: Sight, fit: Fit, stations: int) -> tuple[Fit, NDArray[np.bool_]]:
-        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
+    def _across(self, view: Sight, fit: Fit) -> Across:
+        """The colors beside the gridlines."""
         mesh, levels = self._mesh, fit.levels
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         sides = mesh.cells, mesh.edge_cells, levels.cell
         contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
-        weights, room = unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame)
-        if fit.sigma == 0.0:
-            blurs = profile_blurs(view.image, lines, weights, room, max(1, len(lines) // BLUR_EDGES))
-            seen = blurs[np.isfinite(blurs)]
-            fit = fit._replace(sigma=max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX))
-        sums = read_profiles(view.image, lines, weights, room, fit.sigma, stations)
+        return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
+
+    def _profile_step(
+        self, view: Sight, fit: Fit, across: Across, stations: int
+    ) -> tuple[Fit, NDArray[np.bool_]]:
+        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
+        mesh = self._mesh
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
         use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
-        shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
+        votes = sums, sums[:, A], sums[:, B], use
+        shift, information = self._solve(*votes, lines, across.contrasts, False, fit)
         return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
+
+    def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
+        """The blur that some of the gridlines show."""
+        mesh = self._mesh
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        every = max(1, len(lines) // BLUR_EDGES)
+        blurs = profile_blurs(view.image, lines, across.weights, across.room, every)
+        seen = blurs[np.isfinite(blurs)]
+        return max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
 
     def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
         image, frame = view.image, view.frame
@@ -288,12 +317,12 @@ class Refiner:
             kept = self._kept.residual = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def _result(self, view: Sight, fit: Fit, start: Fit, places: Places) -> Refined:
+    def _result(self, view: Sight, fit: Fit, start: Fit, across: Across, places: Places) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            start, trusted = self._profile_step(view, start, JUDGING_STATIONS)
+            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS)
             profiled, wide = self._sure(start, places)
             use = lost & trusted
             xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]

@@ -33,8 +33,26 @@ class Sight(NamedTuple):
         return (xy_px + 0.5) * self.scale - 0.5
 
 
-def sight(image: NDArray[np.uint8], scale: int) -> Sight:
-    """The image reduced by averaging ``scale`` x ``scale`` pixels."""
+class Sights:
+    """One image at every scale that is asked for, each made once."""
+
+    def __init__(self, image: NDArray[np.uint8]) -> None:
+        self._image = image
+        self._made: dict[int, Sight] = {}
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height at full scale, px."""
+        return self._image.shape[1], self._image.shape[0]
+
+    def at(self, scale: int) -> Sight:
+        """The image reduced by averaging ``scale`` x ``scale`` pixels."""
+        if scale not in self._made:
+            self._made[scale] = _sight(self._image, scale)
+        return self._made[scale]
+
+
+def _sight(image: NDArray[np.uint8], scale: int) -> Sight:
     if scale > 1:
         width, height = image.shape[1] // scale, image.shape[0] // scale
         whole = image[: height * scale, : width * scale]

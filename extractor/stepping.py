@@ -106,7 +106,7 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.sort(length[:count])[count // 10] if count > 0 else 0.0
+    return np.partition(length[:count], count // 10)[count // 10] if count > 0 else 0.0
 
 
 @compiled
