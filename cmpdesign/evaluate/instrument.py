@@ -150,12 +150,15 @@ def as_markers(xy_px: Points, layout: Layout) -> Markers:
     start, end = (xy_px[layout.edges[:, side], None] for side in (0, 1))
     virtual = start * (1 - share) + end * share
     covariance = np.where(known[:, None, None], np.eye(2) * SQUARE_SIGMA_PX**2, np.nan)
+    weight = (1 - share) ** 2 + share**2
+    virtual_covariance = np.where(np.isfinite(virtual)[..., None], weight[..., None] * np.eye(2), np.nan)
     status = np.where(np.isfinite(virtual[..., 0]), VirtualStatus.INTERPOLATED, VirtualStatus.LOST)
     return Markers(
         xy_px=xy_px,
         cov_px2=covariance,
         status=known.astype(np.uint8),
         virtual_xy_px=virtual,
+        virtual_cov_px2=SQUARE_SIGMA_PX**2 * virtual_covariance,
         virtual_status=status.astype(np.uint8),
         mirrored=None,
         reason=None if known.any() else Reason.REFERENCE_LOST,
