@@ -12,6 +12,7 @@ from cmpdesign.errors import CmpDesignError
 COLORS = {
     "square": "#59636b",
     "square_saddles": "#a3adb5",
+    "multicolor_unrefined": "#8fb3dd",
     "multicolor": "#2f6fb7",
     "multicolor_repair": "#2e8b57",
 }

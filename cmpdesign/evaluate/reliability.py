@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cmpdesign.evaluate.conditions import Drawn
     from cmpdesign.scene import Rendered
     from cmpdesign.scene.truth import Truth
+    from extractor import Markers
 
 Points = NDArray[np.float64]
 REACH_MM = 4.0  # the ball's centre lies within this of the pattern's middle, in x and y
@@ -26,7 +27,7 @@ MODES = {
     "shear_x": Load("large_ball", 2.0, shear_mm=(1.5, 0.0)),
     "shear_y": Load("large_ball", 2.0, shear_mm=(0.0, 1.5)),
 }
-METHODS = ("square", "square_saddles", "multicolor", "multicolor_repair")
+METHODS = ("square", "square_saddles", "multicolor_unrefined", "multicolor", "multicolor_repair")
 
 # A marker belongs to the contact's area when it moves by at least this share of the largest movement.
 AREA = 0.1
@@ -79,9 +80,19 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     read = multicolor.read(picture.image)
     places, status = np.stack([m.xy_px for m in read]), np.stack([m.status for m in read])
     measured = np.where((status == Status.MEASURED)[..., None], places, np.nan)
+    found["multicolor_unrefined"] = judged(multicolor, pressed, picture.truth, unrefined(multicolor, read))
     found["multicolor"] = judged(multicolor, pressed, picture.truth, measured)
     found["multicolor_repair"] = judged(multicolor, pressed, picture.truth, places)
     return {"methods": found, "centre_mm": [float(x), float(y)], "specks_drawn": bool(dirty and dirty_too)}
+
+
+def unrefined(one: Instrument, read: Sequence[Markers]) -> Points:
+    """(V, M, 2) the means of the triangles' corners, as the article has them: before this project's refinement."""
+    found = np.full((len(read), len(one.layout.marker_xy_mm), 2), np.nan)
+    for place, view, markers in zip(found, one.sensor.rig.views, read, strict=True):
+        if "place" in markers.stages:
+            place[:] = markers.stages["place"].xy_px + (view.area_px or (0, 0))[:2]
+    return found
 
 
 def _picture(one: Instrument, drawn: Drawn, seed: int, pressed: Moved) -> tuple[Rendered, bool]:

@@ -64,7 +64,9 @@ def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[n
     contours, _ = cv2.findContours(
         cv2.erode(mask, CROSS, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
-    kept = [quad for contour in contours if (quad := _quad(contour, edge_px)) is not None]
+    shortest = 2 * np.sqrt(np.pi * AREA[0]) * edge_px / np.sqrt(2)  # pixels around a disc of the least area
+    long = (contour for contour in contours if len(contour) >= shortest)
+    kept = [quad for contour in long if (quad := _quad(contour, edge_px)) is not None]
     if not kept:
         return np.empty((0, 4, 2))
     return _grown(np.stack(kept), float(eroded_px))
@@ -79,10 +81,8 @@ def _quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
     if len(outline) != 4 or not cv2.isContourConvex(outline):
         return None
     corners = outline[:, 0].astype(np.float64)
-    x, y = corners.T
-    turn = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
     # With y down, a positive area is clockwise to the eye.
-    return corners if turn > 0 else corners[::-1]
+    return corners if cv2.contourArea(outline, True) > 0 else corners[::-1]
 
 
 def _grown(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
