@@ -130,6 +130,22 @@ def test_designs(sensor_file: Path, tmp_path: Path) -> None:
     assert found["old"]["smallest_feature_mm"] == pytest.approx(1.5)
     for one in found.values():
         assert one["laser_time_s"] > 10 and 0 < one["surface_rms_mm"]["mean"] < 0.5
+    (tmp_path / "dust.toml").write_text(
+        'pattern = "honeycomb"\nlayers = 9\npitch_mm = 0.2\n', encoding="utf-8"
+    )
+    printed = evaluate(
+        "designs",
+        tmp_path / "dust.toml",
+        "-o",
+        tmp_path / "dust",
+        "--trials",
+        1,
+        "--workers",
+        1,
+        "--sensor",
+        sensor_file,
+    )
+    assert "dust: nothing read, 0.0 % measured" in printed
     assert "two designs are called 'fine'" in evaluate("designs", names[0], names[0], "-o", out, code=2)
 
 

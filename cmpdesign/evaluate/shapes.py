@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 from cmpdesign.evaluate.conditions import Drawn
 from cmpdesign.evaluate.contacts import Moved
 from cmpdesign.evaluate.instrument import Instrument
+from extractor.errors import PoseError
 
 Points = NDArray[np.float64]
+ERRORS = (
+    "surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "over_sigma", "over_sigma_median",
+)  # fmt: skip
 STEP_MM = 0.25  # of the grid on which surfaces are compared
 CHI_SQUARE_MEDIAN_3 = 2.365973884375338  # of three degrees of freedom
 AREA = 0.1  # the area compared: where the surface has moved by at least this share of the largest movement
@@ -25,16 +29,21 @@ def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[s
         area; ``covered``, the share of that grid where the pattern gives a surface; ``marker_rms_mm`` and
         ``marker_median_mm`` of the markers' places; ``measured``, the share of the visible markers that have one;
         ``over_sigma``, the RMS of the places' errors in units of their own stated covariance, and
-        ``over_sigma_median``, its typical value (both 1 where the covariance is true). None where nothing was read.
+        ``over_sigma_median``, its typical value (both 1 where the covariance is true). None where nothing
+        was read, or the pattern cannot be read even at rest.
     """
+    try:
+        reconstructor = one.reconstructor
+    except PoseError:
+        return {**dict.fromkeys(ERRORS), "covered": 0.0, "measured": 0.0}
     picture = one.picture(drawn, seed, pressed)
-    shape = one.reconstructor.reconstruct(one.read(picture.image))
+    shape = reconstructor.reconstruct(one.read(picture.image))
     truth = picture.truth
     grid = grid_mm(one)
     moved = pressed.displacement_mm(grid)
     length = np.linalg.norm(moved, axis=1)
     area = length >= AREA * length.max()
-    found = one.reconstructor.field.at(shape.displacement_mm, grid[area])
+    found = reconstructor.field.at(shape.displacement_mm, grid[area])
     error = found - moved[area]
     known = np.isfinite(error[:, 0])
     away = np.linalg.norm(shape.xyz_mm - truth.marker_xyz_mm, axis=1)
