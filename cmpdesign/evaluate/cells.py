@@ -8,7 +8,6 @@ nearest.
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,6 +48,8 @@ def turned(corners: Points, angle_deg: float) -> Points:
 
 def drawn(corners_px: Points) -> tuple[NDArray[np.uint8], Points]:
     """A picture (H, W) of a light cell on black, blurred by 1 px, and (2,) where the origin lies in it."""
+    import cv2
+
     low = np.floor(corners_px.min(axis=0)) - 8
     width, height = (np.ceil(corners_px.max(axis=0)) + 8 - low).astype(int)
     fine = np.zeros((height * FINER, width * FINER), np.uint8)
@@ -61,6 +62,8 @@ def drawn(corners_px: Points) -> tuple[NDArray[np.uint8], Points]:
 
 def recognised(picture: NDArray[np.uint8], sides: int) -> Points | None:
     """(n, 2) the corners of the cell in a picture; None when the rule does not hold."""
+    import cv2
+
     mask = (picture > LEVEL).astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if len(contours) != 1:
@@ -87,6 +90,8 @@ def corners_of(contour: Points, count: int) -> tuple[Points, float]:
     Returns:
         (count, 2) them, and by how much the least of them stands out from the line between its neighbours.
     """
+    import cv2
+
     points = cv2.approxPolyDP(contour.astype(np.float32), 0.5, True)[:, 0].astype(np.float64)
     while True:
         before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -187,6 +186,7 @@ def refined(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
 
     NaN outside the image.
     """
+
     inside = ((places >= 0) & (places <= np.array(bgr.shape[1::-1]) - 1)).all(axis=1)
     found = np.full(places.shape, np.nan)
     if inside.any():
@@ -195,6 +195,8 @@ def refined(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
 
 
 def _sub_pixel(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
+    import cv2
+
     window = max(round(WINDOW * edge_px), MIN_WINDOW_PX)
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)

@@ -13,12 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 EROSIONS = (1, 2, 3, 4)
-CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 # A quad's area and its corners' distance from its outline, in units of the square at rest.
 AREA = (0.1, 3.0)
 STRAIGHT = 0.12
@@ -42,6 +41,8 @@ class Quads:
 
 def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
     """The squares of a checkerboard whose edges are about ``edge_px`` long at rest."""
+    import cv2
+
     # The brightest channel: there the colored reference cell is light, too.
     value = np.ascontiguousarray(bgr.max(axis=2))
     block = 2 * round(edge_px) + 1
@@ -61,6 +62,8 @@ def _best(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
 
 
 def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[np.float64]:
+    import cv2
+
     contours, _ = cv2.findContours(
         cv2.erode(mask, CROSS, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
@@ -74,6 +77,8 @@ def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[n
 
 def _quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
     """(4, 2) corners of a contour that is a convex quadrilateral of about the right size; None for any other."""
+    import cv2
+
     area = cv2.contourArea(contour)
     if not AREA[0] * edge_px**2 < area < AREA[1] * edge_px**2:
         return None

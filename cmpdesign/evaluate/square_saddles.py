@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,6 +53,8 @@ class Saddles:
 
 def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> Saddles:
     """The strong local maxima of the negative Hessian determinant of the smoothed brightness."""
+    import cv2
+
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)
     smooth = cv2.GaussianBlur(gray, (0, 0), max(SMOOTH * edge_px, 1.0))
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
