@@ -71,9 +71,11 @@ def _perfect(one: Instrument, pressed: Any, mode: str) -> dict[str, Any]:
 
 def _measures(xyz_mm: Points, displacement_mm: Points, mode: str) -> dict[str, Any]:
     points = edge_points(xyz_mm, displacement_mm, DIRECTIONS[mode])
+    by_depth = edge_points(xyz_mm, displacement_mm, DIRECTIONS["press"])
     return {
         "points": len(points.xy_mm),
         "side_mm": circumscribed_square_mm(points.xy_mm),
+        "side_by_depth_mm": circumscribed_square_mm(by_depth.xy_mm),
         "mean_extent_mm": mean_extent_mm(points.xy_mm),
         "response": response(points, SHEAR_MM) if mode != "press" else None,
     }

@@ -95,7 +95,8 @@ def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any
         for method in METHODS
     }
     variants = {variant: {m: edge_errors_mm(found, m, variant) for m in METHODS} for variant in VARIANTS[1:]}
-    variants["mean_extent"] = {m: edge_errors_mm(found, m, "read", "mean_extent_mm") for m in METHODS}
+    for name, measure in (("mean_extent", "mean_extent_mm"), ("by_depth", "side_by_depth_mm")):
+        variants[name] = {m: edge_errors_mm(found, m, "read", measure) for m in METHODS}
     document["variants"] = {
         name: {m: number(spread(errors).mean) for m, errors in one.items()} for name, one in variants.items()
     }
