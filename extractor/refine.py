@@ -54,6 +54,7 @@ MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
 JUDGED_BY_SAMPLES = 1, 4, 1.0
+PARDON = 0.1  # of the contrast: what glare and uneven light do to a profile
 NO_ROOM = np.empty((0, 4))
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
@@ -237,7 +238,8 @@ class Refiner:
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
         use = (sums[:, AA] > 0).astype(np.float64)
         if judged:
-            use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
+            pardon = PARDON**2 * across.room[:, 3]
+            use, _ = trust(sums, sums[:, A], sums[:, B], pardon, *JUDGED_BY_SAMPLES)
         given = sums, sums[:, A], sums[:, B], use
         shift, information = self._solve(*given, lines, across.contrasts, False, fit)
         foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
@@ -267,7 +269,7 @@ class Refiner:
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        use, noise = trust(sums, to_a, to_b, *JUDGED_BY_PIXELS)
+        use, noise = trust(sums, to_a, to_b, np.zeros(len(sums)), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
             np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)

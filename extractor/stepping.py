@@ -56,11 +56,12 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
 
 
 @compiled
-def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped-def]
+def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) weights, 1 for gridlines that look as the pattern does once they are moved, and the noise (NaN where
     nothing was read).
 
-    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``.
+    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
+    misfit of less than its ``pardon`` (E,) is always forgiven.
     """
     count = sums.shape[0]
     misfit, use = np.full(count, np.nan), np.zeros(count)
@@ -78,7 +79,7 @@ def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped
     usual = max(np.median(judged), MIN_NOISE**2)
     for e in range(count):
         if np.isfinite(misfit[e]):
-            limit = usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
+            limit = max(usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2))), pardon[e])
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
     return use, np.sqrt(usual)
 
