@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from itertools import pairwise
 
+import cv2
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from cmpdesign.mold import meshes as product
 from cmpdesign.mold.meshes import make_meshes, part_mesh
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import parts_of
+from cmpdesign.mold.pictures import exploded
 from cmpdesign.mold.stack import stack_of
 from cmpdesign.products import Made
 from cmpdesign.writers.mesh_3mf import meshes_to_3mf, read_3mf
@@ -99,7 +102,7 @@ def test_crowned_meshes_are_closed() -> None:
 
 
 def test_files_are_the_same_again(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(product, "part_pictures", lambda mold: {})
+    monkeypatch.setattr(product, "mold_pictures", lambda parts, mold: {})
     design = load_design("honeycomb", {"layers": "2"})
     again = make_meshes(design, build_layout(design)).files
     assert [name for name, data in again.items() if data != made.files[name]] == []
@@ -114,6 +117,31 @@ def test_pictures_show_bosses_from_above_only() -> None:
     # The middle of the back is plain; bosses throw lines and shades.
     spread = [np.ptp(picture[50:70, 70:90].astype(int)) for picture in (above, below)]
     assert spread[0] > spread[1] + 30
+
+
+def test_every_part_has_its_pictures(made: Made) -> None:
+    parts = {name.removeprefix("mold/") for name in made.figures if name.startswith("mold/")}
+    assert set(made.pictures) == {"exploded"} | {f"{p}-{side}" for p in parts for side in ("above", "below")}
+    for name, picture in made.pictures.items():
+        data = content(made, f"pictures/{name}.png")
+        np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(data, np.uint8), 1), picture)
+        # A part fills its picture, and does not touch the picture's rim.
+        ink = (picture < 250).any(axis=2)
+        assert 0.02 < ink.mean() < 0.9 and not ink[[0, -1]].any() and not ink[:, [0, -1]].any(), name
+
+
+def test_exploded_parts_lie_above_each_other_and_apart() -> None:
+    design = load_design("honeycomb", {"layers": "2"})
+    parts = parts_of(stack_of(design, build_layout(design)))
+    groups = exploded(parts, [part_mesh(part)[0] for part in parts])
+    assert list(groups)[:3] == ["base", "pin", "frame"] and len(groups["pin"]) == 4
+    ends = [
+        (min(m.points[:, 2].min() for m in g), max(m.points[:, 2].max() for m in g)) for g in groups.values()
+    ]
+    assert all(below[1] + 2 < above[0] for below, above in pairwise(ends))
+    # A boss plate is used upside down: below are its bosses' tips only.
+    x, _, z = groups["boss-red"][0].points.T
+    assert np.ptp(x[z < z.min() + 1e-6]) < 0.5 * np.ptp(x[z > z.max() - 1e-6])
 
 
 def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
