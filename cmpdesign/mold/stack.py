@@ -22,7 +22,7 @@ from cmpdesign.design import Design
 from cmpdesign.errors import DesignError
 from cmpdesign.fiducials import fiducial_positions
 from cmpdesign.layout import BLACK, COLORS, Layout
-from cmpdesign.mold.crown import STEEPEST_DEG, Crown, projected
+from cmpdesign.mold.crown import END_SLOPE, STEEPEST_DEG, Crown, projected
 from cmpdesign.mold.loops import Loop, Points, circle, polygon, rounded_rectangle
 from cmpdesign.mold.options import MoldOptions
 from cmpdesign.mold.silicones import Silicone, load_silicone
@@ -171,6 +171,7 @@ def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, 
         crown = Crown("sphere", radius, reach, reach)
         # The inscribed polygon's sides come nearer than its corners.
         return crown, round_outline(2 * (reach / scale + edge) / np.cos(np.pi / 360))
-    length = float(np.abs(points[:, 1]).max()) + FOOT_MM
+    height = Crown("cylinder", radius, reach, np.inf).height_mm
+    length = float(np.abs(points[:, 1]).max()) + FOOT_MM + height / END_SLOPE
     crown = Crown("cylinder", radius, reach, length)
     return crown, rectangle(2 * (reach / scale + edge), 2 * (length / scale + edge))
