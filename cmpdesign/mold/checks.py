@@ -14,7 +14,7 @@ from cmpdesign.layout import COLORS
 from cmpdesign.mold.bosses import bosses
 from cmpdesign.mold.crown import Crown
 from cmpdesign.mold.loops import Points, frusta_volume_mm3, inset_cells
-from cmpdesign.mold.stack import LAYERS, Stack
+from cmpdesign.mold.stack import LAYERS, Stack, crown_edge_mm
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ LEAST_WALL_MM = 0.3
 def check_mold(stack: Stack) -> list[Finding]:
     """Findings, errors first."""
     found = [*_bosses(stack), *_draft(stack), *_sheets(stack), *_curing(stack), *_shapes(stack)]
+    found += _unused(stack)
     return sorted(found, key=lambda finding: finding.severity)
 
 
@@ -243,6 +244,25 @@ def _crown(stack: Stack, crown: Crown) -> Iterator[Finding]:
     if sag > limit:
         remedy = "make pitch_mm smaller or mold.crown_radius_mm larger: tips of bosses are flat"
         yield Finding("crown over a flat boss's tip", sag, limit, "mm", remedy, "warning")
+
+
+def _unused(stack: Stack) -> Iterator[Finding]:
+    """What was asked for and has no effect, or another one than it says."""
+    option, layout = stack.options, stack.layout
+    if stack.crown is None:
+        remedy = 'not used on a flat pad: set mold.crown = "sphere" or "cylinder", or leave it out'
+        if option.crown_radius_mm is not None:
+            yield Finding("mold.crown_radius_mm", option.crown_radius_mm, 0.0, "mm", remedy, "warning")
+        if "projection" in option.model_fields_set and option.projection != "equidistant":
+            yield Finding(f'mold.projection = "{option.projection}"', 1, 0, "", remedy, "warning")
+        return
+    edge = crown_edge_mm(option, layout)
+    if edge > layout.border_mm:
+        remedy = "taken that wide around the crown, so that vents find room: make it larger, or mold.vent_mm smaller"
+        yield Finding("border_mm", layout.border_mm, edge, "mm", remedy, "warning")
+    if "clip" in layout.parameters:
+        subject = f"clip outlines of a pad whose edge follows its crown ({option.crown})"
+        yield Finding(subject, 1, 0, "", "only cells are clipped; leave it out to keep them all", "warning")
 
 
 def moat_to_pin_mm(stack: Stack) -> float:
