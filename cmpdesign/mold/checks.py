@@ -197,9 +197,11 @@ def _curing(stack: Stack) -> Iterator[Finding]:
             yield Finding(subject, 1, 0, "", silicone.remedy, "warning")
     layers = list(zip(LAYERS, stack.silicones, strict=True))
     for (below, under), (above, over) in pairwise(layers):
-        if under.cure == "tin" and over.cure == "platinum":
+        # Neither cures against the other, the makers say.
+        if under.cure != over.cure:
             subject = (
-                f"tin-cured layers ({below}: {under.name}) under a platinum-cured one ({above}: {over.name})"
+                f"{under.cure}-cured layers ({below}: {under.name}) under a {over.cure}-cured one "
+                f"({above}: {over.name})"
             )
             yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
     scales = [silicone.scale for silicone in stack.silicones]
