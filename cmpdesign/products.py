@@ -90,6 +90,11 @@ def chosen_products(only: str) -> list[str]:
     return [name for name in PRODUCTS if name in names]
 
 
+def product_folders() -> list[str]:
+    """Folders that products fill, as "mold/"."""
+    return [product.where for product in PRODUCTS.values() if product.where.endswith("/")]
+
+
 def make_products(
     names: Sequence[str], design: Design, layout: Layout, report: Report
 ) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
