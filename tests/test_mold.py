@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -250,31 +247,6 @@ def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
 def test_frustum_of_circles() -> None:
     lower, upper = circle(np.zeros(2), 4.0), circle(np.zeros(2), 2.0)
     assert frustum_volume_mm3(lower, upper, 3.0) == pytest.approx(np.pi * 3 * (4 + 2 + 1) / 3, rel=1e-14)
-
-
-BUILD = """
-import hashlib, sys
-from cmpdesign import build_layout, load_design
-from cmpdesign.mold.make import make_mold
-design = load_design("honeycomb", {"layers": "2"})
-for name, content in make_mold(design, build_layout(design)).files.items():
-    print(name, hashlib.sha256(content).hexdigest())
-"""
-
-
-def test_the_same_bytes_in_another_process() -> None:
-    runs = [
-        subprocess.run([sys.executable, "-c", BUILD], capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
-    ]
-    assert runs[0] == runs[1] and runs[0].count(".step") == 14
-    design = load_design("honeycomb", {"layers": "2"})
-    files = make.make_mold(design, build_layout(design)).files
-    here = ""
-    for name, content in files.items():
-        assert isinstance(content, bytes)
-        here += f"{name} {hashlib.sha256(content).hexdigest()}\n"
-    assert here == runs[0]
 
 
 def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> None:

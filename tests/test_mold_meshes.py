@@ -102,13 +102,6 @@ def test_crowned_meshes_are_closed(crown: str) -> None:
         product._checked(part.name, *part_mesh(part), {})
 
 
-def test_files_are_the_same_again(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(product, "mold_pictures", lambda parts, mold: {})
-    design = load_design("honeycomb", {"layers": "2"})
-    again = make_meshes(design, build_layout(design)).files
-    assert [name for name, data in again.items() if data != made.files[name]] == []
-
-
 def test_pictures_show_bosses_from_above_only() -> None:
     design = load_design("honeycomb", {"layers": "2"})
     plate = next(part for part in parts_of(stack_of(design, build_layout(design))) if part.name == "boss-red")
