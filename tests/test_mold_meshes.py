@@ -12,6 +12,7 @@ import pytest
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.mold import meshes as product
+from cmpdesign.mold.job_sheet import job_sheet
 from cmpdesign.mold.meshes import make_meshes, part_mesh
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import parts_of
@@ -102,6 +103,15 @@ def test_crowned_meshes_are_closed(crown: str) -> None:
         product._checked(part.name, *part_mesh(part), {})
 
 
+def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
+    design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+    stack = stack_of(design, build_layout(design))
+    page = job_sheet("dome", stack, parts_of(stack), [])
+    assert "flush" not in page and "wipe along the dome" in page
+    # The white cell alone would be a tenth of a milligram.
+    assert page.count("<td class=n>2.00 g</td>") == 7
+
+
 def test_pictures_show_bosses_from_above_only() -> None:
     design = load_design("honeycomb", {"layers": "2"})
     plate = next(part for part in parts_of(stack_of(design, build_layout(design))) if part.name == "boss-red")
@@ -141,7 +151,7 @@ def test_exploded_parts_lie_above_each_other_and_apart() -> None:
 def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
     page = made.files["mesh/job-sheet.html"]
     assert isinstance(page, str)
-    for word in ("boss-red", "Solaris", "ml", "exploded.png"):
+    for word in ("boss-red", "Solaris", "mm³", "exploded.png", "draw it off flush"):
         assert word in page
     for name in (
         f"mesh/pictures/{part}-{side}.png" for part in ("base", "lid") for side in ("above", "below")

@@ -191,10 +191,13 @@ def _sheets(stack: Stack) -> Iterator[Finding]:
 
 def _curing(stack: Stack) -> Iterator[Finding]:
     tool = stack.options.tool
+    by_remedy: dict[str, list[str]] = {}
     for name, silicone in zip(LAYERS, stack.silicones, strict=True):
         if tool in silicone.inhibited_by.value:
-            subject = f"materials at the {name} layer on which {silicone.name} may not cure ({tool})"
-            yield Finding(subject, 1, 0, "", silicone.remedy, "warning")
+            by_remedy.setdefault(silicone.remedy, []).append(f"{name}: {silicone.name}")
+    for remedy, names in by_remedy.items():
+        subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
+        yield Finding(subject, len(names), 0, "", remedy, "warning")
     layers = list(zip(LAYERS, stack.silicones, strict=True))
     for (below, under), (above, over) in pairwise(layers):
         # Neither cures against the other, the makers say.
