@@ -14,6 +14,7 @@ from cmpdesign.contact import (
     Cube,
     Cylinder,
     Elastomer,
+    HeightMap,
     Motion,
     Punch,
     Rib,
@@ -266,3 +267,41 @@ def test_surface_is_the_displacement_between_and_zero_far_away() -> None:
     step = np.diff(surface(line), axis=0)[:, 1:]
     assert np.abs(np.diff(step, axis=0)).max() < 2e-4, "no jumps and no kinks, beyond the solved area neither"
     assert surface(np.empty((0, 2))).shape == (0, 3)
+
+
+def test_sliding_contact_moves_on() -> None:
+    """With little friction a sheared ball presses where it stands, not where it came from."""
+    slid, there = (
+        solve(LAYER, ball, motion, friction=0.02, size_mm=(18, 18), grid=60)
+        for ball, motion in (
+            (Ball(8.0, centre_mm=(-1.5, 0)), Motion(0.5, (3.0, 0.0))),
+            (Ball(8.0, centre_mm=(1.5, 0)), Motion(0.5)),
+        )
+    )
+    x = slid.x_mm[None, :]
+    centres = [np.sum(one.traction_mpa[..., 2] * x) / one.traction_mpa[..., 2].sum() for one in (slid, there)]
+    assert centres[0] == pytest.approx(centres[1], abs=0.1) and centres[1] == pytest.approx(1.5, abs=0.01)
+    assert np.abs(slid.displacement_mm[..., 2] - there.displacement_mm[..., 2]).max() < 0.06
+
+
+def test_contact_is_found_where_the_surface_bulges_up() -> None:
+    """A collar around a punch, too high for the flat surface, is touched by what the punch squeezes out."""
+    axis = 0.1 * (np.arange(141) - 70)
+    r = np.hypot(*np.meshgrid(axis, axis))
+    for friction in (0.0, 0.5):
+        free = solve(
+            Elastomer(2.0, 0.3), Punch(3.0), Motion(0.4), friction=friction, size_mm=(20, 20), grid=80
+        )
+        row, beside = free.displacement_mm[40, :, 2], (free.x_mm > 4.2) & (free.x_mm < 5.8)
+        bulge = row[beside].max()
+        face = np.where(r <= 3.0, 0.0, np.where((r > 4.0) & (r < 6.0), -0.4 - 0.7 * bulge, np.nan))
+        found = solve(
+            Elastomer(2.0, 0.3),
+            HeightMap(face, 0.1),
+            Motion(0.4),
+            friction=friction,
+            size_mm=(20, 20),
+            grid=80,
+        )
+        assert 0.7 * bulge > 0.16 * 0.4 and found.in_contact[40, beside].any()
+        assert found.displacement_mm[40, beside, 2].max() < 0.7 * bulge + 2e-3
