@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
     ("name", "keys"),
     [
         ("startup", {"conditions", "processes", "largest"}),
+        ("contact", {"conditions", "contacts", "closed_forms_percent"}),
         (
             "extraction",
             {"conditions", "standard", "large", "accuracy", "over_pixels", "over_markers", "growth"},
