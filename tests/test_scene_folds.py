@@ -104,8 +104,7 @@ def test_nothing_changes_beside_the_fold(steep: Scene, monkeypatch: pytest.Monke
 def test_a_blur_spreads_what_was_corrected_without_loss(steep: Scene) -> None:
     folds = look(steep, SIZE).folds
     assert folds is not None
-    values = np.zeros((len(steep.layout.cell_color) + 1, 1))
-    values[:-1, 0] = steep.layout.cell_color != BLACK
+    values = (np.append(steep.layout.cell_color, BLACK) != BLACK)[folds.cell, None].astype(np.float64)
     sums = []
     for blur_px in (0.0, 0.7, 1.5):
         planes = np.zeros((1, SIZE[1], SIZE[0]), np.float32)
@@ -115,9 +114,24 @@ def test_a_blur_spreads_what_was_corrected_without_loss(steep: Scene) -> None:
     np.testing.assert_allclose(sums, sums[0], rtol=2e-3)
 
 
-def test_too_much_is_refused_and_so_is_dirt_on_it(steep: Scene) -> None:
-    with pytest.raises(SceneError, match="bleed_mm, blobs and scratches"):
-        render(replace(steep, damage=Damage(blobs=(Blob((0, 0), 0.2),))), size=SIZE)
+def test_dirt_and_bleeding_inks_are_hidden_like_all_else(steep: Scene) -> None:
+    """What a blob paints on the nearest part alone: a blob under everything paints all that is seen, in its color."""
+    everywhere = Damage(blobs=(Blob((0.0, 0.0), 5.0, (90, 80, 70)),))
+    drawn = render(replace(steep, damage=everywhere), size=SIZE).image[WINDOW].astype(int)
+    np.testing.assert_allclose(drawn - (70, 80, 90), 0, atol=1)
+    plain = render(steep, size=SIZE).image.astype(int)
+    dirty = render(
+        replace(steep, damage=Damage(blobs=(Blob((0.3, 0.4), 0.25, (255, 0, 255)),))), size=SIZE
+    ).image
+    away = np.abs(dirty - plain).max(axis=2) > 1
+    x, y = look(steep, SIZE).image_from_layout(np.array([[0.3, 0.4]]))[0]
+    rows, columns = np.nonzero(away)
+    assert 20 < away.sum() < 600 and np.hypot(rows - y, columns - x).max() < 25
+    bled = render(replace(steep, damage=Damage(bleed_mm=0.02)), size=SIZE).image
+    assert np.abs(bled - plain).mean() < 4 and np.abs(bled - plain).max() > 20
+
+
+def test_too_much_is_refused(steep: Scene) -> None:
     with pytest.raises(SceneError, match="% of the pattern turn away from the camera"):
         render(replace(steep, surface=composed(Dent(2.0, 9.0))), size=SIZE)
     with pytest.raises(SceneError, match="not finite"):

@@ -37,6 +37,7 @@ class Folds:
     Attributes:
         xyd: (T, 3, 3) float64: x and y in px of the view's area, depth in mm.
         cell: (T,) int64, as in ``Patches``.
+        centre_mm: (T, 2) float64, in the layout.
         facing: (T,) float64, 1 towards the camera, -1 away.
         tiles: (K, 2) int64, corners of the tiles of ``TILE_PX`` that hold such places.
         share: of the pattern's area that turns away.
@@ -46,6 +47,7 @@ class Folds:
 
     xyd: Points
     cell: NDArray[np.int64]
+    centre_mm: Points
     facing: Points
     tiles: NDArray[np.int64]
     share: float
@@ -93,6 +95,7 @@ def find_folds(
     return Folds(
         xyd=xyd.reshape(-1, 3, 3),
         cell=np.repeat(around.cell, FINE**2),
+        centre_mm=_nodes(around, FINE).mean(axis=2).reshape(-1, 2),
         facing=np.sign(sign * _areas(xyd)).ravel(),
         tiles=tiles,
         share=share,
@@ -149,7 +152,7 @@ def add_hidden_parts(planes: Planes, folds: Folds, values: Points, blur_px: floa
     Args:
         planes: the signed sums.
         folds: of the view.
-        values: (C + 1, n): what each cell shows, the border last.
+        values: (T, n): what each of the small triangles shows.
         blur_px: the optics' blur.
     """
     from cmpdesign.scene.folds_compiled import sample_tile
@@ -158,7 +161,7 @@ def add_hidden_parts(planes: Planes, folds: Folds, values: Points, blur_px: floa
     reach = int(np.ceil(REACH_SIGMA * blur_px + 1)) if blur_px else 0
     offset = (np.arange(TILE_PX * SAMPLES) + 0.5) / SAMPLES - 0.5
     for left, top in folds.tiles:
-        missing = sample_tile(folds.xyd, folds.cell, folds.facing, values, left, top, TILE_PX, SAMPLES)
+        missing = sample_tile(folds.xyd, folds.facing, values, left, top, TILE_PX, SAMPLES)
         rows = np.arange(max(top - reach, 0), min(top + TILE_PX + reach, height))
         columns = np.arange(max(left - reach, 0), min(left + TILE_PX + reach, width))
         down = _response(rows[:, None] - (top + offset), blur_px)

@@ -13,7 +13,6 @@ Points = NDArray[np.float64]
 @_compiled
 def sample_tile(
     xyd: Points,
-    cell: NDArray[np.int64],
     facing: Points,
     values: Points,
     left: int,
@@ -25,7 +24,7 @@ def sample_tile(
     count, planes = size * samples, values.shape[1]
     result = np.zeros((planes, count, count))
     depth = np.full((count, count), np.inf)
-    nearest = np.full((count, count), -2)
+    nearest = np.full((count, count), -1)
     for t in range(len(xyd)):
         x_low, x_high = _range(xyd[t, 0, 0], xyd[t, 1, 0], xyd[t, 2, 0], left, count, samples)
         y_low, y_high = _range(xyd[t, 0, 1], xyd[t, 1, 1], xyd[t, 2, 1], top, count, samples)
@@ -36,13 +35,13 @@ def sample_tile(
                 if found == np.inf:
                     continue
                 for plane in range(planes):
-                    result[plane, j, i] -= facing[t] * values[cell[t], plane]
+                    result[plane, j, i] -= facing[t] * values[t, plane]
                 if found < depth[j, i]:
-                    depth[j, i], nearest[j, i] = found, cell[t]
+                    depth[j, i], nearest[j, i] = found, t
     for plane in range(planes):
         for j in range(count):
             for i in range(count):
-                if nearest[j, i] > -2:
+                if nearest[j, i] >= 0:
                     result[plane, j, i] += values[nearest[j, i], plane]
     return result
 

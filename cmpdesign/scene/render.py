@@ -127,9 +127,9 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
         join([ground, cells]), values, view.area[2:], point_spread(scene.blur_px), engine, view.orientation
     )
     if view.folds is not None:
-        _require_clean(scene)
-        sheets = np.column_stack([inks_of, np.ones(len(inks_of))])
-        add_hidden_parts(covered, view.folds, sheets, scene.blur_px)
+        shown = inks_of[view.folds.cell]
+        sums = [np.ones(len(shown)), shown.any(axis=1)][: values.shape[1] - 3]
+        add_hidden_parts(covered, view.folds, np.column_stack([shown, *sums]), scene.blur_px)
 
     inks, ground_share = covered[:3], covered[3]
     if bleed_mm:
@@ -145,16 +145,6 @@ def _over_black(scene: Scene, drawn: NDArray[np.int64]) -> Points:
     for ink in np.unique(color[drawn]):
         over[drawn[color[drawn] == ink]] = _bgr(scene.ink(int(ink))) - black
     return over
-
-
-def _require_clean(scene: Scene) -> None:
-    """Hidden parts are drawn from cells as designed."""
-    damage = scene.damage
-    if damage and (damage.bleed_mm or damage.blobs or damage.scratches):
-        raise SceneError(
-            "a part of the surface turns away from the camera; with that, bleed_mm, blobs and scratches cannot be "
-            "drawn: take them out of the damage or take a smaller displacement"
-        )
 
 
 def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -177,7 +167,10 @@ def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engin
         segments(spot.polygon()[None], view.area_from_layout, view.curved) for spot in spots
     ]
     values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
-    covered = coverage(join(outlines), values, view.area[2:], point_spread(blur_px), engine)
+    covered = coverage(join(outlines), values, view.area[2:], point_spread(blur_px), engine, view.orientation)
+    if view.folds is not None:
+        under = np.stack([spot.covers(view.folds.centre_mm) for spot in spots], axis=1)
+        add_hidden_parts(covered, view.folds, under @ values, blur_px)
     overlap = np.maximum(covered[3], 1.0)
     return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
 
