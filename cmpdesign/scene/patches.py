@@ -17,7 +17,7 @@ Points = NDArray[np.float64]
 def patches(layout: Layout) -> Points:
     """(P, 3, 2) mm: triangles that fill a layout's outline, counter-clockwise from the front.
 
-    First the cells in their order (a square one is two triangles, the second ones after all first ones), then the border.
+    First the cells in their order (of square ones the first half of each, then the second), then the border.
     """
     corners = layout.marker_xy_mm[layout.cell_corners]
     fans = [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
