@@ -19,6 +19,7 @@ ROOT = Path(__file__).parent.parent
     [
         ("startup", {"conditions", "processes", "largest"}),
         ("rendering", {"conditions", "errors", "speeds"}),
+        ("contact", {"conditions", "contacts", "closed_forms_percent"}),
         (
             "extraction",
             {"conditions", "standard", "large", "accuracy", "over_pixels", "over_markers", "growth"},
