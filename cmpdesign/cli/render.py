@@ -12,6 +12,19 @@ import typer
 from cmpdesign.cli.terminal import console, printable
 from cmpdesign.errors import CmpDesignError
 
+# Options that a scene file has names for.
+IN_TABLES = {
+    "pitch": "[camera] pitch_px",
+    "rotation": "[camera] rotation_deg",
+    "tilt": "[camera] tilt_deg",
+    "tilt_axis": "[camera] tilt_axis_deg",
+    "mirrored": "[camera] mirrored",
+    "press": "[surface.press] depth_mm",
+    "press_radius": "[surface.press] radius_mm",
+    "blur": "[optics] blur_px",
+    "noise": "[sensor] noise",
+}
+
 
 def finite(option: typer.CallbackParam, value: float | None) -> float | None:
     """A number that is one: the parser takes "nan" and "inf" for numbers, too."""
@@ -22,7 +35,20 @@ def finite(option: typer.CallbackParam, value: float | None) -> float | None:
 
 def render(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="IMAGE", help="PNG file to write.")],
+    ctx: typer.Context,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="IMAGE",
+            help="PNG file to write; of a sequence a video (.mp4, .avi, .mkv) or a folder.",
+        ),
+    ],
+    scene: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Scene TOML, or the name of a scene template."),
+    ] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")
     ] = None,
@@ -51,6 +77,13 @@ def render(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
     """Render the pattern as a camera sees it: seeded, exact to a thousandth of a pixel."""
+    if scene is not None:
+        from cmpdesign.cli.render_scene import render_file
+
+        given = _given(ctx)
+        pixels = image_size(size) if "size" in given else None
+        render_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
+        return
     from cmpdesign.images import to_png
     from cmpdesign.reading import read_layout
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed, save_truth
@@ -60,7 +93,7 @@ def render(
     pixels = image_size(size)
     pattern = read_layout(layout)
     radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
-    scene = Scene(
+    seen = Scene(
         layout=pattern,
         camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
         surface=composed(Press(radius, press)) if press else None,
@@ -68,13 +101,27 @@ def render(
         sensor=Sensor(noise=noise) if noise else None,
         seed=seed,
     )
-    rendered = render_scene(scene, size=pixels)
+    rendered = render_scene(seen, size=pixels)
     if truth is not None:
         save_truth(rendered.truth, truth)
         console().print(f"wrote {printable(truth)}")
     write_file(output, to_png(rendered.image))
     visible = int(rendered.truth.visible.sum())
     console().print(f"wrote {printable(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible")
+
+
+def _given(ctx: typer.Context) -> set[str]:
+    """The options that stand on the command line; beside a scene file only those that a file does not have.
+
+    Raises:
+        CmpDesignError: an option that the file's tables have, too.
+    """
+    sources = {name: ctx.get_parameter_source(name) for name in ctx.params}
+    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    for name in sorted(given & IN_TABLES.keys()):
+        option = "--front or --mirrored" if name == "mirrored" else f"--{name.replace('_', '-')}"
+        raise CmpDesignError(f"{option} has no place beside --scene; write {IN_TABLES[name]} into the file")
+    return given
 
 
 def image_size(text: str) -> tuple[int, int]:

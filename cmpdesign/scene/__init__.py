@@ -5,6 +5,8 @@ layout + surface + camera + light + optics + sensor + damage -> image + truth
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from cmpdesign.scene.background import Busy, Gradient, Paper, Picture, Plain
 from cmpdesign.scene.bound import cramer_rao
 from cmpdesign.scene.camera import Camera
@@ -12,12 +14,18 @@ from cmpdesign.scene.damage import Blob, Damage, Glare, Scratch
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import Led, Light, colored_leds
 from cmpdesign.scene.optics import Optics
+from cmpdesign.scene.pinhole import Pinhole
 from cmpdesign.scene.render import Rendered, render
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.sensor import Sensor
 from cmpdesign.scene.standard import STANDARD_SIZE, standard_layout, standard_scene
-from cmpdesign.scene.surface import Press, Shear, Surface, Twist, composed
-from cmpdesign.scene.truth import Truth, load_truth, save_truth
+from cmpdesign.scene.surface import Dent, Press, Shear, Surface, Twist, composed
+from cmpdesign.scene.truth import Truth, load_truth, load_truths, save_truth, save_truths
+
+if TYPE_CHECKING:
+    from cmpdesign.scene.file import SceneFile as SceneFile
+    from cmpdesign.scene.file import load_scene as load_scene
+
 
 __all__ = [
     "STANDARD_SIZE",
@@ -25,6 +33,7 @@ __all__ = [
     "Busy",
     "Camera",
     "Damage",
+    "Dent",
     "Glare",
     "Gradient",
     "Led",
@@ -32,11 +41,13 @@ __all__ = [
     "Optics",
     "Paper",
     "Picture",
+    "Pinhole",
     "Plain",
     "Press",
     "Rendered",
     "Scene",
     "SceneError",
+    "SceneFile",
     "Scratch",
     "Sensor",
     "Shear",
@@ -46,9 +57,21 @@ __all__ = [
     "colored_leds",
     "composed",
     "cramer_rao",
+    "load_scene",
     "load_truth",
+    "load_truths",
     "render",
     "save_truth",
+    "save_truths",
     "standard_layout",
     "standard_scene",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Scene files need pydantic, which scenes made in Python do not."""
+    if name not in ("SceneFile", "load_scene"):
+        raise AttributeError(f"module 'cmpdesign.scene' has no attribute {name!r}")
+    from cmpdesign.scene import file
+
+    return getattr(file, name)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 RGB = tuple[float, float, float]
 Planes = NDArray[np.float32]
@@ -24,6 +24,8 @@ class Background(Protocol):
 class Plain:
     """One color."""
 
+    __pydantic_config__: ClassVar = STRICT
+
     rgb: RGB = (20.0, 20.0, 20.0)
 
     def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes:
@@ -35,6 +37,8 @@ class Plain:
 @dataclass(frozen=True)
 class Gradient:
     """A color that turns into another along a direction, counter-clockwise from the right."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     rgb_from: RGB = (60.0, 70.0, 80.0)
     rgb_to: RGB = (190.0, 180.0, 170.0)
@@ -53,6 +57,8 @@ class Gradient:
 @dataclass(frozen=True)
 class Paper:
     """Paper: a warm white with fibres, grain and slow shading."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     rgb: RGB = (236.0, 230.0, 216.0)
     grain: float = 4.0
@@ -81,6 +87,8 @@ class Busy:
         shapes: how many.
         triangles: draw triangles in red, green, blue and white only, the hardest clutter for this pattern.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     shapes: int = 150
     triangles: bool = False

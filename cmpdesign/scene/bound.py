@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from cmpdesign.layout import BLACK
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import gain
+from cmpdesign.scene.pinhole import Area
 from cmpdesign.scene.render import missing_cells, render_truth
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
+from cmpdesign.scene.view import look
 
 # A marker that the image says nothing about would make the matrix singular: a prior of 1000 px cures that.
 PRIOR_PER_PX2 = 1e-6
@@ -38,8 +40,9 @@ def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[n
     the bending of gridlines are left out. NaN for markers that are not visible.
 
     Raises:
-        SceneError: the scene has no noise, so nothing bounds it.
+        SceneError: the scene has no noise, so nothing bounds it; or it has several views, each with its own bound.
     """
+    look(scene, size)  # refuses several views
     truth = render_truth(scene, size=size)
     return _inverse_blocks(edge_information(scene, truth, size), truth)
 
@@ -48,8 +51,9 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
     """The sparse (2M, 2M) information matrix, 1/px^2, rows x0, y0, x1, y1, ... by marker.
 
     Raises:
-        SceneError: the scene has no noise.
+        SceneError: the scene has no noise, or several views.
     """
+    area = look(scene, size).area
     noise = scene.sensor.noise if scene.sensor else 0.0
     if noise <= 0:
         raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
@@ -57,7 +61,7 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
     spread = np.sqrt(scene.blur_px**2 + 1 / 12)
     contrast_squared = _contrast_squared(scene, ends.mean(axis=1), size)
     per_px = contrast_squared / (2 * np.sqrt(np.pi) * spread * noise**2)
-    return _information(scene.layout.edges, ends, per_px, size, len(truth.marker_xy_px))
+    return _information(scene.layout.edges, ends, per_px, area, len(truth.marker_xy_px))
 
 
 def _contrast_squared(
@@ -86,16 +90,16 @@ def _information(
     edges: NDArray[np.int32],
     ends: NDArray[np.float64],
     per_px: NDArray[np.float64],
-    size: tuple[int, int],
+    area: Area,
     markers: int,
 ) -> Any:
-    """The sparse (2M, 2M) information matrix of all edges, as far as they lie inside the image."""
+    """The sparse (2M, 2M) information matrix of all edges, as far as they lie inside the view's area."""
     from scipy.sparse import coo_array
 
     step = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(step, axis=1)
     normal = np.stack([-step[:, 1], step[:, 0]], axis=-1) / length[:, None]
-    low, high = _inside(ends, size)
+    low, high = _inside(ends, area)
     weight = per_px * length
     # Integrals of (1 - t)^2, t (1 - t) and t^2 over the part inside.
     both = {
@@ -119,13 +123,12 @@ def _information(
     return matrix.tocsc()
 
 
-def _inside(
-    ends: NDArray[np.float64], size: tuple[int, int]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The range of t, (E,) each, over which each edge lies inside the image; empty ranges are (0, 0)."""
+def _inside(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The range of t, (E,) each, over which each edge lies inside the area; empty ranges are (0, 0)."""
     start, step = ends[:, 0], ends[:, 1] - ends[:, 0]
     step = np.where(np.abs(step) < 1e-12, 1e-12, step)
-    first, second = (-0.5 - start) / step, (np.asarray(size) - 0.5 - start) / step
+    corner = np.asarray(area[:2]) - 0.5
+    first, second = (corner - start) / step, (corner + np.asarray(area[2:]) - start) / step
     low = np.clip(np.minimum(first, second).max(axis=1), 0, 1)
     high = np.clip(np.maximum(first, second).min(axis=1), 0, 1)
     outside = high <= low

@@ -1,14 +1,16 @@
-"""The camera: a homography from the layout frame (mm) to the image frame (px)."""
+"""The plain camera: a pinhole in terms of the picture that it makes; on a plane, a homography from mm to px."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import Layout
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
+from cmpdesign.scene.pinhole import Pinhole
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Camera:
             image's longer side.
         mirrored: looks at the pattern's back; None: as the layout was designed.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     pitch_px: float = 20.0
     rotation_deg: float = 0.0
@@ -58,27 +62,58 @@ def pitch_mm(layout: Layout) -> float:
 
 def homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> NDArray[np.float64]:
     """H_image_from_layout, (3, 3) float64, H[2, 2] = 1; ``size`` is the image's (width, height)."""
-    width, height = size
-    scale = camera.pitch_px / pitch_mm(layout)
-    focal = camera.focal_px if camera.focal_px is not None else 1.5 * max(size)
-    centre_x, centre_y = camera.centre_px or ((width - 1) / 2, (height - 1) / 2)
-
-    turn = np.radians(camera.rotation_deg)
-    side = -1.0 if is_mirrored(camera, layout) else 1.0
-    cos, sin = np.cos(turn), np.sin(turn)
-    # The image's y points down, so a turn that looks counter-clockwise is clockwise in its numbers.
-    planar = scale * np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0])
-    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    from_middle = np.column_stack([np.eye(2), np.round(-0.5 * (low + high), 9)])
-
-    axis = np.radians(camera.tilt_axis_deg)
-    tilted = (
-        _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))[:, :2] @ planar
-    )
+    focal, (centre_x, centre_y) = _focal(camera, size), _centre(camera, size)
+    scale, middle = camera.pitch_px / pitch_mm(layout), _middle(layout)
+    planar = scale * _turned(camera, layout)
+    from_middle = np.column_stack([np.eye(2), -middle])
+    tilted = _tilt(camera)[:, :2] @ planar
     pose = tilted @ from_middle + np.outer([0.0, 0.0, focal], [0.0, 0.0, 1.0])
     intrinsics = np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
     h = intrinsics @ pose
     return np.asarray(h / h[2, 2], dtype=np.float64)
+
+
+def pinhole(camera: Camera, layout: Layout, size: tuple[int, int]) -> Pinhole:
+    """The same camera in space: its homography of the layout's plane is ``homography``."""
+    focal = _focal(camera, size)
+    planar = _turned(camera, layout)
+    # Seen from the front the layout's z points at the camera, seen from the back away from it.
+    r = _tilt(camera) @ np.block([[planar, np.zeros((2, 1))], [np.zeros((1, 2)), np.linalg.det(planar)]])
+    away = np.array([0.0, 0.0, focal * pitch_mm(layout) / camera.pitch_px])
+    return Pinhole(
+        (focal, focal),
+        _centre(camera, size),
+        R_camera_from_layout=r,
+        t_camera_from_layout_mm=away - r[:, :2] @ _middle(layout),
+    )
+
+
+def _focal(camera: Camera, size: tuple[int, int]) -> float:
+    return camera.focal_px if camera.focal_px is not None else 1.5 * max(size)
+
+
+def _centre(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
+    return camera.centre_px or ((size[0] - 1) / 2, (size[1] - 1) / 2)
+
+
+def _middle(layout: Layout) -> NDArray[np.float64]:
+    """(2,) mm: the middle of the outline's bounding box."""
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    return np.asarray(np.round(0.5 * (low + high), 9))
+
+
+def _turned(camera: Camera, layout: Layout) -> NDArray[np.float64]:
+    """(2, 2): the layout's axes in the image's, before the tilt."""
+    turn = np.radians(camera.rotation_deg)
+    side = -1.0 if is_mirrored(camera, layout) else 1.0
+    cos, sin = np.cos(turn), np.sin(turn)
+    # The image's y points down, so a turn that looks counter-clockwise is clockwise in its numbers.
+    return np.asarray(np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0]))
+
+
+def _tilt(camera: Camera) -> NDArray[np.float64]:
+    axis = np.radians(camera.tilt_axis_deg)
+    return _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))
 
 
 def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

@@ -63,6 +63,7 @@ def coverage(
     size: tuple[int, int],
     spread: PointSpread,
     engine: Engine = "compiled",
+    orientation: float | None = None,
 ) -> NDArray[np.float32]:
     """Sum over the polygons of value times blurred coverage.
 
@@ -72,12 +73,14 @@ def coverage(
         size: the image's (width, height).
         spread: the point spread.
         engine: "compiled" (numba) or its twin "numpy".
+        orientation: sign of the area (x to y counts as positive) of polygons that count as covered; the other way
+            round they count as minus that. None: each counts as covered either way round.
 
     Returns:
         (planes, height, width) float32.
     """
     width, height = size
-    task = _task(paths, values, size, spread)
+    task = _task(paths, _signed(paths, values, orientation), size, spread)
     draw = _engine(engine)
     image = np.empty((values.shape[1], height, width), dtype=np.float32)
     for first in range(0, height, BAND_ROWS):
@@ -97,14 +100,21 @@ def _engine(engine: Engine) -> Band:
 def _task(paths: Segments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread) -> Task:
     fine = spread.oversampling
     columns, rows = (fine * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
-    xy = paths.xy_px
-    area = np.bincount(paths.owner, xy[:, 0] * xy[:, 3] - xy[:, 2] * xy[:, 1], minlength=len(values))
     # Knots of the even degree lie between the samples.
     shift = spread.reach + (0.5 if spread.degree == 0 else 0.0)
-    cut, owner = _cut(fine * xy + shift, paths.owner, columns, rows)
+    cut, owner = _cut(fine * paths.xy_px + shift, paths.owner, columns, rows)
     nodes, weights = np.polynomial.legendre.leggauss(spread.degree + 1)
     quadrature = np.stack([(nodes + 1) / 2, weights / 2])
-    return Task(cut, owner, values * -np.sign(area)[:, None], columns, rows, spread, size[0], quadrature)
+    return Task(cut, owner, values, columns, rows, spread, size[0], quadrature)
+
+
+def _signed(paths: Segments, values: NDArray[np.float64], orientation: float | None) -> NDArray[np.float64]:
+    """What the contour integral is to be weighted with."""
+    if orientation is not None:
+        return -orientation * values
+    xy = paths.xy_px
+    area = np.bincount(paths.owner, xy[:, 0] * xy[:, 3] - xy[:, 2] * xy[:, 1], minlength=len(values))
+    return values * -np.sign(area)[:, None]
 
 
 def _cut(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout import BLACK, Layout
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 RGB = tuple[float, float, float]
 Points = NDArray[np.float64]
@@ -18,6 +19,8 @@ ROUND = 48  # sides of a blob
 @dataclass(frozen=True)
 class Blob:
     """A disc of dirt on the pattern, in mm of the layout; it moves with the surface."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     centre_mm: tuple[float, float]
     radius_mm: float
@@ -36,6 +39,8 @@ class Blob:
 @dataclass(frozen=True)
 class Scratch:
     """A straight band on the pattern, from one point to another, in mm of the layout."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     start_mm: tuple[float, float]
     end_mm: tuple[float, float]
@@ -72,6 +77,8 @@ class Scratch:
 class Glare:
     """A reflection fixed to the camera: a Gaussian spot adding ``strength`` (8-bit units) at its centre."""
 
+    __pydantic_config__: ClassVar = STRICT
+
     centre_px: tuple[float, float]
     sigma_px: float
     strength: float = 300.0
@@ -102,6 +109,8 @@ class Damage:
         blobs, scratches, glare: see there.
         bleed_mm: every ink's side runs outward, by a random distance from 0 to this.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     missing_cells: tuple[int, ...] = ()
     missing_share: float = 0.0

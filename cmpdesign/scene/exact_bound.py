@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from cmpdesign.scene.bound import _inverse_blocks
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.render import look, render, render_truth
+from cmpdesign.scene.render import render, render_truth
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.sensor import Sensor
+from cmpdesign.scene.view import look
 
 STEP_PX = 0.1
 APART = 3  # rings between markers that move together

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 RGB = tuple[float, float, float]
 
@@ -21,6 +22,8 @@ class Led:
         rgb: its gain at the rim, for each channel.
         reach: distance, in half diagonals of the image, over which it falls by exp(-1/2).
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     angle_deg: float
     rgb: RGB
@@ -37,6 +40,8 @@ class Light:
         vignetting: relative loss in the image's corners, falling with the square of the distance; 0 to 1.
         leds: further lights at the rim.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     rgb: RGB = (1.0, 1.0, 1.0)
     gradient: tuple[float, float] = (0.0, 0.0)

@@ -14,11 +14,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 SAMPLES_PER_SIGMA = 1.2
 REACH_SIGMA = 5.5
@@ -27,6 +28,8 @@ REACH_SIGMA = 5.5
 @dataclass(frozen=True)
 class Optics:
     """Gaussian blur; ``blur_px`` is its sigma, 0 or 0.1 to 20 px."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     blur_px: float = 1.0
 

@@ -44,30 +44,33 @@ def segments(polygons_mm: Points, image_from_layout: Callable[[Points], Points],
     start = polygons_mm.reshape(-1, 2)
     end = np.roll(polygons_mm, -1, axis=1).reshape(-1, 2)
     owner = np.repeat(np.arange(len(polygons_mm)), polygons_mm.shape[1])
-    pieces = _pieces(start, end, image_from_layout) if curved else np.ones(len(start), dtype=np.int64)
-
-    side = np.repeat(np.arange(len(start)), pieces)
-    step = np.arange(len(side)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    here = image_from_layout(_between(start[side], end[side], step / pieces[side]))
+    if curved:
+        here, pieces = _followed(start, end, image_from_layout)
+    else:
+        here, pieces = image_from_layout(start), np.ones(len(start), dtype=np.int64)
     # Each piece ends, to the last bit, where the next one of its polygon starts.
-    count = np.bincount(owner[side], minlength=len(polygons_mm))
-    following = np.arange(1, len(side) + 1)
+    count = np.bincount(owner, pieces, minlength=len(polygons_mm)).astype(np.int64)
+    following = np.arange(1, len(here) + 1)
     last = np.cumsum(count) - 1
     following[last] = last - count + 1
-    return Segments(np.concatenate([here, here[following]], axis=1), owner[side])
+    return Segments(np.concatenate([here, here[following]], axis=1), np.repeat(owner, pieces))
 
 
-def _between(start: Points, end: Points, t: NDArray[np.float64]) -> Points:
-    return np.asarray(start + t[:, None] * (end - start))
+def _followed(
+    start: Points, end: Points, image_from_layout: Callable[[Points], Points]
+) -> tuple[Points, NDArray[np.int64]]:
+    """Where the pieces of all sides (N, 2) start, one side after the other, and how many each side has.
 
-
-def _pieces(start: Points, end: Points, image_from_layout: Callable[[Points], Points]) -> NDArray[np.int64]:
-    """How many pieces each side (N, 2) needs; the chord error falls with their number's square."""
+    Halving the pieces leaves a fourth of the chord error, which is how it is known.
+    """
     pieces = np.full(len(start), 4, dtype=np.int64)
+    rounds = []
     open_sides = np.arange(len(start))
     while len(open_sides):
-        error = _chord_error(start[open_sides], end[open_sides], pieces[open_sides], image_from_layout)
+        xy, first = _mapped(start[open_sides], end[open_sides], pieces[open_sides], image_from_layout)
+        error = _chord_error(xy, first, pieces[open_sides]) / 4
         coarse = error > CHORD_PX
+        rounds.append((open_sides[~coarse], first[~coarse], xy))
         open_sides, error = open_sides[coarse], error[coarse]
         more = np.ceil(pieces[open_sides] * np.sqrt(np.minimum(error / CHORD_PX, 64.0)) * 1.05)
         pieces[open_sides] = more.astype(np.int64)
@@ -75,17 +78,34 @@ def _pieces(start: Points, end: Points, image_from_layout: Callable[[Points], Po
             raise SceneError(
                 "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
             )
-    return pieces
+    pieces *= 2
+    here = np.empty((int(pieces.sum()), 2))
+    place = np.cumsum(pieces) - pieces
+    for sides, first, xy in rounds:
+        here[_ranges(place[sides], pieces[sides])] = xy[_ranges(first, pieces[sides])]
+    return here, pieces
 
 
-def _chord_error(
+def _mapped(
     start: Points, end: Points, pieces: NDArray[np.int64], image_from_layout: Callable[[Points], Points]
-) -> NDArray[np.float64]:
+) -> tuple[Points, NDArray[np.int64]]:
+    """The ends and middles of every side's pieces in the image, and where each side's first one stands."""
+    count = 2 * pieces + 1
+    first = np.cumsum(count) - count
+    side = np.repeat(np.arange(len(start)), count)
+    step = np.arange(len(side)) - first[side]
+    t = (step / (2 * pieces[side]))[:, None]
+    return image_from_layout(start[side] + t * (end - start)[side]), first
+
+
+def _chord_error(xy: Points, first: NDArray[np.int64], pieces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(N,) px: the largest distance between a piece's middle and its chord's middle."""
-    side = np.repeat(np.arange(len(start)), 2 * pieces + 1)
-    step = np.arange(len(side)) - np.repeat(np.cumsum(2 * pieces + 1) - (2 * pieces + 1), 2 * pieces + 1)
-    xy = image_from_layout(_between(start[side], end[side], step / (2 * pieces[side])))
-    middle = np.flatnonzero(step % 2 == 1)
+    middle = np.repeat(first, pieces) + 2 * _ranges(np.zeros_like(pieces), pieces) + 1
     bend = np.linalg.norm(xy[middle] - 0.5 * (xy[middle - 1] + xy[middle + 1]), axis=1)
-    first = np.cumsum(pieces) - pieces
-    return np.asarray(np.maximum.reduceat(bend, first))
+    return np.asarray(np.maximum.reduceat(bend, np.cumsum(pieces) - pieces))
+
+
+def _ranges(first: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The numbers first, first + 1, ..., ``count`` of them, for one range after the other."""
+    before = np.cumsum(count) - count
+    return np.asarray(np.arange(int(count.sum())) + np.repeat(first - before, count))

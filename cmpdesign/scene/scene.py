@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cmpdesign.layout import COLORS, Layout
 from cmpdesign.scene.background import Background, Plain
@@ -13,10 +16,12 @@ from cmpdesign.scene.damage import Damage
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.light import Light
 from cmpdesign.scene.optics import Optics
+from cmpdesign.scene.pinhole import Pinhole
 from cmpdesign.scene.sensor import Sensor
 from cmpdesign.scene.surface import Surface
 
 RGB = tuple[float, float, float]
+Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +30,8 @@ class Scene:
 
     Attributes:
         layout: the pattern.
-        camera: where it is seen from.
-        surface: the surface's state; None: flat, as designed.
+        camera: where it is seen from; a tuple of pinholes are views that share one image.
+        surface: the surface's state, a map of (N, 2) mm onto (N, 2) or (N, 3) mm; None: flat, as designed.
         light: None: white and even.
         background: behind the pattern's outline.
         optics: the blur; None: none.
@@ -34,11 +39,13 @@ class Scene:
         damage: None: none.
         inks: RGB 0 to 255 by color name, over the layout's palette.
         seed: of everything random; the same scene gives the same bytes.
+        frame: its number in a sequence; only the noise depends on it.
+        warnings: what makes its parts doubtful, handed on with the image.
     """
 
     layout: Layout
-    camera: Camera = field(default_factory=Camera)
-    surface: Surface | None = None
+    camera: Camera | Pinhole | tuple[Pinhole, ...] = field(default_factory=Camera)
+    surface: Surface | Callable[[Points], Points] | None = None
     light: Light | None = None
     background: Background = field(default_factory=Plain)
     optics: Optics | None = None
@@ -46,8 +53,12 @@ class Scene:
     damage: Damage | None = None
     inks: Mapping[str, RGB] = field(default_factory=dict)
     seed: int = 0
+    frame: int = 0
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if isinstance(self.camera, tuple) and not self.camera:
+            raise SceneError("the scene has no view; give at least one Pinhole")
         for name in self.inks:
             if name not in COLORS:
                 raise SceneError(f"ink {name!r} is unknown; the inks are {', '.join(COLORS)}")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 Depth = TypeVar("Depth", np.uint8, np.uint16)
 
@@ -23,6 +23,8 @@ class Sensor:
         bits: 8 or 16.
         jpeg_quality: 1 to 100; None: not compressed. 8 bits only.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     noise: float = 0.0
     gamma: float = 1.0

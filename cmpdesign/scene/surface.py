@@ -1,21 +1,21 @@
-"""The surface's state: smooth maps of the layout frame onto itself, mm to mm, one after the other."""
+"""The surface's state: smooth maps of the layout's plane onto itself or into space, mm to mm, one after the other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.errors import STRICT, SceneError
 
 Points = NDArray[np.float64]
 
 
 class Deformation(Protocol):
-    """A smooth map of (N, 2) float64 points of the layout frame, mm to mm."""
+    """A smooth map of (N, 2) float64 points of the layout's plane to (N, 2) or (N, 3), mm to mm."""
 
     def __call__(self, xy_mm: Points, /) -> Points: ...
 
@@ -39,6 +39,8 @@ class Press:
     exactly ``depth_mm``. It folds where depth_mm / radius_mm leaves (-0.61, 1.36).
     """
 
+    __pydantic_config__: ClassVar = STRICT
+
     radius_mm: float
     depth_mm: float
     centre_mm: tuple[float, float] = (0.0, 0.0)
@@ -54,6 +56,8 @@ class Press:
 @dataclass(frozen=True)
 class Twist:
     """Turns points about a centre, counter-clockwise by ``angle_deg`` there, fading as exp(-r^2 / 2)."""
+
+    __pydantic_config__: ClassVar = STRICT
 
     radius_mm: float
     angle_deg: float
@@ -75,6 +79,8 @@ class Twist:
 class Shear:
     """Drags points by ``shift_mm`` at a centre, fading as exp(-r^2 / 2), as a contact drags the skin."""
 
+    __pydantic_config__: ClassVar = STRICT
+
     radius_mm: float
     shift_mm: tuple[float, float]
     centre_mm: tuple[float, float] = (0.0, 0.0)
@@ -88,33 +94,59 @@ class Shear:
 
 
 @dataclass(frozen=True)
+class Dent:
+    """Moves points towards -z (depth_mm > 0), as an object does that is pressed into the front.
+
+    The depth is depth_mm * exp(-r^2 / 2), r = distance / radius_mm: the simplest surface in space. It stands for no
+    contact; ``cmpdesign.contact`` has those.
+    """
+
+    __pydantic_config__: ClassVar = STRICT
+
+    radius_mm: float
+    depth_mm: float
+    centre_mm: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_radius(self.radius_mm)
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        _, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        return np.concatenate([xy_mm, -self.depth_mm * bell], axis=1)
+
+
+@dataclass(frozen=True)
 class Surface:
-    """Deformations applied in order; any smooth callable of (N, 2) mm points will do."""
+    """Deformations applied in order; any smooth callable of (N, 2) mm points will do.
+
+    Each moves what the ones before it made of x and y; heights add up.
+    """
 
     deformations: tuple[Deformation | Callable[[Points], Points], ...]
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        """Positions (N, 2) in mm after all deformations."""
+        """Positions (N, 2) in mm after all deformations, (N, 3) where one of them leads out of the plane."""
+        height: Points | None = None
         for deform in self.deformations:
-            xy_mm = deform(xy_mm)
-        return xy_mm
+            at = deform(xy_mm)
+            xy_mm = at[:, :2]
+            if at.shape[1] == 3:
+                height = at[:, 2] if height is None else height + at[:, 2]
+        return xy_mm if height is None else np.column_stack([xy_mm, height])
 
 
-def composed(*deformations: Deformation) -> Surface:
+def composed(*deformations: Deformation | Callable[[Points], Points]) -> Surface:
     """The surface after these deformations, the first one first."""
     return Surface(tuple(deformations))
 
 
-def require_no_fold(surface: Surface, xy_mm: Points, step_mm: float) -> None:
+def require_no_fold(surface: Callable[[Points], Points], xy_mm: Points, step_mm: float) -> None:
     """Check the map's Jacobian determinant (central differences over ``step_mm``) at the points (N, 2).
 
     Raises:
         SceneError: the map folds or is not finite somewhere; names the place and the determinant.
     """
-    x_step, y_step = np.array([step_mm, 0.0]), np.array([0.0, step_mm])
-    along_x = (surface(xy_mm + x_step) - surface(xy_mm - x_step)) / (2 * step_mm)
-    along_y = (surface(xy_mm + y_step) - surface(xy_mm - y_step)) / (2 * step_mm)
-    jacobian = along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0]
+    jacobian = determinant(surface, xy_mm, step_mm)
     folded = ~(jacobian > 0)  # also catches NaN
     if folded.any():
         worst = int(np.argmin(np.where(np.isnan(jacobian), -np.inf, jacobian)))
@@ -123,6 +155,14 @@ def require_no_fold(surface: Surface, xy_mm: Points, step_mm: float) -> None:
             f"the surface folds at ({x:.3g}, {y:.3g}) mm: its Jacobian is {jacobian[worst]:.3g}, "
             "it must stay above 0; take a smaller displacement or a larger radius_mm"
         )
+
+
+def determinant(mapped: Callable[[Points], Points], xy_mm: Points, step_mm: float) -> Points:
+    """(N,) the Jacobian determinant of a map of (N, 2) points to (N, 2), by central differences over ``step_mm``."""
+    x_step, y_step = np.array([step_mm, 0.0]), np.array([0.0, step_mm])
+    along_x = (mapped(xy_mm + x_step) - mapped(xy_mm - x_step)) / (2 * step_mm)
+    along_y = (mapped(xy_mm + y_step) - mapped(xy_mm - y_step)) / (2 * step_mm)
+    return np.asarray(along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0])
 
 
 def points_to_check(markers_mm: Points, cells: Sequence[NDArray[np.int32]] | NDArray[np.int32]) -> Points:

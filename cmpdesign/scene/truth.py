@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +16,32 @@ from cmpdesign.scene.errors import SceneError
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Where everything is in the image, exactly. Its fields' names are the .npz file's.
+    """Where everything is, exactly. Its fields' names are the .npz file's.
+
+    Where the scene's camera is a tuple of V views, the fields that a view has its own values of, marked *, have a
+    leading axis of V.
 
     Attributes:
-        marker_xy_px: (M, 2) float64, image frame ((0, 0) is the centre of the top-left pixel).
-        visible: (M,) bool: inside the image, touching at least one undamaged colored or white cell, and not
+        marker_xy_px*: (M, 2) float64, image frame ((0, 0) is the centre of the top-left pixel).
+        visible*: (M,) bool: inside the image, touching at least one undamaged colored or white cell, and not
             itself under dirt or glare.
-        virtual_xy_px: (E, m, 2) float64, on the true, curved gridlines; from the smaller marker id.
-        cell_visible: (C,) bool: all corners inside the image and the cell undamaged: not missing, and less
+        virtual_xy_px*: (E, m, 2) float64, on the true, curved gridlines; from the smaller marker id.
+        cell_visible*: (C,) bool: all corners inside the image and the cell undamaged: not missing, and less
             than half of it under dirt or glare.
-        mirrored: the pattern's back is seen.
-        H: (3, 3) float64 image-from-layout; None when the surface is not flat.
+        mirrored*: the pattern's back is seen.
+        H*: (3, 3) float64 image-from-layout; None when a surface is not flat or a lens distorts.
+        marker_xyz_mm: (M, 3) float64, the surface in the layout frame; z is 0 on a flat one.
+        virtual_xyz_mm: (E, m, 3) float64.
     """
 
     marker_xy_px: NDArray[np.float64]
     visible: NDArray[np.bool_]
     virtual_xy_px: NDArray[np.float64]
     cell_visible: NDArray[np.bool_]
-    mirrored: bool
+    mirrored: bool | NDArray[np.bool_]
     H: NDArray[np.float64] | None
+    marker_xyz_mm: NDArray[np.float64]
+    virtual_xyz_mm: NDArray[np.float64]
 
 
 def save_truth(truth: Truth, path: str | Path) -> Path:
@@ -41,12 +50,34 @@ def save_truth(truth: Truth, path: str | Path) -> Path:
     Raises:
         OutputError: the file cannot be written; what stood there before is unchanged.
     """
+    return _save(_columns(truth), path)
+
+
+def save_truths(truths: Sequence[Truth], time_s: Sequence[float], path: str | Path) -> Path:
+    """Write a sequence as one .npz: every field with a leading axis of F frames, and ``time_s`` (F,).
+
+    Raises:
+        OutputError: the file cannot be written; what stood there before is unchanged.
+    """
+    columns = {"time_s": np.asarray(time_s, dtype=np.float64)}
+    for item in fields(Truth):
+        values = [getattr(truth, item.name) for truth in truths]
+        if all(value is not None for value in values):
+            columns[item.name] = np.stack(values)
+    return _save(columns, path)
+
+
+def _columns(truth: Truth) -> dict[str, Any]:
+    found = {item.name: getattr(truth, item.name) for item in fields(truth)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _save(columns: dict[str, Any], path: str | Path) -> Path:
     path = Path(path)
     beside = path.with_name(path.name + ".part")
-    columns = {item.name: getattr(truth, item.name) for item in fields(truth)}
     try:
         with beside.open("wb") as file:
-            np.savez_compressed(file, **{name: value for name, value in columns.items() if value is not None})
+            np.savez_compressed(file, **columns)
         beside.replace(path)
     except OSError as error:
         beside.unlink(missing_ok=True)
@@ -60,9 +91,37 @@ def load_truth(path: str | Path) -> Truth:
     Raises:
         SceneError: the file is not a truth file.
     """
+    columns = _load(path)
+    if "time_s" in columns:
+        raise SceneError(f"{path} holds the truth of a sequence; read it with load_truths")
+    return _truth(columns, path)
+
+
+def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
+    """Read what ``save_truths`` wrote: the truth of every frame, and their times (F,) in s.
+
+    Raises:
+        SceneError: the file is not the truth file of a sequence.
+    """
+    columns = _load(path)
+    if "time_s" not in columns:
+        raise SceneError(f"{path} holds no sequence; read it with load_truth")
+    time_s = columns.pop("time_s")
+    frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
+    return [_truth(frame, path) for frame in frames], time_s
+
+
+def _load(path: str | Path) -> dict[str, Any]:
     try:
         with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in file.files}
-        return Truth(**{**columns, "mirrored": bool(columns["mirrored"]), "H": columns.get("H")})
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+            return {name: file[name] for name in file.files}
+    except (OSError, ValueError, TypeError, AttributeError, EOFError) as error:
+        raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error
+
+
+def _truth(columns: dict[str, Any], path: str | Path) -> Truth:
+    try:
+        mirrored = columns["mirrored"] if columns["mirrored"].ndim else bool(columns["mirrored"])
+        return Truth(**{**columns, "mirrored": mirrored, "H": columns.get("H")})
+    except (KeyError, TypeError) as error:
         raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error

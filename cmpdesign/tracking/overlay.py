@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.video import CODECS, Video
 
 if TYPE_CHECKING:
     from extractor.displacement import Rest
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 Picture = NDArray[np.uint8]
 
-CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}  # FFV1 is lossless
 EMPTY_SIZE = (640, 480)  # of the video when its first frame has no image
 ARROW_BGR = (255, 200, 0)
 WHITE_BGR = (255, 255, 255)
@@ -35,50 +35,18 @@ class Overlay:
     def __init__(self, path: Path, reference: Reference, fps: float) -> None:
         if path.suffix not in CODECS:
             raise CmpDesignError(f"--overlay {path}: unknown ending; expected one of {', '.join(CODECS)}")
-        self._path, self._part = path, path.with_name(f"{path.stem}.part{path.suffix}")
-        self._reference, self._fps = reference, fps
-        self._writer: Any = None
-        self._size = EMPTY_SIZE
-        self._frames = 0
+        self._video = Video(path, fps)
+        self._reference = reference
+        self._size: tuple[int, int] | None = None
 
     def add(self, image: NDArray[Any] | None, frame: Tracked, rest: Rest | None) -> None:
-        picture = draw_frame(image, self._reference, frame, rest, self._size)
-        if self._writer is None:
-            self._open(picture)
-        self._writer.write(_fitted(picture, self._size))
-        self._frames += 1
-
-    def _open(self, picture: Picture) -> None:
-        import cv2
-
-        self._size = (picture.shape[1], picture.shape[0])
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
-        codec = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix])
-        self._writer = cv2.VideoWriter(str(self._part), codec, self._fps, self._size)
-        if not self._writer.isOpened():
-            raise OutputError(f"{self._path}: cannot be written as a video")
+        picture = draw_frame(image, self._reference, frame, rest, self._size or EMPTY_SIZE)
+        if self._size is None:
+            self._size = (picture.shape[1], picture.shape[0])
+        self._video.add(_fitted(picture, self._size))
 
     def close(self) -> None:
-        """Complete the video and look whether it can be read: OpenCV reports no full disk."""
-        import cv2
-
-        if self._writer is None:
-            return
-        self._writer.release()
-        written = cv2.VideoCapture(str(self._part))
-        frames = int(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
-        written.release()
-        if frames < self._frames:
-            raise OutputError(
-                f"{self._path}: holds {frames} of {self._frames} frames; is the disk full? It is kept as {self._part}"
-            )
-        try:
-            self._part.replace(self._path)
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        self._video.close()
 
 
 def draw_frame(

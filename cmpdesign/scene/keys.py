@@ -1,0 +1,72 @@
+"""Values that change over a sequence: piecewise linear between key frames, written into a document by their path."""
+
+from __future__ import annotations
+
+import copy
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cmpdesign.scene.errors import SceneError
+
+Keys = tuple[tuple[float, float | tuple[float, ...]], ...]
+
+
+def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Nested tables as one, with dotted paths: TOML reads contact.motion.press_mm = ... as tables in tables."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        path = f"{before}.{key}" if before else key
+        flat |= flattened(value, path) if isinstance(value, Mapping) else {path: value}
+    return flat
+
+
+def value_at(keys: Keys, time_s: float) -> float | list[float]:
+    """Between two keys straight, before the first and after the last one constant."""
+    times = [key[0] for key in keys]
+    rows = np.array([key[1] for key in keys], dtype=np.float64)
+    if rows.ndim == 1:
+        return float(np.interp(time_s, times, rows))
+    return [float(np.interp(time_s, times, column)) for column in rows.T]
+
+
+def with_values(document: Mapping[str, Any], values: Mapping[str, Keys], time_s: float) -> dict[str, Any]:
+    """The document with every path's value at a time.
+
+    Raises:
+        SceneError: a path leads to no table of the document.
+    """
+    changed = copy.deepcopy(dict(document))
+    for path, keys in values.items():
+        *tables, last = path.split(".")
+        target: Any = changed
+        for depth, name in enumerate(tables):
+            target = _inside(target, name, path, ".".join(tables[:depth]))
+        _put(target, last, value_at(keys, time_s), path)
+    return changed
+
+
+def _inside(target: Any, name: str, path: str, at: str) -> Any:
+    known = [str(i) for i in range(len(target))] if isinstance(target, list) else list(target)
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise SceneError(
+            f"[sequence] values.{path}: there is no {name}{' in ' + at if at else ''}{hint}; "
+            "give its starting value in the file"
+        )
+    found = target[int(name)] if isinstance(target, list) else target[name]
+    if not isinstance(found, dict | list):
+        raise SceneError(f"[sequence] values.{path}: {name} is a value, no table; leave out what follows it")
+    return found
+
+
+def _put(target: Any, name: str, value: float | list[float], path: str) -> None:
+    if isinstance(target, list):
+        if not (name.isdecimal() and int(name) < len(target)):
+            raise SceneError(f"[sequence] values.{path}: there is no {name}, it has 0 to {len(target) - 1}")
+        target[int(name)] = value
+    else:
+        target[name] = value

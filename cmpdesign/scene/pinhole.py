@@ -1,0 +1,252 @@
+"""A pinhole camera anywhere in space, with OpenCV's lens distortion; several of them share one image.
+
+    x_camera = R_camera_from_layout @ x_layout + t_camera_from_layout_mm
+
+in mm: the camera frame has x right, y down, z forward. One mirror between the view and the camera makes det R = -1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.errors import SceneError
+
+Points = NDArray[np.float64]
+Area = tuple[int, int, int, int]
+
+NEAREST_MM = 1e-3
+ORTHOGONAL = 1e-6
+
+
+def _half_turn() -> Points:
+    """Straight on from the front: x right, y down, z into the pattern."""
+    return np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Pinhole:
+    """A view of the pattern.
+
+    Attributes:
+        focal_px: fx, fy.
+        centre_px: the principal point cx, cy in the whole image's frame.
+        distortion: OpenCV's k1, k2, p1, p2, k3, on normalised coordinates.
+        R_camera_from_layout: (3, 3) float64, orthogonal; det -1 where a mirror stands between.
+        t_camera_from_layout_mm: (3,) float64.
+        area_px: x, y, width, height of the image's part that this view fills; None: all of it.
+        name: for messages.
+    """
+
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    R_camera_from_layout: Points = field(default_factory=_half_turn)
+    t_camera_from_layout_mm: Points = field(default_factory=lambda: np.array([0.0, 0.0, 50.0]))
+    area_px: Area | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        r = _frozen(self.R_camera_from_layout, (3, 3), "R_camera_from_layout")
+        t = _frozen(self.t_camera_from_layout_mm, (3,), "t_camera_from_layout_mm")
+        object.__setattr__(self, "R_camera_from_layout", r)
+        object.__setattr__(self, "t_camera_from_layout_mm", t)
+        if not min(self.focal_px) > 0:
+            raise SceneError(f"focal_px is {tuple(self.focal_px)}; both must be above 0 px")
+        if not np.isfinite([*self.focal_px, *self.centre_px, *self.distortion]).all():
+            raise SceneError("focal_px, centre_px and distortion must be finite numbers")
+        error = float(np.abs(r @ r.T - np.eye(3)).max())
+        if error > ORTHOGONAL:
+            raise SceneError(
+                f"R_camera_from_layout is no rotation or reflection: R R^T is off the unit matrix by {error:.3g}, "
+                f"at most {ORTHOGONAL:g} is allowed; give its numbers with more digits"
+            )
+        if self.area_px is not None and (min(self.area_px[:2]) < 0 or min(self.area_px[2:]) < 1):
+            raise SceneError(
+                f"area_px is {tuple(self.area_px)}; it is x, y (0 or more), width, height (1 or more) in px"
+            )
+
+    @property
+    def position_mm(self) -> Points:
+        """(3,) the camera's centre in the layout frame."""
+        return np.asarray(-self.R_camera_from_layout.T @ self.t_camera_from_layout_mm)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the pattern at rest is seen as from its back."""
+        front = self.position_mm[2] > 0
+        return bool(front == (np.linalg.det(self.R_camera_from_layout) < 0))
+
+    @property
+    def intrinsics(self) -> Points:
+        """(3, 3): normalised coordinates to px."""
+        (fx, fy), (cx, cy) = self.focal_px, self.centre_px
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def homography(self) -> Points | None:
+        """(3, 3) image from the layout's plane, H[2, 2] = 1; None where the lens distorts."""
+        if any(self.distortion):
+            return None
+        h = self.intrinsics @ np.column_stack(
+            [self.R_camera_from_layout[:, :2], self.t_camera_from_layout_mm]
+        )
+        if abs(h[2, 2]) < NEAREST_MM:
+            raise SceneError(
+                "the layout's origin lies beside the camera, not before it; move the camera away"
+            )
+        return np.asarray(h / h[2, 2])
+
+    @cached_property
+    def reach(self) -> float:
+        """The normalised radius where radial distortion turns back on itself; inf where it never does.
+
+        The distorted radius r (1 + k1 r^2 + k2 r^4 + k3 r^6) must grow with r.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        inverse_squares = np.roots(
+            [1.0, 3 * k1, 5 * k2, 7 * k3]
+        )  # in 1 / r^2, so that weak ones do not overflow
+        real = inverse_squares.real[np.abs(inverse_squares.imag) <= 1e-9 * np.abs(inverse_squares)]
+        largest = float(real.max(initial=0.0))
+        return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
+
+    def reflected(self, point_mm: Sequence[float], normal: Sequence[float]) -> Pinhole:
+        """This camera as it sees the pattern in a plane mirror through a point; the normal has any length."""
+        point, n = np.asarray(point_mm, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+        n = n / np.linalg.norm(n)
+        r, t = self.R_camera_from_layout, self.t_camera_from_layout_mm
+        return replace(
+            self,
+            R_camera_from_layout=r @ (np.eye(3) - 2 * np.outer(n, n)),
+            t_camera_from_layout_mm=t + 2 * (point @ n) * (r @ n),
+        )
+
+    @classmethod
+    def looking(
+        cls,
+        size: tuple[int, int],
+        *,
+        distance_mm: float,
+        field_of_view_deg: float,
+        tilt_deg: float = 0.0,
+        azimuth_deg: float = 0.0,
+        roll_deg: float = 0.0,
+        target_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        back: bool = False,
+        mirror: bool = False,
+        distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0),
+        area_px: Area | None = None,
+        name: str = "",
+    ) -> Pinhole:
+        """A camera that looks at a point, which it sees in its area's middle.
+
+        Args:
+            size: the image's (width, height) px.
+            distance_mm: from the camera's centre to the target.
+            field_of_view_deg: across the area's width, without distortion.
+            tilt_deg: between the pattern's normal and the optical axis, -85 to 85.
+            azimuth_deg: to where the camera is tilted, counter-clockwise from the layout's x axis.
+            roll_deg: turn of the pattern in the image, counter-clockwise as seen; at 0 the layout's y points up.
+            target_mm: what it looks at, in the layout frame.
+            back: it stands behind the pattern, at negative z.
+            mirror: its picture is flipped left to right, as by a mirror before it.
+            distortion, area_px, name: as in ``Pinhole``.
+
+        Raises:
+            SceneError: a value is out of range.
+        """
+        if not distance_mm > NEAREST_MM:
+            raise SceneError(f"distance_mm is {distance_mm:g}; it must be above {NEAREST_MM:g} mm")
+        if not 0 < field_of_view_deg < 180:
+            raise SceneError(
+                f"field_of_view_deg is {field_of_view_deg:g}; it must lie between 0 and 180 degrees"
+            )
+        if not abs(tilt_deg) <= 85:
+            raise SceneError(f"tilt_deg is {tilt_deg:g}; it must lie between -85 and 85 degrees")
+        x, y, width, height = area_px or (0, 0, *size)
+        focal = float(0.5 * width / np.tan(np.radians(field_of_view_deg) / 2))
+        r = _looking_rotation(tilt_deg, azimuth_deg, roll_deg, back)
+        t = np.array([0.0, 0.0, distance_mm]) - r @ np.asarray(target_mm, dtype=np.float64)
+        if mirror:
+            flip = np.diag([-1.0, 1.0, 1.0])
+            r, t = flip @ r, flip @ t
+        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
+        return cls((focal, focal), centre, distortion, r, t, area_px, name)
+
+
+def _looking_rotation(tilt_deg: float, azimuth_deg: float, roll_deg: float, back: bool) -> Points:
+    tilt, azimuth, roll = np.radians([tilt_deg, azimuth_deg, roll_deg])
+    side = -1.0 if back else 1.0
+    towards = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), side * np.cos(tilt)])
+    forward = -towards
+    right = np.cross(forward, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    upright = np.stack([right, np.cross(forward, right), forward])
+    cos, sin = np.cos(roll), np.sin(roll)
+    # The image's y points down: a turn that looks counter-clockwise is clockwise in its numbers.
+    return np.asarray(np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ upright)
+
+
+def _frozen(value: object, shape: tuple[int, ...], name: str) -> Points:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise SceneError(f"{name} has the shape {array.shape}; it must hold finite numbers of shape {shape}")
+    array.setflags(write=False)
+    return array
+
+
+def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
+    """Points (N, 3) mm of the layout frame to (N, 2) px of the whole image.
+
+    Raises:
+        SceneError: a point lies behind the camera, or so far aside that the distortion is not defined there.
+    """
+    at = xyz_mm @ camera.R_camera_from_layout.T + camera.t_camera_from_layout_mm
+    depth = at[:, 2]
+    if not np.all(depth > NEAREST_MM):
+        if not np.isfinite(depth).all():
+            raise SceneError(f"{_who(camera)}the surface is not finite everywhere; mend the map")
+        worst = int(np.argmin(depth))
+        place = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
+        raise SceneError(
+            f"{_who(camera)}a part of the pattern lies behind the camera: ({place}) mm has a depth of "
+            f"{depth[worst]:.3g} mm, it must be above 0 mm; move the camera away or tilt it less"
+        )
+    xy = at[:, :2] / depth[:, None]
+    if any(camera.distortion):
+        xy = distorted(camera, xy)
+    return np.asarray(xy * np.asarray(camera.focal_px) + np.asarray(camera.centre_px))
+
+
+def depth_mm(camera: Pinhole, xyz_mm: Points) -> Points:
+    """(N,) how far before the camera, along its axis, points (N, 3) mm of the layout frame lie."""
+    return np.asarray(xyz_mm @ camera.R_camera_from_layout[2] + camera.t_camera_from_layout_mm[2])
+
+
+def distorted(camera: Pinhole, xy: Points) -> Points:
+    """Normalised coordinates (N, 2) after the lens (OpenCV's model with k1, k2, p1, p2, k3).
+
+    Raises:
+        SceneError: a point lies where the radial distortion turns back on itself.
+    """
+    k1, k2, p1, p2, k3 = camera.distortion
+    x, y = xy[:, 0], xy[:, 1]
+    r2 = x * x + y * y
+    if r2.max(initial=0.0) >= camera.reach**2:
+        raise SceneError(
+            f"{_who(camera)}the pattern reaches {np.sqrt(r2.max()):.3g} focal lengths from the optical axis, but the "
+            f"distortion turns back on itself at {camera.reach:.3g}; take a weaker distortion or move the camera away"
+        )
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return np.stack([u, v], axis=-1)
+
+
+def _who(camera: Pinhole) -> str:
+    return f"view {camera.name}: " if camera.name else ""
