@@ -307,3 +307,23 @@ def test_a_square_pattern_is_reconstructed_too() -> None:
     shape = Reconstructor(layout, unplaced(views), rest).reconstruct(now)
     assert np.sqrt(np.mean(normalised(shape.xyz_mm - true, shape.cov_mm2))) < 1.3
     assert np.isfinite(shape.virtual_xyz_mm).all() and (shape.normals[:, 2] > 0.5).all()
+
+
+def test_small_misses_beyond_the_noise_widen_the_covariance() -> None:
+    """Under a sharp contact, errors of hundredths of a pixel come atop the noise: no wrong id makes so little."""
+    views, sigma = pair(), 0.002
+    seen = frame(19, sigma_px=sigma)
+    xy, cov = rows([noisy(LAYOUT, view, TRUE, np.random.default_rng(19), sigma) for view in views])
+    xy[1, 7] += (0.0, 0.05)
+    points = triangulate(views, xy, cov)
+    assert points.reason[7] == PointReason.NONE and points.misfit[7] > 6
+    assert points.cov_mm2[7, 1, 1] > 20 * np.median(points.cov_mm2[:, 1, 1])
+    assert triangulate(views, xy, cov, tolerance_px=0.01).reason[7] == PointReason.DISAGREE
+    rebuilt, rng = reconstructor(model_px=0.0), np.random.default_rng(20)
+    near = np.linalg.norm(LAYOUT.xy_mm - (3.0, 0.0), axis=1) < 4.0
+    bent = [replace(m, xy_px=m.xy_px + near[:, None] * rng.normal(0, 0.012, m.xy_px.shape)) for m in seen]
+    calm, rough = rebuilt.reconstruct(seen), rebuilt.reconstruct(bent)
+    growth = rough.cov_mm2[:, 2, 2] / calm.cov_mm2[:, 2, 2]
+    assert np.median(growth[near]) > 3 and np.median(growth[LAYOUT.xy_mm[:, 0] < -5]) == pytest.approx(1)
+    assert (rough.reason == PointReason.NONE).all()
+    assert np.sqrt(np.mean(normalised(rough.xyz_mm - TRUE, rough.cov_mm2)[near])) < 1.5
