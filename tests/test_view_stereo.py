@@ -326,4 +326,5 @@ def test_small_misses_beyond_the_noise_widen_the_covariance() -> None:
     growth = rough.cov_mm2[:, 2, 2] / calm.cov_mm2[:, 2, 2]
     assert np.median(growth[near]) > 3 and np.median(growth[LAYOUT.xy_mm[:, 0] < -5]) == pytest.approx(1)
     assert (rough.reason == PointReason.NONE).all()
-    assert np.sqrt(np.mean(normalised(rough.xyz_mm - TRUE, rough.cov_mm2)[near])) < 1.5
+    units = [np.sqrt(np.mean(normalised(rough.xyz_mm - TRUE, shape.cov_mm2)[near])) for shape in (rough, calm)]
+    assert units[0] < 1.8 and units[1] > 2.2
