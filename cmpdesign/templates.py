@@ -26,13 +26,30 @@ def templates() -> dict[str, Path]:
     return {path.stem: path for path in sorted(templates_folder().glob("*.toml"))}
 
 
+def scene_templates() -> dict[str, Path]:
+    """Every scene template by name, in alphabetical order."""
+    return {path.stem: path for path in sorted((templates_folder() / "scenes").glob("*.toml"))}
+
+
 def find_design(name_or_path: str | Path) -> Path:
     """The TOML file of a template's name or of a path.
 
     Raises:
         DesignError: neither a template nor a file.
     """
-    known = templates()
+    return _found(name_or_path, templates())
+
+
+def find_scene(name_or_path: str | Path) -> Path:
+    """The TOML file of a scene template's name or of a path.
+
+    Raises:
+        DesignError: neither a template nor a file.
+    """
+    return _found(name_or_path, scene_templates())
+
+
+def _found(name_or_path: str | Path, known: dict[str, Path]) -> Path:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     path = Path(name_or_path)

@@ -47,7 +47,7 @@ def render(
     ],
     scene: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Scene TOML: cameras, contact, light, damage, sequence."),
+        typer.Option(metavar="FILE", help="Scene TOML, or the name of a scene template."),
     ] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")

@@ -32,8 +32,9 @@ def render_file(
     """
     from cmpdesign.reading import read_layout
     from cmpdesign.scene.file import load_scene
+    from cmpdesign.templates import find_scene
 
-    file = load_scene(scene, read_layout(layout), size_px=size, seed=seed)
+    file = load_scene(find_scene(scene), read_layout(layout), size_px=size, seed=seed)
     if file.fps is None:
         _draw_one(file, output, truth)
     else:

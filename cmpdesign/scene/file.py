@@ -95,7 +95,7 @@ class SceneFile:
         from cmpdesign.scene.pressing import contacts
 
         tables = [self._tables(frame).contact or {} for frame in range(self.frames)]
-        yield from contacts(tables, list(self.values))
+        yield from contacts(tables, list(self.values), self.path.parent)
 
     def _tables(self, frame: int) -> SceneTables:
         return read_tables(with_values(self.document, self.values, self.time_s(frame)))
@@ -147,7 +147,7 @@ def _check(tables: SceneTables, file: SceneFile) -> None:
     if tables.contact is not None:
         from cmpdesign.scene.pressing import check_contact
 
-        check_contact(tables.contact)
+        check_contact(tables.contact, file.path.parent)
 
 
 def _document(path: Path) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.scene.errors import SceneError
@@ -13,13 +14,14 @@ if TYPE_CHECKING:
 MOTION = "contact.motion."
 
 
-def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str]) -> Iterator[Contact]:
+def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str], folder: Path) -> Iterator[Contact]:
     """The contact of every frame.
 
     Args:
         tables: [contact] in every frame.
         changing: dotted paths of what changes from frame to frame. If it is the motion alone, every frame goes on from
             the one before, so that friction knows the way; if it is anything else, every frame starts from rest.
+        folder: where a height map is looked for.
 
     Raises:
         SceneError: a name or a value that is not allowed, or a contact that cannot be solved.
@@ -28,10 +30,10 @@ def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str]) -> It
 
     try:
         if not any(path.startswith("contact.") for path in changing):
-            found = contact_from(tables[0]).solve()
+            found = contact_from(tables[0], folder).solve()
             yield from (found for _ in tables)
         elif all(path.startswith(MOTION) for path in changing if path.startswith("contact.")):
-            setups = [contact_from(table) for table in tables]
+            setups = [contact_from(table, folder) for table in tables]
             first = setups[0]
             yield from solve_path(
                 first.elastomer,
@@ -42,12 +44,12 @@ def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str]) -> It
                 grid=first.grid,
             )
         else:
-            yield from (contact_from(table).solve() for table in tables)
+            yield from (contact_from(table, folder).solve() for table in tables)
     except ContactError as error:
-        raise SceneError(f"[contact] {str(error).removeprefix('[contact] ')}") from None
+        raise SceneError(_told(error)) from None
 
 
-def check_contact(table: Mapping[str, Any]) -> None:
+def check_contact(table: Mapping[str, Any], folder: Path) -> None:
     """Read [contact] without solving it.
 
     Raises:
@@ -56,6 +58,11 @@ def check_contact(table: Mapping[str, Any]) -> None:
     from cmpdesign.contact import ContactError, contact_from
 
     try:
-        contact_from(table)
+        contact_from(table, folder)
     except ContactError as error:
-        raise SceneError(f"[contact] {str(error).removeprefix('[contact] ')}") from None
+        raise SceneError(_told(error)) from None
+
+
+def _told(error: Exception) -> str:
+    text = str(error)
+    return text if text.startswith("contact") else f"[contact] {text}"
