@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from view_scenes import HALF, SMALL, Array, binocular, binocular_shot, contact, reference, rig_of
 
+from cmpdesign.build import build_layout
+from cmpdesign.design import load_design
+from cmpdesign.scene import load_scene, render
+from cmpdesign.writers.layout_file import layout_to_json
 from extractor import (
     FrameStatus,
     ImageError,
@@ -19,6 +24,8 @@ from extractor import (
     View,
     ViewExtractor,
     VirtualStatus,
+    load_rig,
+    parse_layout,
 )
 
 LAYOUT = reference(layers=SMALL)
@@ -130,3 +137,26 @@ def test_images_that_do_not_fit_the_rig(plain: tuple[ViewExtractor, Reconstructo
         plain[0].extract(image)
     with pytest.raises(ImageError, match="3 images; give one for all views, or one for each of 2"):
         plain[0].extract([image] * 3)
+    with pytest.raises(ImageError, match="view 'right': the image is NoneType"):
+        plain[0].extract([np.zeros((360, 480, 3), np.uint8), None])  # type: ignore[list-item]
+
+
+def test_a_scene_file_is_a_rig_file() -> None:
+    """The virtual binocular of the templates: each view by one mirror, its pose given, or found in the rest frame."""
+    path = Path(__file__).parent.parent / "templates" / "scenes" / "tac3d-binocular.toml"
+    layout = build_layout(load_design("tac3d"))
+    found, rig = load_scene(path, layout), load_rig(path)
+    scene = found.scene()
+    rest = render(replace(scene, surface=None), size=found.size_px)
+    pressed = render(scene, size=found.size_px)
+    views = ViewExtractor(parse_layout(layout_to_json(layout)), rig)
+    seen = views.extract(rest.image), views.extract(pressed.image)
+    given, placed = (Reconstructor(views.layout, r, seen[0]) for r in (rig, rig.without_poses()))
+    for view, true in zip(placed.poses.views, rig.views, strict=True):
+        assert true.placed and view.mirrored and not rig.without_poses().views[0].placed
+        np.testing.assert_allclose(view.R_camera_from_layout, true.R_camera_from_layout, atol=2e-3)
+    for reconstructor in (given, placed):
+        shape = reconstructor.reconstruct(seen[1])
+        assert (shape.status != Status.LOST).mean() > 0.98
+        assert np.sqrt(np.nanmean((shape.xyz_mm - pressed.truth.marker_xyz_mm) ** 2)) < 0.003
+        assert np.nanmin(shape.displacement_mm[:, 2]) == pytest.approx(-0.8, abs=0.03)

@@ -114,9 +114,7 @@ def rest_markers(text: str, source: str, reference: Reference, fps: float | None
     markers = Extractor(reference).extract(rest_image(text, source, fps))
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
-        raise CmpDesignError(
-            f"at rest: no pattern is found in {name} ({markers.reason}); choose another"
-        )
+        raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
     return markers
 
 
@@ -136,7 +134,9 @@ def rest_image(text: str, source: str, fps: float | None) -> Any:
 def _frame_at(number: int, text: str, fps: float | None) -> Any:
     source = open_source(text, fps)
     if source.name.startswith("camera"):
-        raise CmpDesignError(f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file")
+        raise CmpDesignError(
+            f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file"
+        )
     for index, frame in enumerate(source.frames()):
         if index == number:
             return frame.image
