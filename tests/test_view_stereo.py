@@ -326,5 +326,24 @@ def test_small_misses_beyond_the_noise_widen_the_covariance() -> None:
     growth = rough.cov_mm2[:, 2, 2] / calm.cov_mm2[:, 2, 2]
     assert np.median(growth[near]) > 3 and np.median(growth[LAYOUT.xy_mm[:, 0] < -5]) == pytest.approx(1)
     assert (rough.reason == PointReason.NONE).all()
-    units = [np.sqrt(np.mean(normalised(rough.xyz_mm - TRUE, shape.cov_mm2)[near])) for shape in (rough, calm)]
+    units = [
+        np.sqrt(np.mean(normalised(rough.xyz_mm - TRUE, shape.cov_mm2)[near])) for shape in (rough, calm)
+    ]
     assert units[0] < 1.8 and units[1] > 2.2
+
+
+def test_errors_of_the_poses_are_counted_once() -> None:
+    """A rest frame 25 times as noisy as the others: rays miss each other by the poses' errors, which are allowed."""
+    views, rng, misfits, squares = pair(), np.random.default_rng(21), [], []
+    for _ in range(20):
+        rest = [noisy(LAYOUT, view, flat(LAYOUT), rng, 0.05) for view in views]
+        coarse = Reconstructor(LAYOUT, unplaced(views), rest, model_px=0.0)
+        shape = coarse.reconstruct([noisy(LAYOUT, view, TRUE, rng, 0.002) for view in views])
+        assert not shape.reason.any()
+        misfits.append(shape.misfit**2)
+        squares.append(normalised(shape.xyz_mm - TRUE, shape.cov_mm2))
+    assert 0.7 < np.sqrt(np.mean(misfits)) < 1.3 and 0.7 < np.sqrt(np.mean(squares)) < 1.3
+    again = coarse.reconstruct(rest)
+    noise = triangulate(coarse.poses.views, *rows(rest)).cov_mm2
+    np.testing.assert_allclose(again.displacement_cov_mm2, 2 * noise, rtol=1e-6)
+    assert (again.cov_mm2[:, 2, 2] > noise[:, 2, 2]).all() and not again.displacement_mm.any()
