@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera import Array, View, finite
+from .camera import Array, View, finite, is_covariance
 
 ITERATIONS = 12
 CONVERGED = 1e-5  # of a standard deviation
@@ -22,6 +22,7 @@ GATE_SIGMAS = 6.0
 TOLERANCE_PX = (
     0.1  # gridlines that bend more than extraction can follow err by so much beyond their covariance
 )
+SINGULAR = 1e-13  # smallest eigenvalue of information with a unit diagonal, below which it has no inverse
 DOUBT_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
 SOUND = 1e-14  # half the squared angle between two rays, below which they are one
 
@@ -78,7 +79,7 @@ def triangulate(
         gate_sigmas: misfit above which a point is ``DISAGREE``,
         tolerance_px: if its residuals' norm over all views also is above this.
     """
-    seen = finite(xy_px) & finite(cov_px2, 2)
+    seen = finite(xy_px) & is_covariance(cov_px2)
     reason = np.where(seen.sum(axis=0) == 1, PointReason.ONE_VIEW, PointReason.NONE).astype(np.uint8)
     reason[~seen.any(axis=0)] = PointReason.UNSEEN
     start, ray = _nearest_to_rays(views, xy_px, seen)
@@ -159,7 +160,8 @@ def _solve(
             break
     design = np.swapaxes(by_point, 2, 3) @ weight
     out.xyz_mm[use], out.cov_mm2[use] = xyz, _inverse((design @ by_point).sum(axis=0))
-    toward = -out.cov_mm2[use] @ (design @ by_pose)
+    bounded = np.where(np.isfinite(out.cov_mm2[use]), out.cov_mm2[use], 0.0)  # what is not is refused below
+    toward = -bounded @ (design @ by_pose)
     out.by_pose[use] = np.moveaxis(toward, 0, 2).reshape(len(use), 3, -1)
     out.misfit[use] = _misfit(away, by_point, by_pose, weight, seen, out.by_pose[use], cov_pose)
     return np.asarray(np.sqrt((away**2).sum(axis=(0, 2))))
@@ -191,11 +193,15 @@ def _solved(normal: Array, gradient: Array) -> Array:
 
 
 def _inverse(normal: Array) -> Array:
-    """Inverses of 3 x 3 matrices; infinite variances where singular."""
-    sound = finite(normal, 2)
-    sound[sound] = np.linalg.eigvalsh(normal[sound])[:, 0] > 1e-300
+    """Inverses of 3 x 3 matrices, in their own scale; infinite variances where singular."""
     out = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
-    out[sound] = np.linalg.inv(normal[sound])
+    scale = np.diagonal(normal, axis1=1, axis2=2)
+    sound = finite(normal, 2) & (scale > 0).all(axis=1)
+    root = np.sqrt(scale[sound])
+    root = root[:, :, None] * root[:, None, :]
+    even = normal[sound] / root
+    good = np.linalg.eigvalsh(even)[:, 0] > SINGULAR
+    out[np.flatnonzero(sound)[good]] = np.linalg.inv(even[good]) / root[good]
     return out
 
 

@@ -347,3 +347,52 @@ def test_errors_of_the_poses_are_counted_once() -> None:
     noise = triangulate(coarse.poses.views, *rows(rest)).cov_mm2
     np.testing.assert_allclose(again.displacement_cov_mm2, 2 * noise, rtol=1e-6)
     assert (again.cov_mm2[:, 2, 2] > noise[:, 2, 2]).all() and not again.displacement_mm.any()
+
+
+def damaged(markers: Markers, rng: np.random.Generator) -> Markers:
+    """Anything but markers: places from anywhere, lost ones, covariances of any size, zero or unknown."""
+    xy, cov, count = markers.xy_px.copy(), markers.cov_px2.copy(), len(markers.xy_px)
+
+    def some(*shares: float) -> np.ndarray:
+        return rng.random(count) < rng.choice(shares)
+
+    wild = some(0, 0.1, 0.9)
+    xy[wild] = rng.uniform(-3000, 3000, (wild.sum(), 2))
+    xy[some(0, 0, 0.1, 0.95)] = np.nan
+    xy[some(0, 0, 0.05)] *= 1e9
+    cov[some(0, 0.3)] *= 10 ** rng.uniform(-8, 8)
+    cov[some(0, 0.1)] = 0
+    cov[some(0, 0.1)] = np.nan
+    return replace(markers, xy_px=xy, cov_px2=cov)
+
+
+def test_whatever_the_views_say_there_is_a_shape_or_a_reason() -> None:
+    rng, strict = np.random.default_rng(22), reconstructor()
+    lax = reconstructor(gate_sigmas=np.inf, max_sigma_mm=np.inf)
+    for seed in range(30):
+        seen = [damaged(markers, rng) for markers in frame(seed)]
+        for rebuilt in (strict, lax):
+            shape = rebuilt.reconstruct(seen)
+            known = np.isfinite(shape.xyz_mm).all(axis=1)
+            np.testing.assert_array_equal(known, shape.reason == PointReason.NONE)
+            np.testing.assert_array_equal(known, shape.status != Status.LOST)
+            assert (np.linalg.eigvalsh(shape.cov_mm2[known]) > 0).all()
+
+
+def test_a_rest_frame_that_is_none_is_refused() -> None:
+    views, rng = pair(mirrored=(True, False)), np.random.default_rng(23)
+    refused = 0
+    for k in range(10):
+        rest = [noisy(LAYOUT, view, flat(LAYOUT), rng) for view in views]
+        some = rng.random(len(TRUE)) < 0.4
+        rest = [damaged(markers, rng) if k % 2 else lost(markers, some) for markers in rest]
+        for flatness_mm in (0.0, 0.1):
+            try:
+                found = Reconstructor(LAYOUT, unplaced(views), rest, flatness_mm=flatness_mm)
+            except PoseError as error:
+                refused += 1
+                assert "\n" not in str(error)
+                continue
+            for view, true in zip(found.poses.views, views, strict=True):
+                np.testing.assert_allclose(view.R_camera_from_layout, true.R_camera_from_layout, atol=0.2)
+    assert 4 <= refused <= 10
