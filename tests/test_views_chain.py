@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -160,3 +163,18 @@ def test_a_scene_file_is_a_rig_file() -> None:
         assert (shape.status != Status.LOST).mean() > 0.98
         assert np.sqrt(np.nanmean((shape.xyz_mm - pressed.truth.marker_xyz_mm) ** 2)) < 0.003
         assert np.nanmin(shape.displacement_mm[:, 2]) == pytest.approx(-0.8, abs=0.03)
+
+
+@pytest.mark.slow
+def test_the_benchmark_runs_and_its_figures_hold(tmp_path: Path) -> None:
+    out = tmp_path / "figures.json"
+    command = [sys.executable, "-m", "benchmarks.reconstruction", "--quick", "--json", str(out)]
+    root = Path(__file__).parent.parent
+    run = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600, check=False)
+    assert run.returncode == 0, run.stderr
+    results = json.loads(out.read_text(encoding="utf-8"))["results"]
+    assert len({(r["sensor"], r["state"]) for r in results}) == 16
+    for r in results:
+        assert r["reported_share"] > 0.99 and max(r["error_um"]) < 8
+        if r["state"] in ("at rest", "ball 20 mm: press 0.5 mm"):
+            assert r["ratio_stated"] < 1.5 and r["ratio_image"] < 1.5 and 0.8 < r["normalised"] < 1.3
