@@ -21,7 +21,7 @@ from .rig import Rig
 from .triangulation import DOUBT_SIGMAS, GATE_SIGMAS, PointReason, Points, triangulate
 from .types import Markers, Status, VirtualStatus
 
-MAX_SIGMA_EDGES = 0.25  # standard deviation of a position, above which it is not reported
+MAX_SIGMA_EDGES = 0.1  # standard deviation of a position, above which it is not reported
 CROWD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
 MIN_REST = 3  # markers that must have a place at rest
 
@@ -94,7 +94,7 @@ class Reconstructor:
         model_px: what the camera model leaves open, as a standard deviation per axis that is added to the pixels'
             own; None: what the rest frame's rays miss each other by beyond their covariances.
         gate_sigmas: misfit above which a marker is not reported.
-        max_sigma_mm: standard deviation of a position above which it is not reported; None: a quarter of an edge.
+        max_sigma_mm: standard deviation of a position above which it is not reported; None: a tenth of an edge.
 
     Attributes:
         poses: the views in their places, see ``Poses``.

@@ -34,7 +34,7 @@ class PointReason(IntEnum):
     UNSEEN = 1  # no view shows it
     ONE_VIEW = 2  # one view alone does: it lies somewhere on a ray
     NO_RAY = 3  # a pixel where the lens' distortion has no inverse
-    PARALLEL = 4  # the rays are too nearly parallel to tell its depth
+    PARALLEL = 4  # rays too nearly parallel, or pixels too uncertain, to tell its depth
     DISAGREE = 5  # the rays miss each other by more than their covariances allow
     SURROUNDINGS = 6  # a virtual marker, and an end of its edge is lost
 
