@@ -34,7 +34,7 @@ from .stepping import (
     votes,
     widening,
 )
-from .synthesis import A, B, clear, draw_cells, edge_contrasts, read_gridlines
+from .synthesis import AA, A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
@@ -189,14 +189,15 @@ class Refiner:
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0, None)
         across = self._across(view, fit)
         fit = fit._replace(sigma=self._blur(view, fit, across))
-        return self._profile_step(view, fit, across, self._steps.profiles[0])[0], across
+        fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
+        return fit, across
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
         stations = steps.profiles[1] if sharp else FEW_STATIONS
-        fit, trusted = self._profile_step(view, fit, across, stations)
+        fit, trusted = self._profile_step(view, fit, across, stations, judged=sharp)
         if sharp:
             return self._refined(view, fit, *self._sure(fit, places), trusted)
         start = fit
@@ -225,13 +226,18 @@ class Refiner:
         return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
 
     def _profile_step(
-        self, view: Sight, fit: Fit, across: Across, stations: int
+        self, view: Sight, fit: Fit, across: Across, stations: int, *, judged: bool
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
+        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should.
+
+        Gridlines are ``judged`` only where they are already close: farther off, the best of them look wrong.
+        """
         mesh = self._mesh
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
-        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
+        use = (sums[:, AA] > 0).astype(np.float64)
+        if judged:
+            use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
         given = sums, sums[:, A], sums[:, B], use
         shift, information = self._solve(*given, lines, across.contrasts, False, fit)
         foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
@@ -335,7 +341,7 @@ class Refiner:
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS)
+            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS, judged=True)
             profiled, wide = self._sure(start, places)
             use = lost & trusted
             xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]

@@ -18,6 +18,8 @@ ROOT = Path(__file__).parent.parent
     ("name", "keys"),
     [
         ("startup", {"conditions", "processes", "largest"}),
+        ("rendering", {"conditions", "errors", "speeds"}),
+        ("contact", {"conditions", "contacts", "closed_forms_percent"}),
         (
             "extraction",
             {"conditions", "standard", "large", "accuracy", "over_pixels", "over_markers", "growth"},
@@ -32,6 +34,8 @@ def test_a_quick_run_prints_and_writes(name: str, keys: set[str], tmp_path: Path
     assert "Python" in result.stdout and "…" not in result.stdout
     figures = json.loads(out.read_text(encoding="utf-8"))
     assert set(figures) == keys and figures["conditions"]["cpu"]
+    for error in figures.get("errors", []):
+        assert error["edge_rms_px"] < 3e-4 and error["edge_largest_px"] < 1e-3 and error["edges"] > 50
     for scene in figures.get("accuracy", []):
         assert scene["wrong"] == 0 and scene["measured_share"] > 0.99
         assert scene["rms_inner_px"] > 0.9 * scene["bound_inner_px"]

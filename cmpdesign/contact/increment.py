@@ -11,7 +11,6 @@ Only how far it has slid over the object since is followed, so that a sliding co
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,16 +29,24 @@ Mask = NDArray[np.bool_]
 Box = tuple[slice, slice]
 # The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
 TOLERANCE = 1e-4
+# With friction, whose limits have to be found as well, three tenths.
+TOLERANCE_RUBBING = 3e-4
+# Cells around what is near enough to touch.
+MARGIN = 3
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The surface (3, ny, nx) after some motion; ``settled_mm`` (2, ny, nx) is what pressing moved sideways."""
+    """The surface (3, ny, nx) after some motion.
+
+    ``settled_mm`` (2, ny, nx) is what pressing moved sideways, ``limit_mpa`` (ny, nx) how much friction there is.
+    """
 
     motion: Motion
     traction_mpa: Array
     displacement_mm: Array
     settled_mm: Array
+    limit_mpa: Array
     iterations: int = 0
     residual_mm: float = 0.0
 
@@ -58,11 +65,6 @@ class Problem:
     friction: float
     grid: Grid
     operators: dict[tuple[int, int], Operator] = field(default_factory=dict, repr=False)
-
-    @property
-    def sticks(self) -> bool:
-        """Whether friction is without limit."""
-        return math.isinf(self.friction)
 
     def height_mm(self, xy_mm: Array) -> Array:
         """Height of the object, as it first stood, over points (2, ny, nx)."""
@@ -83,30 +85,40 @@ class Problem:
         return self.operator((slice(0, rows), slice(0, columns)))(traction_mpa)
 
 
+def untouched(motion: Motion, shape: tuple[int, int]) -> State:
+    """The flat surface."""
+    nothing = np.zeros((3, *shape))
+    return State(motion, nothing, nothing, nothing[:2], nothing[0])
+
+
 def advance(problem: Problem, state: State, motion: Motion) -> State:
     """The state after one more increment. Starts with the cells that may touch, takes in what else would."""
     if motion.press_mm == 0:
-        nothing = np.zeros_like(state.traction_mpa)
-        return State(motion, nothing, nothing, nothing[:2])
+        return untouched(motion, problem.grid.shape)
     height = problem.height_mm(_ridden(problem, state, motion))
     near = height < 1.15 * motion.press_mm
     if not near.any():
-        nothing = np.zeros_like(state.traction_mpa)
-        return State(motion, nothing, nothing, state.settled_mm)
+        return untouched(motion, problem.grid.shape)
+    near |= state.in_contact
+    start = state.traction_mpa
     while True:
-        box = _box_around(near | state.in_contact)
-        found, height = _solved(problem, state, motion, box)
+        box = _box_around(near, problem.grid.shape)
+        found, height = _solved(problem, state, motion, box, start)
         through = found.displacement_mm[2] > height - motion.press_mm + 10 * TOLERANCE * motion.press_mm
         through[box] = False
         if not through.any():
             return found
         near |= through
+        start = found.traction_mpa
 
 
-def _box_around(cells: Mask) -> Box:
-    """The bounding box of some cells."""
+def _box_around(cells: Mask, shape: tuple[int, int]) -> Box:
+    """The bounding box of some cells, with a margin in which a contact can grow."""
     rows, columns = np.flatnonzero(cells.any(axis=1)), np.flatnonzero(cells.any(axis=0))
-    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    return (
+        slice(max(int(rows[0]) - MARGIN, 0), min(int(rows[-1]) + 1 + MARGIN, shape[0])),
+        slice(max(int(columns[0]) - MARGIN, 0), min(int(columns[-1]) + 1 + MARGIN, shape[1])),
+    )
 
 
 def _ridden(problem: Problem, state: State, motion: Motion) -> Array:
@@ -117,24 +129,27 @@ def _ridden(problem: Problem, state: State, motion: Motion) -> Array:
     return state.motion.brought_back(moved, problem.indenter.centre_mm)
 
 
-def _solved(problem: Problem, state: State, motion: Motion, box: Box) -> tuple[State, Array]:
+def _solved(
+    problem: Problem, state: State, motion: Motion, box: Box, start_mpa: Array
+) -> tuple[State, Array]:
     """The state with tractions in a box of cells, and the object's height over all cells."""
     grid, centre = problem.grid, problem.indenter.centre_mm
     height = problem.height_mm(_ridden(problem, state, motion))
-    traction, applied, left = _pressed(problem, state.traction_mpa, height, motion, box)
+    traction, applied, left = _pressed(problem, start_mpa, height, motion, box)
+    limit = np.zeros(grid.shape)
     pressing = motion.part(0, 1) == state.motion.part(0, 1)
     if problem.friction > 0:
         wanted = _wanted(grid, state, motion, centre)
         # Where the object slides its height over a point changes; it is looked up again with what has slid so far.
-        for last in (True,) if pressing else (False, True):
-            traction, more, left = _rubbed(problem, traction, height, wanted, motion, box)
-            applied += more
-            if not last:
+        for again in (False,) if pressing else (False, True):
+            if again:
                 moved = grid.xy_mm + problem.answer_mm(traction)[:2] - state.settled_mm
                 height = problem.height_mm(motion.brought_back(moved, centre))
+            traction, limit[box], more, left = _rubbed(problem, traction, height, wanted, motion, box)
+            applied += more
     displacement = problem.answer_mm(traction)
     settled = state.settled_mm + (displacement - state.displacement_mm)[:2] if pressing else state.settled_mm
-    found = State(motion, traction, displacement, settled, state.iterations + applied, left)
+    found = State(motion, traction, displacement, settled, limit, state.iterations + applied, left)
     return found, height
 
 
@@ -155,7 +170,7 @@ def _pressed(
     offset = operator(held)[2] if held.any() else 0.0
     touchable = np.isfinite(height[box])
     target = np.where(touchable, height[box], 0.0) - motion.press_mm - offset
-    z, applied, left = minimise(
+    z = minimise(
         operator.normal,
         target,
         Pressure(touchable),
@@ -165,25 +180,25 @@ def _pressed(
     )
     found = np.zeros_like(traction)
     found[inside] = held
-    found[(2, *box)] = z
-    return found, applied, left
+    found[(2, *box)] = z.traction_mpa
+    return found, z.applied, z.left_mm
 
 
 def _rubbed(
     problem: Problem, traction: Array, height: Array, wanted: Array, motion: Motion, box: Box
-) -> tuple[Array, int, float]:
-    """Tractions with friction up to the friction coefficient times the pressure so far."""
+) -> tuple[Array, Array, int, float]:
+    """Tractions with friction up to the friction coefficient times the pressure, and that limit in the box."""
     operator, inside = problem.operator(box), (..., *box)
     touchable = np.isfinite(height[box])
     target = np.concatenate([wanted[inside], (np.where(touchable, height[box], 0.0) - motion.press_mm)[None]])
-    t, applied, left = minimise(
+    t = minimise(
         operator,
         target,
         Friction.at(touchable, problem.friction, traction[(2, *box)]),
         traction[inside],
         largest=operator.largest,
-        tolerance_mm=TOLERANCE * motion.press_mm,
+        tolerance_mm=TOLERANCE_RUBBING * motion.press_mm,
     )
     found = np.zeros_like(traction)
-    found[inside] = t
-    return found, applied, left
+    found[inside] = t.traction_mpa
+    return found, t.allowed.limit_mpa, t.applied, t.left_mm

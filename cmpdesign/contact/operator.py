@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from cmpdesign.contact.green import Green
 
 Array = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
 
 
 class Operator:
@@ -33,30 +34,51 @@ class Operator:
         self._xy = spectrum(green.xy, True, True)
         self._xz = spectrum(green.xz, False, True)
         self._yz = spectrum(green.yz, True, False)
-        # Gershgorin's bounds on the eigenvalues, in mm/MPa: of all three directions, and of z alone.
-        xx, yy, zz, xy, xz, yz = map(abs, (self._xx, self._yy, self._zz, self._xy, self._xz, self._yz))
-        self.largest = float(max((xx + xy + xz).max(), (yy + xy + yz).max(), (zz + xz + yz).max()))
-        self.largest_normal = float(zz.max())
+        self._found = np.empty((3, *self._zz.shape), dtype=np.complex128)
+        self._part = np.empty(self._zz.shape, dtype=np.complex128)
+        self.largest = self._largest()
+        self.largest_normal = float(np.abs(self._zz).max())
+
+    def _largest(self) -> float:
+        """A bound on all eigenvalues in mm/MPa: of the plane's block, then of that with z."""
+        plane = (self._xx + self._yy) / 2 + np.hypot((self._xx - self._yy) / 2, self._xy)
+        both = (plane + self._zz) / 2 + np.hypot((plane - self._zz) / 2, np.hypot(self._xz, self._yz))
+        return float(both.max())
 
     def __call__(self, traction_mpa: Array) -> Array:
         """Displacement (3, rows, columns) in mm of the traction (3, rows, columns) in MPa."""
-        from scipy.fft import irfft2, rfft2
-
-        x, y, z = rfft2(traction_mpa, s=self.padded, workers=1)
-        found = np.empty((3, *x.shape), dtype=np.complex128)
-        found[0] = self._xx * x + self._xy * y + 1j * (self._xz * z)
-        found[1] = self._xy * x + self._yy * y + 1j * (self._yz * z)
-        found[2] = self._zz * z - 1j * (self._xz * x + self._yz * y)
-        rows, columns = self.shape
-        return np.asarray(irfft2(found, s=self.padded, workers=1)[:, :rows, :columns])
+        # The spectra of xz and yz are imaginary; with z turned by i, the equations are real and symmetric.
+        x, y, z = self._forward(traction_mpa)
+        z *= 1j
+        found, part = self._found, self._part
+        for axis, (from_x, from_y, from_z) in enumerate(
+            ((self._xx, self._xy, self._xz), (self._xy, self._yy, self._yz), (self._xz, self._yz, self._zz))
+        ):
+            np.multiply(from_x, x, out=found[axis])
+            found[axis] += np.multiply(from_y, y, out=part)
+            found[axis] += np.multiply(from_z, z, out=part)
+        found[2] *= -1j
+        return self._back(found)
 
     def normal(self, traction_z_mpa: Array) -> Array:
         """Displacement z (rows, columns) in mm of the traction z (rows, columns) in MPa alone."""
-        from scipy.fft import irfft2, rfft2
+        found: Array = self._back(self._forward(traction_z_mpa[None]) * self._zz)[0]
+        return found
 
-        spectrum = self._zz * rfft2(traction_z_mpa, s=self.padded, workers=1)
+    def _forward(self, values: Array) -> Spectrum:
+        """The padded spectrum; the padding's rows are not transformed along x, as they are empty."""
+        from scipy.fft import fft, rfft
+
+        along = rfft(values, n=self.padded[1], axis=2, workers=1)
+        return np.asarray(fft(along, n=self.padded[0], axis=1, workers=1, overwrite_x=True))
+
+    def _back(self, spectrum: Spectrum) -> Array:
+        """The box's part of the values."""
+        from scipy.fft import ifft, irfft
+
         rows, columns = self.shape
-        return np.asarray(irfft2(spectrum, s=self.padded, workers=1)[:rows, :columns])
+        along = ifft(spectrum, axis=1, workers=1, overwrite_x=True)[:, :rows]
+        return np.asarray(irfft(along, n=self.padded[1], axis=2, workers=1)[:, :, :columns])
 
 
 def _wrapped(kernel: Array, padded: tuple[int, ...], odd_y: bool, odd_x: bool) -> Array:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,10 @@ STEP = 1.9
 
 class Allowed(Protocol):
     """The set of tractions to choose from."""
+
+    @property
+    def limit_mpa(self) -> Array:
+        """The most shear in every cell."""
 
     def project(self, t: Array) -> Array:
         """The nearest allowed tractions."""
@@ -93,6 +97,11 @@ class Pressure:
 
     touchable: Mask
 
+    @property
+    def limit_mpa(self) -> Array:
+        """No shear."""
+        return np.zeros(self.touchable.shape)
+
     def project(self, t: Array) -> Array:
         """The nearest allowed tractions."""
         return np.where(self.touchable, np.minimum(t, 0.0), 0.0)
@@ -110,6 +119,18 @@ class Pressure:
         return 0.0
 
 
+class Minimum(NamedTuple):
+    """Tractions, what they were allowed at last, applications of C, and the gap that is left in mm (RMS).
+
+    The gap is above the tolerance only if the iteration did not converge.
+    """
+
+    traction_mpa: Array
+    allowed: Allowed
+    applied: int
+    left_mm: float
+
+
 def minimise(
     apply: Callable[[Array], Array],
     b: Array,
@@ -118,16 +139,13 @@ def minimise(
     *,
     largest: float,
     tolerance_mm: float,
-) -> tuple[Array, int, float]:
+) -> Minimum:
     """Tractions that leave no more than ``tolerance_mm`` of gap, as a root mean square over the loaded cells.
 
     Args:
         apply: the operator C; ``largest`` is at least its largest eigenvalue.
         b: the displacement that the object asks for, shaped as t.
         t: where to start.
-
-    Returns:
-        Tractions, applications of C, and the gap that is left (above the tolerance only if it did not converge).
     """
     step = STEP / largest
     t = allowed.project(t)
@@ -139,7 +157,7 @@ def minimise(
         left = float(np.sqrt(np.sum(to_go**2) / max(int(np.count_nonzero(free)), 1)))
         done = left <= tolerance_mm
         if applied >= MOST_ITERATIONS or (done and allowed.change(t) <= STEADY):
-            return t, applied, left
+            return Minimum(t, allowed, applied, left)
         if done or (ahead is None and applied - renewed >= RENEW_AFTER):
             allowed = allowed.renewed(t)
             t, renewed, ahead = allowed.project(t), applied, None

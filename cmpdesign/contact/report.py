@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.increment import TOLERANCE, Problem, State
+from cmpdesign.contact.increment import TOLERANCE, TOLERANCE_RUBBING, Problem, State
 from cmpdesign.contact.result import Contact
 from cmpdesign.contact.strain import LINEAR_UP_TO, largest_strain
 
@@ -22,8 +22,6 @@ def report(problem: Problem, state: State) -> Contact:
     grid, traction, moved = problem.grid, state.traction_mpa, state.displacement_mm
     strain = largest_strain(problem.elastomer, moved, traction, grid.step_mm)
     friction = np.hypot(traction[0], traction[1])
-    # Without limit, 0 * inf outside the contact would not be a number.
-    limit = np.full_like(friction, np.inf) if problem.sticks else problem.friction * -traction[2]
     fields = [np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (moved, traction)]
     found = Contact(
         x_mm=grid.x_mm,
@@ -31,7 +29,7 @@ def report(problem: Problem, state: State) -> Contact:
         displacement_mm=fields[0],
         traction_mpa=fields[1],
         in_contact=state.in_contact,
-        slipping=state.in_contact & (friction >= (1 - 1e-6) * limit),
+        slipping=state.in_contact & (friction >= (1 - 1e-9) * state.limit_mpa),
         force_n=traction.sum(axis=(1, 2)) * grid.step_mm**2,
         moment_nmm=_moment(problem, state),
         largest_strain=strain,
@@ -72,7 +70,7 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
             f"the grid's step of {step:.3g} mm is above the thickness of {thickness:.3g} mm; "
             f"take grid above {math.ceil(max(problem.grid.shape) * step / thickness)} or a smaller size_mm"
         )
-    allowed = TOLERANCE * state.motion.press_mm
+    allowed = (TOLERANCE_RUBBING if problem.friction > 0 else TOLERANCE) * state.motion.press_mm
     if state.residual_mm > allowed:
         yield (
             f"the solver left a gap of {state.residual_mm:.2g} mm, above {allowed:.2g} mm; "
@@ -92,10 +90,10 @@ def _grid_warnings(problem: Problem, touched: NDArray[np.bool_]) -> Iterator[str
             f"the contact covers {np.count_nonzero(touched)} cells of {step:.3g} mm, below {FEWEST_CELLS}; "
             "take a finer grid or a smaller size_mm"
         )
-    rim = np.concatenate([touched[0], touched[-1], touched[:, 0], touched[:, -1]])
-    if rim.any():
+    at_edge = np.count_nonzero(touched) - np.count_nonzero(touched[1:-1, 1:-1])
+    if at_edge:
         yield (
-            f"the contact reaches the edge of the solved area in {np.count_nonzero(rim)} cells: nothing is touched "
+            f"the contact reaches the edge of the solved area in {at_edge} cells: nothing is touched "
             "beyond it, though the layer goes on; take a larger size_mm or a smaller object"
         )
 

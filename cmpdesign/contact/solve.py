@@ -9,7 +9,7 @@ import numpy as np
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import ContactError, require
 from cmpdesign.contact.grid import make_grid
-from cmpdesign.contact.increment import Problem, State, advance
+from cmpdesign.contact.increment import Problem, State, advance, untouched
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects import Indenter
 from cmpdesign.contact.report import report
@@ -77,8 +77,7 @@ def _problem(
 
 
 def _states(problem: Problem, motions: Sequence[Motion]) -> Iterator[State]:
-    nothing = np.zeros((3, *problem.grid.shape))
-    state = State(Motion(0.0), nothing, nothing, nothing[:2])
+    state = untouched(Motion(0.0), problem.grid.shape)
     if not np.isfinite(problem.indenter.height_mm(*problem.grid.xy_mm)).any():
         x, y = problem.indenter.centre_mm
         raise ContactError(

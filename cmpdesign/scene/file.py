@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
+from cmpdesign.layout import COLORS, Layout
 from cmpdesign.scene.background import Background, Picture, Plain
 from cmpdesign.scene.camera import Camera
 from cmpdesign.scene.errors import SceneError
@@ -211,6 +211,8 @@ def _background(tables: SceneTables, path: Path) -> Background:
 
 
 def _rgb(value: tuple[float, float, float] | str, name: str) -> tuple[float, float, float]:
+    if name not in COLORS:
+        raise SceneError(f"[inks] {name} is unknown; the inks are {', '.join(COLORS)}")
     if not isinstance(value, str):
         return value
     digits = value.removeprefix("#")

@@ -169,7 +169,7 @@ class Pinhole:
         if not abs(tilt_deg) <= 85:
             raise SceneError(f"tilt_deg is {tilt_deg:g}; it must lie between -85 and 85 degrees")
         x, y, width, height = area_px or (0, 0, *size)
-        focal = 0.5 * width / np.tan(np.radians(field_of_view_deg) / 2)
+        focal = float(0.5 * width / np.tan(np.radians(field_of_view_deg) / 2))
         r = _looking_rotation(tilt_deg, azimuth_deg, roll_deg, back)
         t = np.array([0.0, 0.0, distance_mm]) - r @ np.asarray(target_mm, dtype=np.float64)
         if mirror:

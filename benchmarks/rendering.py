@@ -1,0 +1,154 @@
+"""Rendering: its time, and its own error against a reference that shares no step with it.
+
+    python -m benchmarks.rendering [--quick] [--json FILE]
+
+Scenes of 640x480 and 331 markers: flat, seen through a distorting lens, pressed by a ball (a solved contact, seen from
+the back), and that in the two halves of a virtual binocular. Blur 1 px and none, no noise.
+
+The reference (``benchmarks.scanlines``) shares no step with the renderer. It is poor where a side runs along its scan
+lines, so the patterns are turned by 30 degrees, the flat one by 7.3. The error in grey levels is that of a 16-bit
+image, in 8-bit steps. The error in px is how far the gridlines' middles have to move along their normals so that the
+reference fits the image best. One core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
+
+import cv2
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.machine import sentence, write_json
+from benchmarks.scanlines import Error, Window, error
+from cmpdesign.contact import Ball, Elastomer, Motion, solve
+from cmpdesign.scene import Pinhole, Scene, render, standard_layout, standard_scene
+
+SIZE = (640, 480)
+REPEATS, QUICK_REPEATS = 40, 5
+TURN_DEG = 30.0
+BARREL = (-0.2, 0.05, 0.001, -0.002, 0.0)
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Of one picture: median and 95th percentile of the wall clock, and median CPU time, in ms."""
+
+    name: str
+    p50_ms: float
+    p95_ms: float
+    cpu_ms: float
+
+
+def scenes(grid: int = 256) -> dict[str, Scene]:
+    """The pictures that are judged, by name; the flat one is the standard scene with 10 layers."""
+    layout = standard_layout(layers=10)
+    flat = standard_scene(layout)
+    contact = solve(Elastomer(3.0, 0.2), Ball(6.0), Motion(0.6, (0.4, 0.0), 8.0), size_mm=(24, 22), grid=grid)
+    back = Pinhole.looking(
+        SIZE, distance_mm=36, field_of_view_deg=42, tilt_deg=8, roll_deg=TURN_DEG, back=True
+    )
+    lens = Pinhole.looking(
+        SIZE, distance_mm=32, field_of_view_deg=48, tilt_deg=12, roll_deg=TURN_DEG, distortion=BARREL
+    )
+    halves = [
+        Pinhole.looking(
+            SIZE,
+            distance_mm=46,
+            field_of_view_deg=30,
+            tilt_deg=14,
+            azimuth_deg=azimuth,
+            roll_deg=TURN_DEG,
+            back=True,
+            mirror=True,
+            area_px=(x, 0, 320, 480),
+        )
+        for azimuth, x in ((180, 0), (0, 320))
+    ]
+    surface = contact.surface()
+    return {
+        "flat": flat,
+        "distorted": replace(flat, camera=lens),
+        "pressed": replace(flat, camera=back, surface=surface),
+        "pressed, two views": replace(flat, camera=tuple(halves), surface=surface),
+    }
+
+
+def speed(name: str, scene: Scene, repeats: int) -> Speed:
+    """With the blur and noise of the standard scene; the first picture, which loads code, does not count."""
+    render(scene, size=SIZE)
+    wall, cpu = [], []
+    for _ in range(repeats):
+        before = time.perf_counter(), time.process_time()
+        render(scene, size=SIZE)
+        wall.append(1e3 * (time.perf_counter() - before[0]))
+        cpu.append(1e3 * (time.process_time() - before[1]))
+    return Speed(name, float(np.median(wall)), float(np.percentile(wall, 95)), float(np.median(cpu)))
+
+
+def tables(errors: Sequence[Error], speeds: Sequence[Speed]) -> list[Table]:
+    judged = Table(box=SIMPLE_HEAD, title="the renderer's own error")
+    for heading in ("scene", "blur px", "grey RMS", "largest", "edge RMS px", "largest", "gridlines"):
+        judged.add_column(heading, justify="left" if heading == "scene" else "right")
+    for item in errors:
+        judged.add_row(
+            item.name,
+            f"{item.blur_px:g}",
+            f"{item.grey_rms:.4f}",
+            f"{item.grey_largest:.3f}",
+            f"{item.edge_rms_px:.6f}",
+            f"{item.edge_largest_px:.6f}",
+            f"{item.edges}",
+        )
+    timed = Table(box=SIMPLE_HEAD, title="time of a picture, 640x480, 331 markers, blur 1 px, noise 2/255")
+    for heading in ("scene", "p50 ms", "p95 ms", "CPU p50 ms"):
+        timed.add_column(heading, justify="left" if heading == "scene" else "right")
+    for speed_of in speeds:
+        timed.add_row(
+            speed_of.name, *(f"{v:.1f}" for v in (speed_of.p50_ms, speed_of.p95_ms, speed_of.cpu_ms))
+        )
+    return [judged, timed]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions and a smaller window")
+    parser.add_argument("--json", type=Path, help="also write the results here")
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    window = Window(260, 180, 120, 120) if options.quick else Window(220, 140, 200, 200)
+    judged = scenes()
+    # The two views' first one lies in the left half.
+    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in judged}
+    errors = [
+        error(name, scene, blur_px, windows[name], SIZE)
+        for name, scene in judged.items()
+        for blur_px in (1.0, 0.0)
+    ]
+    speeds = [
+        speed(name, scene, QUICK_REPEATS if options.quick else REPEATS) for name, scene in judged.items()
+    ]
+    console = Console(width=100)
+    for table in tables(errors, speeds):
+        console.print(table)
+    console.print(sentence())
+    if options.json:
+        write_json(
+            options.json,
+            {"errors": [asdict(item) for item in errors], "speeds": [asdict(item) for item in speeds]},
+        )
+
+
+if __name__ == "__main__":
+    main()

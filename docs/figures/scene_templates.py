@@ -1,0 +1,59 @@
+"""What the scene templates show: one picture with all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.build import build_layout
+from cmpdesign.design import load_design
+from cmpdesign.scene import Scene, load_scene, render
+from cmpdesign.templates import scene_templates
+
+ORDER = ("flat-print", "pressed-ball", "tac3d-binocular", "press-and-twist")
+TILE_PX = (400, 300)
+GAP_PX = 8
+STEP = 8  # of the colors: what PNG packs better
+
+
+def figures() -> dict[str, bytes]:
+    """File name -> PNG."""
+    from cmpdesign.images import to_png
+
+    tiles = dict(_tiles())
+    rows = [np.hstack([_framed(tiles[name]) for name in pair]) for pair in (ORDER[:2], ORDER[2:])]
+    return {"scenes.png": to_png(np.vstack(rows) // STEP * STEP)}
+
+
+def _tiles() -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    layout = build_layout(load_design("tac3d"))
+    for name in ORDER:
+        file = load_scene(scene_templates()[name], layout)
+        *_, last = file.scenes()
+        picture = render(_quiet(last), size=file.size_px).image
+        yield name, _scaled(picture.astype(np.uint8))
+
+
+def _quiet(scene: Scene) -> Scene:
+    """Without noise, which a small file cannot hold."""
+    return replace(scene, sensor=None)
+
+
+def _scaled(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Into the middle of a tile, as large as fits."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    factor = min(TILE_PX[0] / width, TILE_PX[1] / height)
+    small = cv2.resize(picture, (round(width * factor), round(height * factor)), interpolation=cv2.INTER_AREA)
+    tile = np.zeros((TILE_PX[1], TILE_PX[0], 3), np.uint8)
+    top, left = (TILE_PX[1] - small.shape[0]) // 2, (TILE_PX[0] - small.shape[1]) // 2
+    tile[top : top + small.shape[0], left : left + small.shape[1]] = small
+    return tile
+
+
+def _framed(tile: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.pad(tile, ((0, GAP_PX), (0, GAP_PX), (0, 0)), constant_values=255)
