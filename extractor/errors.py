@@ -13,3 +13,11 @@ class LayoutError(ExtractorError, ValueError):
 
 class ImageError(ExtractorError, ValueError):
     """An image whose type, shape or size cannot be read as a color picture."""
+
+
+class RigError(ExtractorError, ValueError):
+    """A rig file or a view that cannot be believed; names file, field, value and expectation."""
+
+
+class PoseError(ExtractorError, ValueError):
+    """Views that cannot be placed, or whose places do not allow to measure in space; says which and why."""

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from cmpdesign import __version__
-from cmpdesign.cli import build, check, kerf, render, schema, templates, track, verify
+from cmpdesign.cli import build, check, kerf, reconstruct, render, schema, templates, track, verify
 from cmpdesign.cli.terminal import BAD_INPUT, is_expected, print_error
 
 
@@ -38,6 +38,7 @@ app.command("check")(check.check)
 app.command("render")(render.render)
 app.command("verify")(verify.verify)
 app.command("track")(track.track)
+app.command("reconstruct")(reconstruct.reconstruct)
 app.command("kerf")(kerf.kerf)
 app.command("schema")(schema.schema)
 

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cmpdesign.cli.running import finish, go, require_positive
 from cmpdesign.cli.terminal import console, print_warning, printable
 from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import Run
     from extractor.reference import Reference
-    from extractor.tracking import Tracked
-
-NOT_TRACKED = 1
-INTERRUPTED = 130
 
 
 def track(
@@ -63,8 +59,8 @@ def track(
 
         console().print(f"wrote {printable(output)}: {recover_file(output)} frames recovered")
         return
-    _require_positive("--mm-per-px", mm_per_px)
-    _require_positive("--fps", fps)
+    require_positive("--mm-per-px", mm_per_px)
+    require_positive("--fps", fps)
     _require_png(quiver)
     from extractor import load_layout
 
@@ -72,13 +68,13 @@ def track(
     run = _prepared(reference, source, output, rest, mm_per_px, fps, overlay, cold)
     run.limit = frames
     try:
-        _gone(run)
+        go(run, "tracking")
     except OutputError:  # no reason to keep from the user what could be tracked
         with suppress(OutputError):
             _report(run, reference, source, output, quiver)
         raise
     _report(run, reference, source, output, quiver)
-    _finish(run)
+    finish(run)
 
 
 def _prepared(
@@ -97,44 +93,14 @@ def _prepared(
     from cmpdesign.tracking.sinks import open_sink
     from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
     from cmpdesign.tracking.summary import Tally
+    from cmpdesign.tracking.table import TrackTable
     from extractor.tracking import Tracker
 
     at_rest = None if rest is None else rest_markers(rest, source, reference, fps)
     tracker = Tracker(reference, rest=at_rest, mm_per_px=mm_per_px, warm=not cold)
     frames = open_source(source, fps)
     video = None if overlay is None else Overlay(overlay, reference, frames.fps or DEFAULT_FPS)
-    return Run(frames, tracker, open_sink(output, reference), Tally(reference), video)
-
-
-def _gone(run: Run) -> None:
-    from cmpdesign.tracking.run import stopped_by_hand
-
-    with stopped_by_hand(run.stop), _progress(run) as watch:
-        run.go(watch)
-
-
-@contextmanager
-def _progress(run: Run) -> Iterator[Callable[[Tracked], None]]:
-    """A bar on stderr where a terminal shows it: frames, and how many are tracked."""
-    terminal = console(stderr=True)
-    if not terminal.is_terminal:
-        yield lambda frame: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    total = run.limit or run.source.total
-    columns = (
-        TextColumn("tracking"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=terminal, transient=True) as progress:
-        task = progress.add_task("tracking", total=total, note="")
-        yield lambda frame: progress.update(
-            task, advance=1, note=f"{run.tally.tracked} tracked, {frame.elapsed_ms:.1f} ms"
-        )
+    return Run(frames, tracker, open_sink(output, TrackTable(tracker)), Tally(reference), video)
 
 
 def _report(run: Run, reference: Reference, source: str, output: Path, quiver: Path | None) -> None:
@@ -156,18 +122,6 @@ def _report(run: Run, reference: Reference, source: str, output: Path, quiver: P
         print_warning(f"{printable(quiver)} is not drawn: no frame has a displacement")
     for path, content in contents.items():
         write_file(path, content)
-
-
-def _finish(run: Run) -> None:
-    if run.stop.asked:
-        by_design = run.source.name.startswith("camera")  # there is no other way to end a camera's run
-        raise typer.Exit(0 if by_design else INTERRUPTED)
-    if not run.tally.frames:
-        raise CmpDesignError(f"{run.source.name}: no frame could be read")
-    if run.ended_early:
-        print_warning(f"{run.ended_early}; these are written")
-    if run.ended_early or not run.tally.tracked:
-        raise typer.Exit(NOT_TRACKED)
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
@@ -195,11 +149,6 @@ def _print_summary(summary: dict[str, Any]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console().print(table)
-
-
-def _require_positive(option: str, value: float | None) -> None:
-    if value is not None and not 0 < value < float("inf"):
-        raise CmpDesignError(f"{option} is {value:g}; expected a number above 0")
 
 
 def _require_png(path: Path | None) -> None:

@@ -14,11 +14,9 @@ from cmpdesign.images import read_image
 from cmpdesign.tracking.overlay import Overlay
 from cmpdesign.tracking.sinks import Sink
 from cmpdesign.tracking.sources import Source, open_source
-from cmpdesign.tracking.summary import Tally
 
 if TYPE_CHECKING:
     from extractor import Markers, Reference
-    from extractor.tracking import Tracked, Tracker
 
 
 @dataclass(eq=False)
@@ -30,18 +28,22 @@ class Stop:
 
 @dataclass(eq=False)
 class Run:
-    """One run's parts. ``tally`` and ``ended_early`` tell how it went."""
+    """One run's parts. ``tally`` and ``ended_early`` tell how it went.
+
+    ``tracker`` makes a frame of an image, a time stamp and a problem; ``tally`` counts frames: a ``Tracker`` and a
+    ``Tally``, or a ``ShapeTracker`` and a ``ShapeTally``.
+    """
 
     source: Source
-    tracker: Tracker
+    tracker: Any
     sink: Sink
-    tally: Tally
+    tally: Any
     overlay: Overlay | None = None
     limit: int | None = None
     ended_early: str = ""
     stop: Stop = field(default_factory=Stop)
 
-    def go(self, watch: Callable[[Tracked], None]) -> None:
+    def go(self, watch: Callable[[Any], None]) -> None:
         """Track to the end; ``watch`` sees every frame.
 
         Raises:
@@ -57,10 +59,10 @@ class Run:
         if failed:
             raise OutputError("; ".join(dict.fromkeys((*failed, self.sink.kept()))))
 
-    def _track(self, watch: Callable[[Tracked], None]) -> None:
+    def _track(self, watch: Callable[[Any], None]) -> None:
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
-            self.sink.add(tracked, self.tracker.rest)
+            self.sink.add(tracked)
             self.tally.add(tracked)
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
@@ -109,23 +111,33 @@ def rest_markers(text: str, source: str, reference: Reference, fps: float | None
     """
     from extractor import Extractor
 
-    image = _frame_at(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
-    name = f"frame {text}" if text.isdecimal() else text
-    if image is None:
-        raise CmpDesignError(f"--rest {text}: {name} cannot be read; choose another")
-    markers = Extractor(reference).extract(image)
+    markers = Extractor(reference).extract(rest_image(text, source, fps))
     if markers.reason is not None:
-        raise CmpDesignError(
-            f"--rest {text}: no pattern is found in {name} ({markers.reason}); choose another"
-        )
+        name = f"frame {text}" if text.isdecimal() else text
+        raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
     return markers
+
+
+def rest_image(text: str, source: str, fps: float | None) -> Any:
+    """The picture at rest: a frame of the source by its number, or an image file.
+
+    Raises:
+        CmpDesignError: there is no such frame or image.
+    """
+    image = _frame_at(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
+    if image is None:
+        name = f"frame {text}" if text.isdecimal() else text
+        raise CmpDesignError(f"at rest: {name} cannot be read; choose another")
+    return image
 
 
 def _frame_at(number: int, text: str, fps: float | None) -> Any:
     source = open_source(text, fps)
     if source.name.startswith("camera"):
-        raise CmpDesignError(f"--rest {number}: a camera's frames cannot be read ahead; give an image file")
+        raise CmpDesignError(
+            f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file"
+        )
     for index, frame in enumerate(source.frames()):
         if index == number:
             return frame.image
-    raise CmpDesignError(f"--rest {number}: {text} has fewer frames")
+    raise CmpDesignError(f"at rest, frame {number}: {text} has fewer frames")

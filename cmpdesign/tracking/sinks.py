@@ -1,4 +1,4 @@
-"""Where tracked frames go, as they come: whatever happens, what was written so far can be read.
+"""Where frames go, as they come: whatever happens, what was written so far can be read.
 
 CSV grows beside its place as ``FILE.part``. NPZ and Parquet cannot grow: their frames go to ``FILE.part/``, a folder
 of chunks, each of them an .npz of its own, and are assembled at the end. A killed run leaves these for ``recover``.
@@ -10,19 +10,14 @@ import csv
 import io
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.tracking.table import LONG_COLUMNS, Columns, about, batch, long_form
-
-if TYPE_CHECKING:
-    from extractor.displacement import Rest
-    from extractor.reference import Reference
-    from extractor.tracking import Tracked
+from cmpdesign.tracking.table import HEAD, Columns, Table, long_form_of
 
 CHUNK_FRAMES = 256
 CHUNK_S = 5.0  # what a crash can cost
@@ -35,14 +30,14 @@ class Sink(Protocol):
     ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says how many frames are where.
     """
 
-    def add(self, frame: Tracked, rest: Rest | None) -> None: ...
+    def add(self, frame: Any) -> None: ...
 
     def close(self) -> None: ...
 
     def kept(self) -> str: ...
 
 
-def open_sink(path: Path, reference: Reference) -> Sink:
+def open_sink(path: Path, table: Table) -> Sink:
     """The sink for a file's ending.
 
     Raises:
@@ -59,7 +54,7 @@ def open_sink(path: Path, reference: Reference) -> Sink:
         raise OutputError(f"{path}: is a folder; give a file's name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return CsvSink(path, reference) if path.suffix == ".csv" else ChunkSink(path, reference)
+        return CsvSink(path, table) if path.suffix == ".csv" else ChunkSink(path, table)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
 
@@ -110,16 +105,16 @@ def _pyarrow() -> Any:
 class CsvSink:
     """The long form as text, flushed frame by frame; a frame that does not fit on the disk is cut off again."""
 
-    def __init__(self, path: Path, reference: Reference) -> None:
-        self._path, self._part, self._reference = path, _part(path), reference
+    def __init__(self, path: Path, table: Table) -> None:
+        self._path, self._part, self._table = path, _part(path), table
         self._file = self._part.open("xb", buffering=0)
         self._end, self._frames = 0, 0
-        self._write((",".join(LONG_COLUMNS) + "\n").encode())
+        self._write((",".join((*HEAD, *self._table.digits)) + "\n").encode())
 
-    def add(self, frame: Tracked, rest: Rest | None) -> None:
-        columns = long_form(batch([frame]), self._reference.layer, self._reference.index)
+    def add(self, frame: Any) -> None:
+        columns = long_form_of(self._table.batch([frame]), self._table.about())
         try:
-            self._write(_lines(columns))
+            self._write(_lines(columns, self._table.digits))
             self._frames += 1
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
@@ -146,23 +141,18 @@ class CsvSink:
         return f"{self._frames} frames are kept in {self._part if self._part.exists() else self._path}"
 
 
-def _lines(columns: Columns) -> bytes:
+def _lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
     """A frame's rows; an empty field where nothing is known."""
     reason = io.StringIO()
     csv.writer(reason, lineterminator="").writerow([columns["reason"][0]])
     head = f"{columns['frame'][0]},{_number(columns['time_s'][0], 6)},{columns['frame_status'][0]},{reason.getvalue()},"
-    digits = {name: 5 for name in LONG_COLUMNS[8:]} | {
-        "cov_xx_px2": 8,
-        "cov_xy_px2": 8,
-        "cov_yy_px2": 8,
-        "dx_mm": 6,
-        "dy_mm": 6,
-    }
     if not columns["reason"][0]:
         head = head.replace('""', "")
-    whole = [columns[name].tolist() for name in LONG_COLUMNS[4:8]]
-    real = [[_number(v, digits[name]) for v in columns[name].tolist()] for name in LONG_COLUMNS[8:]]
-    return "".join(head + ",".join(map(str, row)) + "\n" for row in zip(*whole, *real, strict=True)).encode()
+    cells = [
+        [_number(v, places) if places else str(v) for v in columns[name].tolist()]
+        for name, places in digits.items()
+    ]
+    return "".join(head + ",".join(row) + "\n" for row in zip(*cells, strict=True)).encode()
 
 
 def _number(value: float, digits: int) -> str:
@@ -182,33 +172,31 @@ def _cut_to_whole_lines(part: Path) -> int:
 class ChunkSink:
     """Frames in chunks of some seconds, assembled at the end."""
 
-    def __init__(self, path: Path, reference: Reference) -> None:
-        self._path, self._part, self._reference = path, _part(path), reference
+    def __init__(self, path: Path, table: Table) -> None:
+        self._path, self._part, self._table = path, _part(path), table
         self._part.mkdir()
-        self._frames: list[Tracked] = []
-        self._rest: Rest | None = None
+        self._frames: list[Any] = []
         self._chunks, self._kept = 0, 0
         self._last = time.monotonic()
 
-    def add(self, frame: Tracked, rest: Rest | None) -> None:
+    def add(self, frame: Any) -> None:
         self._frames.append(frame)
-        self._rest = rest
         if len(self._frames) >= CHUNK_FRAMES or time.monotonic() - self._last > CHUNK_S:
             self._flush()
 
     def _flush(self) -> None:
         try:
-            _save(self._part / "about.npz", about(self._reference, self._rest))
+            _save(self._part / "about.npz", self._table.about())
             if self._frames:
                 self._save(self._frames)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
         self._frames, self._last = [], time.monotonic()
 
-    def _save(self, frames: list[Tracked]) -> None:
+    def _save(self, frames: list[Any]) -> None:
         """As one chunk; where it does not fit, as two halves, so that a full disk takes what it can."""
         try:
-            _save(self._part / f"{self._chunks:06d}.npz", batch(frames))
+            _save(self._part / f"{self._chunks:06d}.npz", self._table.batch(frames))
         except OSError:
             if len(frames) == 1:
                 raise
@@ -308,7 +296,7 @@ def _to_parquet(part: Path, path: Path, fixed: Columns) -> int:
     frames, writer = 0, None
     try:
         for columns in _chunks(part):
-            long = long_form(columns, fixed["layer"], fixed["index"])
+            long = long_form_of(columns, fixed)
             arrays = {
                 name: arrow.array(values, from_pandas=values.dtype.kind == "f")
                 for name, values in long.items()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.images import Image, ImageFileError, read_image
+from cmpdesign.images import ImageFileError, read_image
 
 IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
@@ -23,10 +23,10 @@ class SourceError(CmpDesignError, ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a source hands on: an image, or None and why there is none."""
+    """What a source hands on: an image (of several sources: a list of them), or None and why there is none."""
 
     time_s: float
-    image: Image | None
+    image: Any
     problem: str = ""
 
 
@@ -63,6 +63,50 @@ def open_source(text: str, fps: float | None = None) -> Source:
     if path.is_dir():
         return Folder(path, fps or DEFAULT_FPS)
     return Video(path, fps)
+
+
+def open_sources(text: str, fps: float | None = None) -> Source:
+    """The source that a text names, or several, one for each view, where it is a list with commas.
+
+    Raises:
+        SourceError: nothing to track there.
+    """
+    names = split_list(text)
+    return Several([open_source(name, fps) for name in names]) if len(names) > 1 else open_source(text, fps)
+
+
+def split_list(text: str) -> list[str]:
+    """The names in a list with commas; a file whose own name has a comma is one."""
+    return [text] if Path(text).exists() else text.split(",")
+
+
+class Several:
+    """Sources that run side by side, one for each view; they end together with the shortest of them."""
+
+    def __init__(self, sources: list[Source]) -> None:
+        self._sources = sources
+        self.name, self.ended_early = " and ".join(source.name for source in sources), ""
+        totals = [source.total for source in sources if source.total is not None]
+        self.total = min(totals) if totals else None
+        self.fps = sources[0].fps
+
+    def frames(self) -> Iterator[Frame]:
+        """The first source's time stamps; a frame that one of them lacks is None in the list."""
+        streams = [source.frames() for source in self._sources]
+        while True:
+            frames = [next(stream, None) for stream in streams]
+            together = [frame for frame in frames if frame is not None]
+            if len(together) < len(frames):
+                break
+            problems = [frame.problem for frame in together if frame.problem]
+            yield Frame(together[0].time_s, [frame.image for frame in together], "; ".join(problems))
+        said = [source.ended_early for source in self._sources if source.ended_early]
+        if together and not said:
+            short = [
+                source.name for source, frame in zip(self._sources, frames, strict=True) if frame is None
+            ]
+            said = [f"{' and '.join(short)} has fewer frames than the others"]
+        self.ended_early = "; ".join(said)
 
 
 class Folder:

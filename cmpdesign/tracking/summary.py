@@ -97,23 +97,27 @@ class Tally:
             "reasons": {reason: count for reason, count in sorted(self._reasons.items()) if reason},
             "starts": {str(start): count for start, count in sorted(self._starts.items()) if start != "none"},
             "marker_shares": {"measured": measured, "repaired": repaired + fitted, "lost": lost},
-            "time_ms": self._percentiles(),
-            "frames_per_s": {name: 1e3 / ms if ms else None for name, ms in self._percentiles().items()},
+            "time_ms": percentiles(self._elapsed_ms),
+            "frames_per_s": {
+                name: 1e3 / ms if ms else None for name, ms in percentiles(self._elapsed_ms).items()
+            },
             "rest": _rest(rest),
             "jitter_px": self.jitter_px,
             "jitter_pairs": self._pairs,
             "largest_displacement": self._largest_json(),
         }
 
-    def _percentiles(self) -> dict[str, float]:
-        values = np.percentile(self._elapsed_ms, (50, 95, 99)) if self._elapsed_ms else np.zeros(3)
-        return dict(zip(("p50", "p95", "p99"), (float(v) for v in values), strict=True))
-
     def _largest_json(self) -> dict[str, Any] | None:
         px, frame, marker, mm = self._largest
         if frame < 0:
             return None
         return {"px": px, "mm": mm if np.isfinite(mm) else None, "frame": frame, "marker": marker}
+
+
+def percentiles(elapsed_ms: list[float]) -> dict[str, float]:
+    """The 50th, 95th and 99th; 0 without values."""
+    values = np.percentile(elapsed_ms, (50, 95, 99)) if elapsed_ms else np.zeros(3)
+    return dict(zip(("p50", "p95", "p99"), (float(v) for v in values), strict=True))
 
 
 def _rest(rest: Rest | None) -> dict[str, Any] | None:

@@ -1,39 +1,97 @@
-"""The columns that tracking writes, and batches of them."""
+"""Tables that are written frame by frame: what every sink needs of one, and the columns that tracking writes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from extractor.displacement import Rest
-    from extractor.reference import Reference
-    from extractor.tracking import Tracked
+    from extractor.tracking import Tracked, Tracker
 
 Columns = dict[str, NDArray[Any]]
 
 FRAME_STATUS = ("", "tracked", "lost", "unreadable", "other size")
 REASON = "U120"
-# In the long form, pairs become columns of their own.
-LONG_COLUMNS = (
-    "frame", "time_s", "frame_status", "reason", "marker", "layer", "index", "status", "x_px", "y_px",
-    "cov_xx_px2", "cov_xy_px2", "cov_yy_px2", "dx_px", "dy_px", "dx_mm", "dy_mm",
-)  # fmt: skip
+HEAD = ("frame", "time_s", "frame_status", "reason")  # opens every row of a long form
+
+
+class Table(Protocol):
+    """Frames as arrays, and as a long form of one row for every frame and point.
+
+    Attributes:
+        digits: the long form's columns after ``HEAD``: decimals in text, 0 for whole numbers.
+    """
+
+    digits: Mapping[str, int]
+
+    def batch(self, frames: Sequence[Any]) -> Columns:
+        """F frames as arrays with a leading axis of F."""
+        ...
+
+    def about(self) -> Columns:
+        """What is the same for all frames, with ``format``, by which ``long_form_of`` knows the table."""
+        ...
+
+
+class TrackTable:
+    """A tracker's frames.
+
+    Args:
+        tracker: whose layout and rest frame are written beside the frames.
+    """
+
+    digits: Mapping[str, int] = {name: 0 for name in ("marker", "layer", "index", "status")} | {
+        "x_px": 5, "y_px": 5, "cov_xx_px2": 8, "cov_xy_px2": 8, "cov_yy_px2": 8,
+        "dx_px": 5, "dy_px": 5, "dx_mm": 6, "dy_mm": 6,
+    }  # fmt: skip
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+
+    def batch(self, frames: Sequence[Tracked]) -> Columns:
+        return batch(frames)
+
+    def about(self) -> Columns:
+        return about(self._tracker)
+
+
+def head(frames: Sequence[Any]) -> Columns:
+    """What all tables say of a frame."""
+    return {
+        "frame": np.array([frame.index for frame in frames], np.int64),
+        "time_s": np.array([frame.time_s for frame in frames], np.float64),
+        "frame_status": np.array([frame.status for frame in frames], np.uint8),
+        "reason": np.array([frame.reason for frame in frames], REASON),
+        "elapsed_ms": np.array([frame.elapsed_ms for frame in frames], np.float32),
+    }
+
+
+def long_head(columns: Columns, count: int) -> Columns:
+    """``HEAD`` for ``count`` rows of every frame."""
+    long: Columns = {name: np.repeat(columns[name], count) for name in ("frame", "time_s")}
+    long["frame_status"] = np.repeat(np.array(FRAME_STATUS)[columns["frame_status"]], count)
+    long["reason"] = np.repeat(columns["reason"], count)
+    return long
+
+
+def long_form_of(columns: Columns, fixed: Columns) -> Columns:
+    """The long form of frames, whichever table they are of."""
+    if str(fixed["format"]) == "cmp-reconstruction":
+        from cmpdesign.tracking.shape_table import long_form as of_shapes
+
+        return of_shapes(columns, fixed)
+    return long_form(columns, fixed)
 
 
 def batch(frames: Sequence[Tracked]) -> Columns:
     """Frames as columns: F frames by M markers."""
     cov = np.stack([frame.markers.cov_px2 for frame in frames])
     return {
-        "frame": np.array([frame.index for frame in frames], np.int64),
-        "time_s": np.array([frame.time_s for frame in frames], np.float64),
-        "frame_status": np.array([frame.status for frame in frames], np.uint8),
-        "reason": np.array([frame.reason for frame in frames], REASON),
+        **head(frames),
         "start": np.array([frame.start or "" for frame in frames], "U20"),
-        "elapsed_ms": np.array([frame.elapsed_ms for frame in frames], np.float32),
         "status": np.stack([frame.markers.status for frame in frames]),
         "xy_px": np.stack([frame.markers.xy_px for frame in frames]),
         "cov_px2": cov[:, :, (0, 0, 1), (0, 1, 1)].astype(np.float32),
@@ -42,12 +100,14 @@ def batch(frames: Sequence[Tracked]) -> Columns:
     }
 
 
-def about(reference: Reference, rest: Rest | None) -> Columns:
-    """What is the same for all frames."""
+def about(tracker: Tracker) -> Columns:
+    """The layout, and the rest frame as far as it is known by now."""
+    reference, rest = tracker.layout, tracker.rest
     unknown = np.full((3, 3), np.nan)
     homography = rest.layout_from_image if rest is not None else None
     scale = rest.mm_per_px if rest is not None else None
     return {
+        "format": np.array("cmp-tracking"),
         "layer": reference.layer,
         "index": reference.index,
         "layout_xy_mm": reference.xy_mm,
@@ -59,21 +119,20 @@ def about(reference: Reference, rest: Rest | None) -> Columns:
     }
 
 
-def long_form(columns: Columns, layer: NDArray[np.int32], index: NDArray[np.int32]) -> Columns:
-    """One row for every frame and marker, lost ones too, in the order of ``LONG_COLUMNS``."""
+def long_form(columns: Columns, fixed: Columns) -> Columns:
+    """One row for every frame and marker, lost ones too; pairs become columns of their own."""
     frames, count = columns["status"].shape
     pairs = {
         "xy_px": ("x_px", "y_px"),
         "displacement_px": ("dx_px", "dy_px"),
         "displacement_mm": ("dx_mm", "dy_mm"),
     }
-    long: Columns = {name: np.repeat(columns[name], count) for name in ("frame", "time_s", "reason")}
-    long["frame_status"] = np.repeat(np.array(FRAME_STATUS)[columns["frame_status"]], count)
+    long = long_head(columns, count)
     long["marker"] = np.tile(np.arange(count, dtype=np.int32), frames)
-    long["layer"], long["index"] = np.tile(layer, frames), np.tile(index, frames)
+    long["layer"], long["index"] = np.tile(fixed["layer"], frames), np.tile(fixed["index"], frames)
     long["status"] = columns["status"].reshape(-1)
     for name, (x, y) in pairs.items():
         long[x], long[y] = columns[name][..., 0].reshape(-1), columns[name][..., 1].reshape(-1)
     for place, name in enumerate(("cov_xx_px2", "cov_xy_px2", "cov_yy_px2")):
         long[name] = columns["cov_px2"][..., place].reshape(-1)
-    return {name: long[name] for name in LONG_COLUMNS}
+    return {name: long[name] for name in (*HEAD, *TrackTable.digits)}

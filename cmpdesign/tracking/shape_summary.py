@@ -1,0 +1,89 @@
+"""What a run of reconstruction amounts to, counted frame by frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmpdesign.tracking.summary import percentiles
+
+if TYPE_CHECKING:
+    from extractor.stereo import Reconstructor
+    from extractor.views import ShapeFrame
+
+
+class ShapeTally:
+    """Counts of a reconstructor's frames."""
+
+    def __init__(self, reconstructor: Reconstructor) -> None:
+        self._reconstructor = reconstructor
+        self._present = reconstructor.layout.present
+        self._elapsed_ms: list[float] = []
+        self._statuses: Counter[str] = Counter()
+        self._reasons: Counter[str] = Counter()
+        self._markers = np.zeros(4, np.int64)
+        self._lost: Counter[int] = Counter()
+        self._sigmas_um: list[np.ndarray] = []
+        self._largest = (-1.0, -1, -1)
+
+    @property
+    def frames(self) -> int:
+        return len(self._elapsed_ms)
+
+    @property
+    def tracked(self) -> int:
+        return self._statuses["tracked"]
+
+    def add(self, frame: ShapeFrame) -> None:
+        shape = frame.shape
+        self._elapsed_ms.append(frame.elapsed_ms)
+        self._statuses[frame.status.name.lower()] += 1
+        self._reasons[frame.reason] += 1
+        self._markers += np.bincount(shape.status[self._present], minlength=4)
+        self._lost.update(shape.reason[self._present & (shape.status == 0)].tolist())
+        known = shape.status != 0
+        if not known.any():
+            return
+        variances = shape.cov_mm2[known][:, [0, 1, 2], [0, 1, 2]]
+        self._sigmas_um.append(1e3 * np.sqrt(np.median(variances, axis=0)))
+        length = np.linalg.norm(shape.displacement_mm, axis=1)
+        if np.isfinite(length).any() and np.nanmax(length) > self._largest[0]:
+            self._largest = (float(np.nanmax(length)), frame.index, int(np.nanargmax(length)))
+
+    def to_json(self, source: str, declared: int | None, ended: str) -> dict[str, Any]:
+        """The summary as it is written; see docs/reconstruction.md."""
+        from extractor import PointReason
+
+        layout, poses = self._reconstructor.layout, self._reconstructor.poses
+        total = max(int(self._markers.sum()), 1)
+        lost, measured, repaired, fitted = (float(n) / total for n in self._markers)
+        mm, frame, marker = self._largest
+        sigmas = np.median(self._sigmas_um, axis=0).tolist() if self._sigmas_um else None
+        return {
+            "format": "cmp-reconstruction",
+            "version": 1,
+            "source": source,
+            "pattern": layout.pattern,
+            "digest": layout.digest,
+            "ended_early": ended or None,
+            "frames": {
+                "declared": declared,
+                "read": self.frames,
+                **{name: self._statuses[name] for name in ("tracked", "lost", "unreadable", "other_size")},
+            },
+            "reasons": {reason: count for reason, count in sorted(self._reasons.items()) if reason},
+            "marker_shares": {"measured": measured, "repaired": repaired + fitted, "lost": lost},
+            "lost_markers": {
+                PointReason(code).name.lower(): count for code, count in sorted(self._lost.items()) if code
+            },
+            "sigma_um": sigmas,
+            "time_ms": percentiles(self._elapsed_ms),
+            "views": [
+                {"name": view.name, "position_mm": view.position_mm.tolist(), "rms_px": float(rms)}
+                for view, rms in zip(poses.views, poses.rms_px, strict=True)
+            ],
+            "model_px": self._reconstructor.model_px,
+            "largest_displacement": None if frame < 0 else {"mm": mm, "frame": frame, "marker": marker},
+        }

@@ -1,0 +1,101 @@
+"""The columns that reconstruction writes: the surface of every frame, by the names that users of Tac3D read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cmpdesign.tracking.table import HEAD, Columns, head, long_head
+
+if TYPE_CHECKING:
+    from extractor.stereo import Reconstructor, Shape
+    from extractor.views import ShapeFrame
+
+TRIPLES = {
+    "3D_Positions": ("x_mm", "y_mm", "z_mm"),
+    "3D_Displacements": ("dx_mm", "dy_mm", "dz_mm"),
+    "3D_Normals": ("nx", "ny", "nz"),
+}
+COVARIANCE = ("xx", "xy", "xz", "yy", "yz", "zz")
+UPPER = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
+
+
+class ShapeTable:
+    """A reconstructor's frames: F frames by N points, the layout's M markers first, then its virtual markers.
+
+    Args:
+        reconstructor: whose layout, poses and rest frame are written beside the frames.
+    """
+
+    digits: Mapping[str, int] = (
+        {name: 0 for name in ("point", "edge", "status", "point_reason")}
+        | {name: 6 for name in (*TRIPLES["3D_Positions"], *TRIPLES["3D_Displacements"])}
+        | {name: 7 for name in TRIPLES["3D_Normals"]}
+        | {f"cov_{name}_mm2": 12 for name in COVARIANCE}
+    )
+
+    def __init__(self, reconstructor: Reconstructor) -> None:
+        self._reconstructor = reconstructor
+
+    def batch(self, frames: Sequence[ShapeFrame]) -> Columns:
+        shapes = [frame.shape for frame in frames]
+        columns = head(frames)
+        columns["status"] = np.stack([_joined(s.status, s.virtual_status) for s in shapes])
+        columns["point_reason"] = np.stack([_reasons(s) for s in shapes])
+        columns["misfit"] = np.stack([s.misfit for s in shapes]).astype(np.float32)
+        for name in TRIPLES:
+            columns[name] = np.stack([s.tac3d[name] for s in shapes]).astype(np.float32)
+        cov = np.stack([np.concatenate([s.cov_mm2, s.virtual_cov_mm2.reshape(-1, 3, 3)]) for s in shapes])
+        columns["cov_mm2"] = cov[:, :, UPPER[0], UPPER[1]].astype(np.float32)
+        return columns
+
+    def about(self) -> Columns:
+        """The layout, the views in their places, and the surface at rest."""
+        reconstructor = self._reconstructor
+        layout, poses = reconstructor.layout, reconstructor.poses
+        markers, count = len(layout.layer), layout.virtual_per_edge
+        edge = np.concatenate([np.full(markers, -1), np.repeat(np.arange(len(layout.edges)), count)])
+        return {
+            "format": np.array("cmp-reconstruction"),
+            "digest": np.array(layout.digest),
+            "layer": layout.layer,
+            "index": layout.index,
+            "layout_xy_mm": layout.xy_mm,
+            "edges": layout.edges,
+            "edge": edge.astype(np.int32),
+            "rest_positions_mm": reconstructor.rest_positions_mm,
+            "views": np.array([view.name for view in poses.views]),
+            "R_camera_from_layout": np.stack([view.R_camera_from_layout for view in poses.views]),
+            "t_camera_from_layout_mm": np.stack([view.t_camera_from_layout_mm for view in poses.views]),
+            "pose_rms_px": poses.rms_px,
+            "pose_misfit": np.array(poses.misfit),
+            "model_px": np.array(reconstructor.model_px),
+        }
+
+
+def _joined(status: np.ndarray, virtual: np.ndarray) -> np.ndarray:
+    return np.concatenate([status, virtual.ravel()])
+
+
+def _reasons(shape: Shape) -> np.ndarray:
+    from extractor import PointReason
+
+    lost = shape.virtual_status.ravel() == 0
+    return np.concatenate([shape.reason, np.where(lost, PointReason.SURROUNDINGS, 0).astype(np.uint8)])
+
+
+def long_form(columns: Columns, fixed: Columns) -> Columns:
+    """One row for every frame and point, lost ones too; triples become columns of their own."""
+    frames, count = columns["status"].shape
+    long = long_head(columns, count)
+    long["point"] = np.tile(np.arange(count, dtype=np.int32), frames)
+    long["edge"] = np.tile(fixed["edge"], frames)
+    long["status"], long["point_reason"] = columns["status"].reshape(-1), columns["point_reason"].reshape(-1)
+    for name, axes in TRIPLES.items():
+        for place, axis in enumerate(axes):
+            long[axis] = columns[name][..., place].reshape(-1)
+    for place, name in enumerate(COVARIANCE):
+        long[f"cov_{name}_mm2"] = columns["cov_mm2"][..., place].reshape(-1)
+    return {name: long[name] for name in (*HEAD, *ShapeTable.digits)}
