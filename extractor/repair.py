@@ -20,7 +20,8 @@ from .types import Status
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-MAX_FRAYED = 0.25  # in edges, of a marker of the outermost layer from where the others put it
+FRAYED = 0.1, 0.25  # in edges, of a marker of the outermost layer from where the others put it, and
+BENT_SIGMAS = 7.0  # standard deviations in between
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
@@ -117,10 +118,12 @@ def _drop_frayed(
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
     outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
-    place, _, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
+    place, variance, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
     apart = xy - place
     with np.errstate(invalid="ignore"):
-        bad = (np.hypot(apart[:, 0], apart[:, 1]) > MAX_FRAYED * edge) & (support >= MIN_QUADRATIC)
+        # the worse a quadratic fits the layers inside, the less it tells beyond them
+        allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
+        bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
     xy[bad], cov[bad] = np.nan, np.nan
 
 
