@@ -44,6 +44,7 @@ USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MIN_EDGE_PX = 8.0  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
+MAX_SIGMA = 0.04  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
@@ -371,7 +372,7 @@ class Refiner:
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         with np.errstate(invalid="ignore"):
             near = np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px
-            sure = np.einsum("mii->m", cov) < (MAX_SHIFT * places.edge_px) ** 2
+            sure = np.einsum("mii->m", cov) < (MAX_SIGMA * places.edge_px) ** 2
         lost = ~(near & sure)
         xy[lost] = np.nan
         cov[lost] = np.nan

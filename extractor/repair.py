@@ -20,8 +20,8 @@ from .types import Status
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-FRAYED = 0.1, 0.25  # in edges, of a marker of the outermost layer from where the others put it, and
-BENT_SIGMAS = 7.0  # standard deviations in between
+FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
+BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
