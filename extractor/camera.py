@@ -170,6 +170,13 @@ def finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(values).all(axis=tuple(range(-axes, 0))))
 
 
+def is_covariance(cov_px2: Array) -> NDArray[np.bool_]:
+    """Which (..., 2, 2) are finite and positive definite; a pixel whose covariance is not is taken for unseen."""
+    safe = np.where(finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
+    determinant = safe[..., 0, 0] * safe[..., 1, 1] - safe[..., 0, 1] * safe[..., 1, 0]
+    return np.asarray((safe[..., 0, 0] > 0) & (determinant > 0))
+
+
 def cross_matrix(vectors: Array) -> Array:
     """(N, 3, 3): the matrices that multiply a vector like a cross product from the left."""
     out = np.zeros((len(vectors), 3, 3))

@@ -80,6 +80,15 @@ class Field:
         sound = np.linalg.cond(gram) < MAX_CONDITION
         out[some[sound]] = np.linalg.solve(gram[sound], design[sound])[:, :2] / self._edge_mm
 
+    def mean_around(self, values: Array) -> Array:
+        """(M,) means over each marker and the two rings around it, of those that are known; NaN where none is."""
+        near = np.column_stack([np.arange(len(self._near)), self._near])
+        around = np.where(near >= 0, values[near], np.nan)
+        known = np.isfinite(around)
+        total = np.where(known, around, 0.0).sum(axis=1)
+        count = known.sum(axis=1)
+        return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
     def normals(self, xyz_mm: Array) -> Array:
         """(M, 3) unit normals of the surface through (M, 3), out of the front; NaN where unknown."""
         by_x, by_y = np.moveaxis(self.gradients(xyz_mm), 2, 0)

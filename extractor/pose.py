@@ -14,16 +14,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera import Array, View, finite
+from .camera import Array, View, finite, is_covariance
 from .errors import PoseError
 
 MIN_MARKERS = 6
 MAX_CONDITION = 1e4  # of the markers' scatter; markers on a line fix no pose
-ITERATIONS = 60
+ITERATIONS = 30
 CONVERGED = 1e-6  # of a standard deviation
 OUTLIER = 6.0  # times the usual misfit
 ROUNDS = 3
 GAP = 25.0  # by which chi^2 of the second pose must be larger, as 5 standard deviations are
+MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges
+RIDGE = 1e-12  # on correlations, so that each has an inverse
 SAME_DEG = 0.5  # poses nearer than this are one
 
 
@@ -64,6 +66,7 @@ def place_views(
         PoseError: too few markers, on a line, or two poses that the image does not tell apart.
     """
     flat = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
+    xy_px = np.where(is_covariance(cov_px2)[..., None], xy_px, np.nan)
     started = [v if v.placed else _alone(v, flat, xy_px[i], cov_px2[i]) for i, v in enumerate(views)]
     free = np.array([not view.placed for view in views])
     weighted = np.where(finite(xy_px)[..., None, None], cov_px2, np.nan)
@@ -77,6 +80,7 @@ def place_views(
         if not outlier.any():
             break
         used &= ~outlier
+    _require_fit(views, fit, xy_mm, xy_px)
     rms = np.sqrt([np.nanmean(away**2) if np.isfinite(away).any() else np.nan for away in fit.away_px])
     freedom = int(np.isfinite(fit.away_px).sum()) - 6 * int(free.sum())
     misfit = float(np.sqrt(fit.chi2 / freedom)) if free.any() and freedom > 0 else float("nan")
@@ -87,9 +91,8 @@ def place_views(
 
 def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     """The better of the plane's two poses in one view."""
-    known = finite(xy_px) & finite(cov_px2, 2)
     plain = view.normalised(xy_px)
-    known &= finite(plain)
+    known = finite(xy_px) & finite(plain)
     where = f"view {view.name!r}: "
     if known.sum() < MIN_MARKERS:
         raise PoseError(f"{where}{int(known.sum())} markers at rest; a pose needs {MIN_MARKERS}")
@@ -97,9 +100,12 @@ def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     if np.linalg.cond(spread) > MAX_CONDITION:
         raise PoseError(f"{where}the markers at rest lie on a line; a pose needs a plane")
     seen = np.where(known[:, None], xy_px, np.nan)
+    poses = _two_poses(flat[known], plain[known], bool(view.mirrored))
+    if not poses:
+        raise PoseError(f"{where}the markers at rest fix no pose")
     fits = [
         _refined([view.at(*pose)], flat, seen[None], cov_px2[None], (0.0, 0.0, 0.0), np.array([True]))
-        for pose in _two_poses(flat[known], plain[known], bool(view.mirrored))
+        for pose in poses
     ]
     fits.sort(key=lambda fit: fit.chi2)
     best, other = fits[0].views[0], fits[1].views[0]
@@ -116,12 +122,17 @@ def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
 
 
 def _two_poses(xyz: Array, plain: Array, mirrored: bool) -> list[tuple[Array, Array]]:
-    """The pose that a homography implies, and its mirror image about the line of sight to the markers' middle."""
+    """The pose that a homography implies, and its mirror image about the line of sight to the markers' middle.
+
+    None where there is no homography.
+    """
     flip = np.diag([-1.0 if mirrored else 1.0, 1.0, 1.0])
     homography, _ = cv2.findHomography(xyz[:, :2], plain * flip.diagonal()[:2])
-    if homography is None:
-        raise PoseError("the markers at rest fix no homography")
+    if homography is None or not np.isfinite(homography).all():
+        return []
     h = np.asarray(homography, np.float64)
+    if not np.linalg.norm(h[:, :2], axis=0).all():
+        return []
     h *= 2 / np.linalg.norm(h[:, :2], axis=0).sum()
     middle = xyz.mean(axis=0)
     if h[2] @ [middle[0], middle[1], 1.0] < 0:
@@ -172,7 +183,7 @@ def _refined(
             break
         scale = np.diag(normal.diagonal())
         step = np.zeros(len(chosen))
-        step[chosen] = np.linalg.solve(normal + damping * scale, gradient)
+        step[chosen] = _solved(normal + damping * scale, gradient)
         tried = [_moved(view, step[6 * i : 6 * i + 6]) for i, view in enumerate(now)]
         system_there = _system(tried, flat, xy_px, cov_px2, spread)
         if _cost(system_there[0], weight) <= _cost(away, weight):
@@ -185,12 +196,29 @@ def _refined(
     normal = (np.swapaxes(by_pose, 1, 2) @ weight @ by_pose).sum(axis=0)
     cov = np.zeros_like(normal)
     if free.any():
-        cov[np.ix_(chosen, chosen)] = np.linalg.inv(normal[np.ix_(chosen, chosen)])
+        cov[np.ix_(chosen, chosen)] = _solved(normal[np.ix_(chosen, chosen)], np.eye(int(chosen.sum())))
     squares = np.einsum("mi,mij,mj->m", away, weight, away)
     seen = finite(xy_px).sum(axis=0)
     misfit = np.sqrt(squares / np.where(seen > 0, 2.0 * seen, np.nan))
     residual = np.where(np.isfinite(xy_px), away.reshape(len(flat), -1, 2).swapaxes(0, 1), np.nan)
     return _Fit(now, cov, _cost(away, weight), misfit, residual)
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    """Solution of a normal system in its own scale.
+
+    Raises:
+        PoseError: it has none, as where all markers are off the image's model.
+    """
+    squares = normal.diagonal()
+    try:
+        if not (squares > 0).all():
+            raise np.linalg.LinAlgError
+        scale = np.sqrt(squares)
+        even = np.linalg.inv(normal / scale[:, None] / scale)
+    except np.linalg.LinAlgError:
+        raise PoseError("the markers at rest fix no pose") from None
+    return np.asarray(even @ (right.T / scale).T / (scale if right.ndim == 1 else scale[:, None]))
 
 
 def _cost(away: Array, weight: Array) -> float:
@@ -208,7 +236,7 @@ def _system(
     noise = np.zeros((markers, count, 2, count, 2))
     for v, view in enumerate(views):
         there, point, pose = view.linearised(flat)
-        seen = finite(xy_px[v]) & finite(cov_px2[v], 2)
+        seen = finite(xy_px[v])
         lost = seen & ~finite(there)
         away[seen, v] = (xy_px[v] - there)[seen]
         away[lost, v] = 1e6  # behind the camera: a step that goes there is refused
@@ -218,7 +246,10 @@ def _system(
     points = by_point.reshape(markers, 2 * count, 3)
     total = noise.reshape(markers, 2 * count, 2 * count) + points @ spread @ np.swapaxes(points, 1, 2)
     shape = (markers, 2 * count, 6 * count)
-    return away.reshape(markers, -1), by_pose.reshape(shape), np.asarray(np.linalg.inv(total))
+    root = np.sqrt(np.diagonal(total, axis1=1, axis2=2))
+    root = root[:, :, None] * root[:, None, :]
+    weight = np.linalg.inv(total / root + RIDGE * np.eye(2 * count)) / root
+    return away.reshape(markers, -1), by_pose.reshape(shape), np.asarray(weight)
 
 
 def _moved(view: View, step: Array) -> View:
@@ -228,6 +259,22 @@ def _moved(view: View, step: Array) -> View:
     turn, _ = cv2.Rodrigues(step[:3])
     left, _, right = np.linalg.svd(np.asarray(turn) @ view.R_camera_from_layout)
     return view.at(left @ right, view.t_camera_from_layout_mm + step[3:])
+
+
+def _require_fit(views: Sequence[View], fit: _Fit, xy_mm: Array, xy_px: Array) -> None:
+    """The markers at rest lie near where the layout puts them; a lens is a matter of pixels, not of edges."""
+    step_mm = np.linalg.norm(xy_mm[:, None] - xy_mm[None], axis=2)
+    nearest = np.where(step_mm > 0, step_mm, np.inf).argmin(axis=1)
+    for view, away, px in zip(views, fit.away_px, xy_px, strict=True):
+        edge_px = np.linalg.norm(px - px[nearest], axis=1)
+        if not np.isfinite(away).any() or not np.isfinite(edge_px).any():
+            continue
+        rms, limit = np.sqrt(np.nanmean(away**2)), MAX_RMS_EDGES * np.nanmedian(edge_px)
+        if rms > limit:
+            raise PoseError(
+                f"view {view.name!r}: at rest the markers lie {rms:.1f} px off where the layout puts them, more than "
+                f"{limit:.1f} px; check the layout, the rig's intrinsics and the rest frame"
+            )
 
 
 def _require_one_side(views: Sequence[View]) -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
@@ -50,6 +50,11 @@ class Rig:
                 raise RigError(
                     f"the view's name {name!r} is given {names.count(name)} times; give each its own"
                 )
+
+    def without_poses(self) -> Rig:
+        """The same views, to be placed by a rest frame; whether they are mirrored is kept."""
+        poseless = {"R_camera_from_layout": None, "t_camera_from_layout_mm": None}
+        return Rig(tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
 
     @property
     def names(self) -> tuple[str, ...]:

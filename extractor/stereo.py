@@ -18,10 +18,11 @@ from .errors import PoseError
 from .pose import Poses, place_views
 from .reference import Reference
 from .rig import Rig
-from .triangulation import GATE_SIGMAS, PointReason, Points, triangulate
+from .triangulation import DOUBT_SIGMAS, GATE_SIGMAS, PointReason, Points, triangulate
 from .types import Markers, Status, VirtualStatus
 
-MAX_SIGMA_EDGES = 0.25  # standard deviation of a position, above which it is not reported
+MAX_SIGMA_EDGES = 0.1  # standard deviation of a position, above which it is not reported
+CROWD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
 MIN_REST = 3  # markers that must have a place at rest
 
 
@@ -93,7 +94,7 @@ class Reconstructor:
         model_px: what the camera model leaves open, as a standard deviation per axis that is added to the pixels'
             own; None: what the rest frame's rays miss each other by beyond their covariances.
         gate_sigmas: misfit above which a marker is not reported.
-        max_sigma_mm: standard deviation of a position above which it is not reported; None: a quarter of an edge.
+        max_sigma_mm: standard deviation of a position above which it is not reported; None: a tenth of an edge.
 
     Attributes:
         poses: the views in their places, see ``Poses``.
@@ -144,7 +145,7 @@ class Reconstructor:
             markers: view by view, in the rig's order and the frame of the full image; None: no picture was had.
         """
         kept, problem = self._sorted_out(markers)
-        points = self._points(kept)
+        points = self._widened(self._points(kept))
         status = np.max(
             [
                 np.where(_seen(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
@@ -256,6 +257,17 @@ class Reconstructor:
             max_sigma_mm=self._max_sigma_mm,
             gate_sigmas=np.inf if model_px is not None else self._gate_sigmas,
         )
+
+    def _widened(self, points: Points) -> Points:
+        """Covariances where a whole neighbourhood's rays miss each other by more than they should.
+
+        Under a sharp contact gridlines bend more than extraction can follow, and its covariances do not say so.
+        """
+        around = self.field.mean_around(points.misfit**2)
+        more = np.where(around > CROWD_SIGMAS**2, around, 1.0)
+        done = np.where(points.misfit > DOUBT_SIGMAS, points.misfit**2, 1.0)
+        factor = np.where(np.isfinite(more), np.maximum(more / done, 1.0), 1.0)
+        return replace(points, cov_mm2=points.cov_mm2 * factor[:, None, None])
 
     def _unexplained_px(self, rest: Sequence[Markers]) -> float:
         """What the rest frame's rays miss each other by beyond their covariances; those far off do not count."""

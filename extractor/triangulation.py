@@ -14,11 +14,15 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera import Array, View, finite
+from .camera import Array, View, finite, is_covariance
 
 ITERATIONS = 12
 CONVERGED = 1e-5  # of a standard deviation
 GATE_SIGMAS = 6.0
+TOLERANCE_PX = (
+    0.1  # gridlines that bend more than extraction can follow err by so much beyond their covariance
+)
+SINGULAR = 1e-13  # smallest eigenvalue of information with a unit diagonal, below which it has no inverse
 DOUBT_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
 SOUND = 1e-14  # half the squared angle between two rays, below which they are one
 
@@ -30,7 +34,7 @@ class PointReason(IntEnum):
     UNSEEN = 1  # no view shows it
     ONE_VIEW = 2  # one view alone does: it lies somewhere on a ray
     NO_RAY = 3  # a pixel where the lens' distortion has no inverse
-    PARALLEL = 4  # the rays are too nearly parallel to tell its depth
+    PARALLEL = 4  # rays too nearly parallel, or pixels too uncertain, to tell its depth
     DISAGREE = 5  # the rays miss each other by more than their covariances allow
     SURROUNDINGS = 6  # a virtual marker, and an end of its edge is lost
 
@@ -62,6 +66,7 @@ def triangulate(
     cov_pose: Array | None = None,
     max_sigma_mm: float = np.inf,
     gate_sigmas: float = GATE_SIGMAS,
+    tolerance_px: float = TOLERANCE_PX,
 ) -> Points:
     """Where points lie that V placed views see.
 
@@ -71,9 +76,10 @@ def triangulate(
         cov_px2: (V, N, 2, 2) float64.
         cov_pose: (6 V, 6 V) of the poses' errors, which widen what residuals may be; None: the poses are exact.
         max_sigma_mm: standard deviation along its worst direction above which a point is ``PARALLEL``.
-        gate_sigmas: misfit above which a point is ``DISAGREE``.
+        gate_sigmas: misfit above which a point is ``DISAGREE``,
+        tolerance_px: if its residuals' norm over all views also is above this.
     """
-    seen = finite(xy_px) & finite(cov_px2, 2)
+    seen = finite(xy_px) & is_covariance(cov_px2)
     reason = np.where(seen.sum(axis=0) == 1, PointReason.ONE_VIEW, PointReason.NONE).astype(np.uint8)
     reason[~seen.any(axis=0)] = PointReason.UNSEEN
     start, ray = _nearest_to_rays(views, xy_px, seen)
@@ -83,8 +89,9 @@ def triangulate(
     out = _empty(len(reason), len(views), reason)
     if not len(use):
         return out
-    _solve(views, xy_px[:, use], cov_px2[:, use], seen[:, use], start[use], cov_pose, use, out)
-    _judge(out, use, max_sigma_mm, gate_sigmas)
+    miss_px = _solve(views, xy_px[:, use], cov_px2[:, use], seen[:, use], start[use], cov_pose, use, out)
+    gate = np.where(miss_px > tolerance_px, gate_sigmas, np.inf)
+    _judge(out, use, max_sigma_mm, gate)
     return out
 
 
@@ -128,8 +135,12 @@ def _solve(
     cov_pose: Array | None,
     use: NDArray[np.intp],
     out: Points,
-) -> None:
-    """Fill ``out`` at ``use``: all points step together, each by its own damped Gauss-Newton step."""
+) -> Array:
+    """Fill ``out`` at ``use``: all points step together, each by its own damped Gauss-Newton step.
+
+    Returns:
+        (N,) the norm of the residuals over all views, px.
+    """
     noise = np.where(seen[..., None, None], cov_px2, np.eye(2))
     weight = np.where(seen[..., None, None], np.linalg.inv(noise), 0.0)
     xyz, damping = start.copy(), np.zeros(len(start))
@@ -149,9 +160,11 @@ def _solve(
             break
     design = np.swapaxes(by_point, 2, 3) @ weight
     out.xyz_mm[use], out.cov_mm2[use] = xyz, _inverse((design @ by_point).sum(axis=0))
-    toward = -out.cov_mm2[use] @ (design @ by_pose)
+    bounded = np.where(np.isfinite(out.cov_mm2[use]), out.cov_mm2[use], 0.0)  # what is not is refused below
+    toward = -bounded @ (design @ by_pose)
     out.by_pose[use] = np.moveaxis(toward, 0, 2).reshape(len(use), 3, -1)
     out.misfit[use] = _misfit(away, by_point, by_pose, weight, seen, out.by_pose[use], cov_pose)
+    return np.asarray(np.sqrt((away**2).sum(axis=(0, 2))))
 
 
 def _residuals(
@@ -180,11 +193,15 @@ def _solved(normal: Array, gradient: Array) -> Array:
 
 
 def _inverse(normal: Array) -> Array:
-    """Inverses of 3 x 3 matrices; infinite variances where singular."""
-    sound = finite(normal, 2)
-    sound[sound] = np.linalg.eigvalsh(normal[sound])[:, 0] > 1e-300
+    """Inverses of 3 x 3 matrices, in their own scale; infinite variances where singular."""
     out = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
-    out[sound] = np.linalg.inv(normal[sound])
+    scale = np.diagonal(normal, axis1=1, axis2=2)
+    sound = finite(normal, 2) & (scale > 0).all(axis=1)
+    root = np.sqrt(scale[sound])
+    root = root[:, :, None] * root[:, None, :]
+    even = normal[sound] / root
+    good = np.linalg.eigvalsh(even)[:, 0] > SINGULAR
+    out[np.flatnonzero(sound)[good]] = np.linalg.inv(even[good]) / root[good]
     return out
 
 
@@ -208,7 +225,7 @@ def _misfit(
     return np.asarray(np.sqrt(_cost(away, weight) / freedom))
 
 
-def _judge(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate_sigmas: float) -> None:
+def _judge(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate: Array) -> None:
     """Widen the covariance of what is doubtful, take back what cannot be believed."""
     doubtful = use[out.misfit[use] > DOUBT_SIGMAS]
     out.cov_mm2[doubtful] *= out.misfit[doubtful, None, None] ** 2
@@ -218,7 +235,7 @@ def _judge(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate_sigmas:
     worst[sound] = np.sqrt(np.maximum(np.linalg.eigvalsh(cov[sound])[:, -1], 0))
     for doubt, reason in (
         (~(worst <= max_sigma_mm) | ~np.isfinite(worst), PointReason.PARALLEL),
-        (~(out.misfit[use] <= gate_sigmas), PointReason.DISAGREE),
+        (out.misfit[use] > gate, PointReason.DISAGREE),
     ):
         hit = doubt & (out.reason[use] == PointReason.NONE)
         out.reason[use[hit]] = reason

@@ -23,11 +23,11 @@ from .types import Markers
 Image = NDArray[Any]
 
 
-def cut(image: Image, view: View) -> Image:
+def cut(image: Any, view: View) -> Any:
     """The part of an image that a view fills.
 
     Raises:
-        ImageError: the area reaches beyond the image.
+        ImageError: not an image, or the area reaches beyond it.
     """
     if view.area_px is None:
         return image
@@ -79,7 +79,6 @@ class ViewExtractor:
         """
         found = []
         for view, picture in zip(self.rig.views, _images(image, self.rig), strict=True):
-            assert picture is not None
             found.append(shifted(self._extractor.extract(cut(picture, view)), _origin(view)))
         return tuple(found)
 

@@ -153,6 +153,35 @@ def test_two_cameras_are_two_sources(made: Path, tmp_path: Path) -> None:
     assert "REST lists 3 pictures, SOURCE 2" in refused(*command, "a,b,c", both, "-o", tmp_path / "e.npz")
 
 
+def test_given_poses_are_kept_or_found_again(made: Path, tmp_path: Path) -> None:
+    rig = made / "rig.toml"
+    text = rig.read_text(encoding="utf-8").split("[[view]]")
+    turned = np.array([[np.cos(0.02), -np.sin(0.02), 0], [np.sin(0.02), np.cos(0.02), 0], [0, 0, 1]])
+    tables = [
+        f"{table}R_camera_from_layout = {(camera.R_camera_from_layout @ turned).tolist()}\n"
+        f"t_camera_from_layout_mm = {camera.t_camera_from_layout_mm.tolist()}\n"
+        for table, camera in zip(text[1:], binocular(), strict=True)
+    ]
+    (tmp_path / "turned.toml").write_text("[[view]]" + "[[view]]".join(tables), encoding="utf-8")
+    command = (
+        "reconstruct",
+        made / "layout.json",
+        tmp_path / "turned.toml",
+        "0",
+        made / "frames",
+        "--frames",
+        "1",
+    )
+    found = {}
+    for name, options in (("kept", ()), ("found", ("--from-rest",))):
+        assert run(*command, "-o", tmp_path / f"{name}.npz", *options).exit_code == 0
+        with np.load(tmp_path / f"{name}.npz") as file:
+            found[name] = file["R_camera_from_layout"][0]
+    true = binocular()[0].R_camera_from_layout
+    np.testing.assert_allclose(found["kept"], true @ turned, atol=1e-12)
+    np.testing.assert_allclose(found["found"], true, atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("rig", "rest", "options", "said"),
     [

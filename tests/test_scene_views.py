@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
+from cmpdesign.layout import COLORS, Layout
 from cmpdesign.scene import (
     Blob,
     Camera,
@@ -183,6 +183,18 @@ def test_each_view_is_drawn_as_if_alone(layout: Layout) -> None:
         shown = alone.truth.marker_xy_px[alone.truth.visible]
         assert (shown[:, 0] >= x - 0.5).all() and (shown[:, 0] < x + width - 0.5).all()
         np.testing.assert_array_equal(truth.marker_xyz_mm, alone.truth.marker_xyz_mm)
+
+
+def test_colors_lie_in_every_view_where_the_truth_says(layout: Layout) -> None:
+    drawn = render(Scene(layout, halves(), inks=INKS), size=SIZE)
+    checked = 0
+    for xy_px, seen in zip(drawn.truth.marker_xy_px, drawn.truth.cell_visible, strict=True):
+        for cell in np.flatnonzero(seen):
+            x, y = xy_px[layout.cell_corners[cell]].mean(axis=0).round().astype(int)
+            expected = INKS[COLORS[layout.cell_color[cell]]][::-1]
+            np.testing.assert_allclose(drawn.image[y, x], expected, atol=1)
+            checked += 1
+    assert checked > 60
 
 
 def test_flat_views_have_a_homography_each(layout: Layout) -> None:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from view_scenes import HALF, SMALL, Array, binocular, binocular_shot, contact, reference, rig_of
 
+from cmpdesign.build import build_layout
+from cmpdesign.design import load_design
+from cmpdesign.scene import load_scene, render
+from cmpdesign.writers.layout_file import layout_to_json
 from extractor import (
     FrameStatus,
     ImageError,
@@ -19,6 +27,8 @@ from extractor import (
     View,
     ViewExtractor,
     VirtualStatus,
+    load_rig,
+    parse_layout,
 )
 
 LAYOUT = reference(layers=SMALL)
@@ -130,3 +140,41 @@ def test_images_that_do_not_fit_the_rig(plain: tuple[ViewExtractor, Reconstructo
         plain[0].extract(image)
     with pytest.raises(ImageError, match="3 images; give one for all views, or one for each of 2"):
         plain[0].extract([image] * 3)
+    with pytest.raises(ImageError, match="view 'right': the image is NoneType"):
+        plain[0].extract([np.zeros((360, 480, 3), np.uint8), None])  # type: ignore[list-item]
+
+
+def test_a_scene_file_is_a_rig_file() -> None:
+    """The virtual binocular of the templates: each view by one mirror, its pose given, or found in the rest frame."""
+    path = Path(__file__).parent.parent / "templates" / "scenes" / "tac3d-binocular.toml"
+    layout = build_layout(load_design("tac3d"))
+    found, rig = load_scene(path, layout), load_rig(path)
+    scene = found.scene()
+    rest = render(replace(scene, surface=None), size=found.size_px)
+    pressed = render(scene, size=found.size_px)
+    views = ViewExtractor(parse_layout(layout_to_json(layout)), rig)
+    seen = views.extract(rest.image), views.extract(pressed.image)
+    given, placed = (Reconstructor(views.layout, r, seen[0]) for r in (rig, rig.without_poses()))
+    for view, true in zip(placed.poses.views, rig.views, strict=True):
+        assert true.placed and view.mirrored and not rig.without_poses().views[0].placed
+        np.testing.assert_allclose(view.R_camera_from_layout, true.R_camera_from_layout, atol=2e-3)
+    for reconstructor in (given, placed):
+        shape = reconstructor.reconstruct(seen[1])
+        assert (shape.status != Status.LOST).mean() > 0.98
+        assert np.sqrt(np.nanmean((shape.xyz_mm - pressed.truth.marker_xyz_mm) ** 2)) < 0.003
+        assert np.nanmin(shape.displacement_mm[:, 2]) == pytest.approx(-0.8, abs=0.03)
+
+
+@pytest.mark.slow
+def test_the_benchmark_runs_and_its_figures_hold(tmp_path: Path) -> None:
+    out = tmp_path / "figures.json"
+    command = [sys.executable, "-m", "benchmarks.reconstruction", "--quick", "--json", str(out)]
+    root = Path(__file__).parent.parent
+    run = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600, check=False)
+    assert run.returncode == 0, run.stderr
+    results = json.loads(out.read_text(encoding="utf-8"))["results"]
+    assert len({(r["sensor"], r["state"]) for r in results}) == 16
+    for r in results:
+        assert r["reported_share"] > 0.95 and r["normalised"] < 4
+        if r["state"] in ("at rest", "ball 20 mm: press 0.5 mm"):
+            assert r["ratio_stated"] < 1.5 and r["ratio_image"] < 1.7 and 0.8 < r["normalised"] < 1.3

@@ -105,6 +105,7 @@ def noisy(
         cov_px2=cov,
         status=np.full(count, Status.MEASURED, np.uint8),
         virtual_xy_px=np.full((edges, virtual, 2), np.nan),
+        virtual_cov_px2=np.full((edges, virtual, 2, 2), np.nan),
         virtual_status=np.zeros((edges, virtual), np.uint8),
         mirrored=appears,
         reason=None,

@@ -34,6 +34,9 @@ def reconstruct(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
     ],
+    from_rest: Annotated[
+        bool, typer.Option("--from-rest", help="Place all views by REST, also those whose pose RIG gives.")
+    ] = False,
     flatness_mm: Annotated[
         float, typer.Option(metavar="MM", help="How far the markers may lie off the plane at rest.")
     ] = 0.0,
@@ -62,7 +65,7 @@ def reconstruct(
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
-    run = _prepared(layout, rig, rest, source, output, flatness_mm, model_px, fps, cold)
+    run = _prepared(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
     run.limit = frames
     try:
         go(run, "reconstructing")
@@ -80,6 +83,7 @@ def _prepared(
     rest: str,
     source: str,
     output: Path,
+    from_rest: bool,
     flatness_mm: float,
     model_px: float | None,
     fps: float | None,
@@ -93,7 +97,8 @@ def _prepared(
     from cmpdesign.tracking.sources import open_sources
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
-    views = ViewExtractor(load_layout(layout), load_rig(rig), "accurate")
+    known = load_rig(rig)
+    views = ViewExtractor(load_layout(layout), known.without_poses() if from_rest else known, "accurate")
     at_rest = views.extract(_at_rest(rest, source, fps))
     reconstructor = Reconstructor(
         views.layout, views.rig, at_rest, flatness_mm=(0.0, 0.0, flatness_mm), model_px=model_px

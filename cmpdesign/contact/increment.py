@@ -1,6 +1,5 @@
 """One increment of a contact with Coulomb friction.
 
-
 Normal and tangential tractions act on each other (C_xz), so every increment is solved for all three at once. Within one
 increment a cell in contact sticks to the place of the object that it touched before, or slips against its friction. A
 cell that comes into contact sticks where it is.
@@ -11,7 +10,7 @@ Only how far it has slid over the object since is followed, so that a sliding co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +108,7 @@ def advance(problem: Problem, state: State, motion: Motion) -> State:
         if not through.any():
             return found
         near |= through
-        start = found.traction_mpa
+        start, state = found.traction_mpa, replace(state, iterations=found.iterations)
 
 
 def _box_around(cells: Mask, shape: tuple[int, int]) -> Box:

@@ -90,10 +90,10 @@ def _grid_warnings(problem: Problem, touched: NDArray[np.bool_]) -> Iterator[str
             f"the contact covers {np.count_nonzero(touched)} cells of {step:.3g} mm, below {FEWEST_CELLS}; "
             "take a finer grid or a smaller size_mm"
         )
-    rim = np.concatenate([touched[0], touched[-1], touched[:, 0], touched[:, -1]])
-    if rim.any():
+    at_edge = np.count_nonzero(touched) - np.count_nonzero(touched[1:-1, 1:-1])
+    if at_edge:
         yield (
-            f"the contact reaches the edge of the solved area in {np.count_nonzero(rim)} cells: nothing is touched "
+            f"the contact reaches the edge of the solved area in {at_edge} cells: nothing is touched "
             "beyond it, though the layer goes on; take a larger size_mm or a smaller object"
         )
 

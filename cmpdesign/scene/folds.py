@@ -2,8 +2,9 @@
 
 ``coverage`` adds every cell with the sign of its facing. Where the surface turns away and back again, three sheets lie
 over a pixel, +1, -1 and +1, and their sum is right only if they have the same color. So the places where a part turns
-away are drawn again from small triangles, at ``SAMPLES`` x ``SAMPLES`` points a pixel: the nearest sheet's color less
-the signed sum of all sheets is what is missing there. Everywhere else it is 0, and the image stays exact.
+away are drawn again from small triangles, at ``SAMPLES`` x ``SAMPLES`` points a pixel, in the colors of a flat picture
+of the layout: the nearest sheet's color less the signed sum of all sheets is what is missing there. Everywhere else it
+is 0, and the image stays exact.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from cmpdesign.layout import Layout
 from cmpdesign.scene.camera import pitch_mm
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.optics import REACH_SIGMA, box_gaussian
-from cmpdesign.scene.patches import Patches, patches, subdivision
+from cmpdesign.scene.patches import patches, subdivision
 
 Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
@@ -27,6 +28,8 @@ COARSE, FINE = 4, 16  # parts of a patch's side: to look for folds, and to draw 
 SUSPECT = 0.35  # of the median facing area per layout area: below, it is looked at more closely
 LARGEST_SHARE = 0.1  # of the pattern that may turn away
 TILE_PX, SAMPLES = 32, 8
+TEXELS = 64  # of the flat picture, to a pitch
+LARGEST_TEXTURE = 2048
 DEPTH_SHARE = 0.02  # of the pitch: sheets nearer to each other count as one
 
 
@@ -36,21 +39,33 @@ class Folds:
 
     Attributes:
         xyd: (T, 3, 3) float64: x and y in px of the view's area, depth in mm.
-        cell: (T,) int64, as in ``Patches``.
+        corners_mm: (T, 3, 2) float64, in the layout.
         facing: (T,) float64, 1 towards the camera, -1 away.
         tiles: (K, 2) int64, corners of the tiles of ``TILE_PX`` that hold such places.
         share: of the pattern's area that turns away.
         place_mm: (2,) where, in the layout.
         tolerance_mm: depths that differ by less count as the same sheet.
+        texel_mm: of the flat picture.
     """
 
     xyd: Points
-    cell: NDArray[np.int64]
+    corners_mm: Points
     facing: Points
     tiles: NDArray[np.int64]
     share: float
     place_mm: Points
     tolerance_mm: float
+    texel_mm: float
+
+    def texels_from_layout(self, xy_mm: Points) -> Points:
+        """(..., 2) mm to texels of the flat picture; (0, 0) is the centre of its first."""
+        return np.asarray((xy_mm - self.corners_mm.min(axis=(0, 1))) / self.texel_mm)
+
+    @property
+    def texture_size(self) -> tuple[int, int]:
+        """Width and height of the flat picture that holds all small triangles."""
+        width, height = np.ceil(self.texels_from_layout(self.corners_mm).max(axis=(0, 1))).astype(int) + 1
+        return int(width), int(height)
 
 
 def find_folds(
@@ -73,13 +88,13 @@ def find_folds(
     suspects = np.asarray((facing < SUSPECT * np.median(facing)).any(axis=1))
     if not suspects.any():
         return None
-    close = ground.only(suspects)
+    close = ground[suspects]
     fine, fine_mm = _mapped(close, seen, FINE), _nodes(close, FINE)
     away = sign * _areas(fine) < 0
     if not away.any():
         return None
     areas_mm = _areas(fine_mm)
-    share = float(areas_mm[away].sum() / _areas(ground.corners_mm[:, None]).sum())
+    share = float(areas_mm[away].sum() / _areas(ground).sum())
     place = fine_mm[away].mean(axis=1)[np.argmax(areas_mm[away])]
     if share > LARGEST_SHARE:
         raise SceneError(
@@ -88,29 +103,32 @@ def find_folds(
             "a larger radius or a camera that looks more steeply"
         )
     tiles = _tiles(fine[away], area_size)
-    around = ground.only(_touching(coarse, tiles))
+    around = ground[_touching(coarse, tiles)]
     xyd = _mapped(around, seen, FINE)
+    corners_mm = _nodes(around, FINE).reshape(-1, 3, 2)
+    span_mm = float(np.ptp(corners_mm, axis=(0, 1)).max())
     return Folds(
         xyd=xyd.reshape(-1, 3, 3),
-        cell=np.repeat(around.cell, FINE**2),
+        corners_mm=corners_mm,
         facing=np.sign(sign * _areas(xyd)).ravel(),
         tiles=tiles,
         share=share,
         place_mm=place,
         tolerance_mm=DEPTH_SHARE * pitch_mm(layout),
+        texel_mm=max(pitch_mm(layout) / TEXELS, span_mm / LARGEST_TEXTURE),
     )
 
 
-def _nodes(ground: Patches, parts: int) -> Points:
+def _nodes(ground: Points, parts: int) -> Points:
     """(P, parts^2, 3, 2) mm: the small triangles' corners."""
     at, small = subdivision(parts)
-    return np.asarray((at @ ground.corners_mm)[:, small])
+    return np.asarray((at @ ground)[:, small])
 
 
-def _mapped(ground: Patches, seen: Callable[[Points], Points], parts: int) -> Points:
+def _mapped(ground: Points, seen: Callable[[Points], Points], parts: int) -> Points:
     """(P, parts^2, 3, 3): x, y in px and depth in mm of the small triangles' corners."""
     at, small = subdivision(parts)
-    nodes = at @ ground.corners_mm
+    nodes = at @ ground
     mapped = seen(nodes.reshape(-1, 2))
     return np.asarray(mapped.reshape(*nodes.shape[:2], 3)[:, small])
 
@@ -143,22 +161,23 @@ def _touching(coarse: Points, tiles: NDArray[np.int64]) -> NDArray[np.bool_]:
     return found
 
 
-def add_hidden_parts(planes: Planes, folds: Folds, values: Points, blur_px: float) -> None:
+def add_hidden_parts(planes: Planes, folds: Folds, texture: Planes, blur_px: float) -> None:
     """Correct an area's planes (n, height, width), made by ``coverage``, in place.
 
     Args:
         planes: the signed sums.
         folds: of the view.
-        values: (C + 1, n): what each cell shows, the border last.
+        texture: (n, height, width) the same sums for the flat layout, of ``folds.texture_size``.
         blur_px: the optics' blur.
     """
     from cmpdesign.scene.folds_compiled import sample_tile
 
+    uv = folds.texels_from_layout(folds.corners_mm)
     height, width = planes.shape[1:]
     reach = int(np.ceil(REACH_SIGMA * blur_px + 1)) if blur_px else 0
     offset = (np.arange(TILE_PX * SAMPLES) + 0.5) / SAMPLES - 0.5
     for left, top in folds.tiles:
-        missing = sample_tile(folds.xyd, folds.cell, folds.facing, values, left, top, TILE_PX, SAMPLES)
+        missing = sample_tile(folds.xyd, uv, folds.facing, texture, left, top, TILE_PX, SAMPLES)
         rows = np.arange(max(top - reach, 0), min(top + TILE_PX + reach, height))
         columns = np.arange(max(left - reach, 0), min(left + TILE_PX + reach, width))
         down = _response(rows[:, None] - (top + offset), blur_px)

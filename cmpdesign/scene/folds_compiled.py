@@ -13,38 +13,51 @@ Points = NDArray[np.float64]
 @_compiled
 def sample_tile(
     xyd: Points,
-    cell: NDArray[np.int64],
+    uv: Points,
     facing: Points,
-    values: Points,
+    texture: NDArray[np.float32],
     left: int,
     top: int,
     size: int,
     samples: int,
 ) -> Points:
     """(planes, size * samples, size * samples): the nearest sheet's value less the signed sum of all sheets."""
-    count, planes = size * samples, values.shape[1]
+    count, planes = size * samples, len(texture)
     result = np.zeros((planes, count, count))
     depth = np.full((count, count), np.inf)
-    nearest = np.full((count, count), -2)
+    nearest = np.zeros((planes, count, count))
+    value = np.empty(planes)
     for t in range(len(xyd)):
         x_low, x_high = _range(xyd[t, 0, 0], xyd[t, 1, 0], xyd[t, 2, 0], left, count, samples)
         y_low, y_high = _range(xyd[t, 0, 1], xyd[t, 1, 1], xyd[t, 2, 1], top, count, samples)
         for j in range(y_low, y_high):
             y = top - 0.5 + (j + 0.5) / samples
             for i in range(x_low, x_high):
-                found = _depth_at(xyd[t], left - 0.5 + (i + 0.5) / samples, y)
-                if found == np.inf:
+                a, b, c = _shares(xyd[t], left - 0.5 + (i + 0.5) / samples, y)
+                if a < 0:
                     continue
+                u = a * uv[t, 0, 0] + b * uv[t, 1, 0] + c * uv[t, 2, 0]
+                v = a * uv[t, 0, 1] + b * uv[t, 1, 1] + c * uv[t, 2, 1]
+                _look_up(texture, u, v, value)
+                away = a * xyd[t, 0, 2] + b * xyd[t, 1, 2] + c * xyd[t, 2, 2]
                 for plane in range(planes):
-                    result[plane, j, i] -= facing[t] * values[cell[t], plane]
-                if found < depth[j, i]:
-                    depth[j, i], nearest[j, i] = found, cell[t]
-    for plane in range(planes):
-        for j in range(count):
-            for i in range(count):
-                if nearest[j, i] > -2:
-                    result[plane, j, i] += values[nearest[j, i], plane]
-    return result
+                    result[plane, j, i] -= facing[t] * value[plane]
+                    if away < depth[j, i]:
+                        nearest[plane, j, i] = value[plane]
+                depth[j, i] = min(depth[j, i], away)
+    return result + nearest
+
+
+@_compiled
+def _look_up(texture: NDArray[np.float32], u: float, v: float, value: Points) -> None:
+    """Every plane's value at a place, linear between the centres of texels."""
+    _, height, width = texture.shape
+    column, row = min(max(int(u), 0), width - 2), min(max(int(v), 0), height - 2)
+    right, down = u - column, v - row
+    for plane in range(len(value)):
+        upper = (1 - right) * texture[plane, row, column] + right * texture[plane, row, column + 1]
+        lower = (1 - right) * texture[plane, row + 1, column] + right * texture[plane, row + 1, column + 1]
+        value[plane] = (1 - down) * upper + down * lower
 
 
 @_compiled
@@ -57,15 +70,16 @@ def _range(a: float, b: float, c: float, start: int, count: int, samples: int) -
 
 
 @_compiled
-def _depth_at(triangle: Points, x: float, y: float) -> float:
-    """The depth of a triangle (3, 3) at a point; inf outside it."""
+def _shares(triangle: Points, x: float, y: float) -> tuple[float, float, float]:
+    """Barycentric coordinates of a point in a triangle (3, 3); negative ones outside it."""
     ax, ay = triangle[0, 0] - x, triangle[0, 1] - y
     bx, by = triangle[1, 0] - x, triangle[1, 1] - y
     cx, cy = triangle[2, 0] - x, triangle[2, 1] - y
     a, b, c = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
     if not ((a > 0 and b > 0 and c > 0) or (a < 0 and b < 0 and c < 0)):
-        return np.inf
-    return (a * triangle[0, 2] + b * triangle[1, 2] + c * triangle[2, 2]) / (a + b + c)  # type: ignore[no-any-return]
+        return -1.0, -1.0, -1.0
+    total = a + b + c
+    return a / total, b / total, c / total
 
 
 @_compiled
@@ -78,5 +92,7 @@ def nearest_depth(xyd: Points, points: Points) -> Points:
         for n in range(len(points)):
             x, y = points[n, 0], points[n, 1]
             if low_x <= x <= high_x and low_y <= y <= high_y:
-                found[n] = min(found[n], _depth_at(xyd[t], x, y))
+                a, b, c = _shares(xyd[t], x, y)
+                if a >= 0:
+                    found[n] = min(found[n], a * xyd[t, 0, 2] + b * xyd[t, 1, 2] + c * xyd[t, 2, 2])
     return found

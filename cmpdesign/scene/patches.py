@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -12,34 +11,19 @@ from cmpdesign.layout import Layout
 from cmpdesign.scene.camera import pitch_mm
 
 Points = NDArray[np.float64]
-BORDER = -1
-
-
-@dataclass(frozen=True, eq=False)
-class Patches:
-    """Triangles that fill a layout's outline.
-
-    Attributes:
-        corners_mm: (P, 3, 2) float64, counter-clockwise from the front.
-        cell: (P,) int64, the cell that each is part of; ``BORDER`` beside them.
-    """
-
-    corners_mm: Points
-    cell: NDArray[np.int64]
-
-    def only(self, chosen: NDArray[np.bool_]) -> Patches:
-        """Those that are chosen, (P,)."""
-        return Patches(self.corners_mm[chosen], self.cell[chosen])
 
 
 @lru_cache(maxsize=4)
-def patches(layout: Layout) -> Patches:
-    """The layout's patches; a square cell is two of them."""
+def patches(layout: Layout) -> Points:
+    """(P, 3, 2) mm: triangles that fill a layout's outline, counter-clockwise from the front.
+
+    First the cells in their order (of square ones the first half of each, then the second), then the border.
+    """
     corners = layout.marker_xy_mm[layout.cell_corners]
     fans = [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
-    border = _border(layout, corners)
-    cell = np.concatenate([*[np.arange(len(corners))] * len(fans), np.full(len(border), BORDER)])
-    return Patches(np.concatenate([*fans, border]), cell)
+    found = np.concatenate([*fans, _border(layout, corners)])
+    found.setflags(write=False)
+    return found
 
 
 def _border(layout: Layout, cells_mm: Points) -> Points:

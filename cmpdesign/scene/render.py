@@ -16,7 +16,7 @@ from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.folds import add_hidden_parts
 from cmpdesign.scene.light import gain
 from cmpdesign.scene.optics import point_spread
-from cmpdesign.scene.paths import Segments, join, segments
+from cmpdesign.scene.paths import join, segments
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.sensor import Sensor, expose
 from cmpdesign.scene.truth import Truth
@@ -112,24 +112,17 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
         polygons = bled(polygons, bleed_mm, _rng(scene, BLEED))
-    ground = segments(layout.outline_mm[None], view.area_from_layout, view.curved)
-    cells = segments(polygons, view.area_from_layout, view.curved)
-
     # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
     black = _bgr(scene.ink(BLACK))
-    inks_of = _over_black(scene, drawn)
+    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
+        -1, 3
+    )
     values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
     values[0, 3] = 1.0
-    values[1:, :3] = inks_of[drawn]
+    values[1:, :3] = over_black
     if bleed_mm:
         values[1:, 4] = 1.0
-    covered = coverage(
-        join([ground, cells]), values, view.area[2:], point_spread(scene.blur_px), engine, view.orientation
-    )
-    if view.folds is not None:
-        _require_clean(scene)
-        sheets = np.column_stack([inks_of, np.ones(len(inks_of))])
-        add_hidden_parts(covered, view.folds, sheets, scene.blur_px)
+    covered = _summed(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
 
     inks, ground_share = covered[:3], covered[3]
     if bleed_mm:
@@ -138,23 +131,24 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
     return np.asarray(inks + behind + ground_share * (black_plane - behind), dtype=np.float32)
 
 
-def _over_black(scene: Scene, drawn: NDArray[np.int64]) -> Points:
-    """(C + 1, 3) B, G, R over black of the cells that are drawn; 0 of the others, and of the border (last)."""
-    color, black = scene.layout.cell_color, _bgr(scene.ink(BLACK))
-    over = np.zeros((len(color) + 1, 3))
-    for ink in np.unique(color[drawn]):
-        over[drawn[color[drawn] == ink]] = _bgr(scene.ink(int(ink))) - black
-    return over
+def _summed(view: View, polygons_mm: list[Points], values: Points, blur_px: float, engine: Engine) -> Planes:
+    """(planes, height, width): what polygons (K, n, 2) of the layout add up to in a view's area, hidden parts left out.
 
-
-def _require_clean(scene: Scene) -> None:
-    """Hidden parts are drawn from cells as designed."""
-    damage = scene.damage
-    if damage and (damage.bleed_mm or damage.blobs or damage.scratches):
-        raise SceneError(
-            "a part of the surface turns away from the camera; with that, bleed_mm, blobs and scratches cannot be "
-            "drawn: take them out of the damage or take a smaller displacement"
-        )
+    Args:
+        view: the view.
+        polygons_mm: counter-clockwise ones.
+        values: (polygons, planes) what each adds to each plane.
+        blur_px: the optics' blur.
+        engine: see ``coverage``.
+    """
+    spread, folds = point_spread(blur_px), view.folds
+    seen = join([segments(part, view.area_from_layout, view.curved) for part in polygons_mm])
+    planes = coverage(seen, values, view.area[2:], spread, engine, view.orientation)
+    if folds is not None:
+        flat = join([segments(part, folds.texels_from_layout, False) for part in polygons_mm])
+        texture = coverage(flat, values, folds.texture_size, point_spread(0.0), engine)
+        add_hidden_parts(planes, folds, texture, blur_px)
+    return planes
 
 
 def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -173,11 +167,8 @@ def _blurred(planes: Planes, blur_px: float) -> Planes:
 def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engine: Engine) -> Planes:
     """Blobs and scratches over the pattern; where they overlap, they mix."""
     spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
-    outlines: list[Segments] = [
-        segments(spot.polygon()[None], view.area_from_layout, view.curved) for spot in spots
-    ]
     values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
-    covered = coverage(join(outlines), values, view.area[2:], point_spread(blur_px), engine)
+    covered = _summed(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
     overlap = np.maximum(covered[3], 1.0)
     return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
 
