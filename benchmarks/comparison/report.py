@@ -83,7 +83,7 @@ def picture(results: Sequence[Result]) -> bytes:
     from matplotlib import pyplot
     from matplotlib.lines import Line2D
 
-    figure, axis = pyplot.subplots(figsize=(9.0, 5.4))
+    figure, axis = pyplot.subplots(figsize=(7.0, 5.2))
     drawn = [r for r in results if r.found_share >= MIN_FOUND]
     for r in drawn:
         axis.plot(
@@ -94,7 +94,7 @@ def picture(results: Sequence[Result]) -> bytes:
         bound = next(flat[m.name].bound_px for m in METHODS if m.board == board and m.name in flat)
         axis.axhline(bound, color="#444444", linestyle="--" if board else "-", linewidth=1)
         axis.annotate(
-            words, (1.0, bound), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8
+            words, (1.0, bound), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7
         )
     axis.set(
         xscale="log", yscale="log", xlabel="time, ms an image, one core", ylabel="RMS error per axis, px"
@@ -107,8 +107,7 @@ def picture(results: Sequence[Result]) -> bytes:
     )
     axis.add_artist(first)
     axis.legend(handles=scenes, fontsize=8, loc="lower left", bbox_to_anchor=(1.01, 0.0), frameon=False)
-    figure.tight_layout()
     data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=100, metadata={"Software": None}, bbox_extra_artists=(first,))
+    figure.savefig(data, format="png", dpi=100, metadata={"Software": None}, bbox_inches="tight")
     pyplot.close(figure)
     return data.getvalue()
