@@ -54,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         write_json(options.json, found)
     if options.publish:
-        for path in publish("comparison", found, {"comparison": markdown(results)}):
+        for path in publish("comparison", found, {"comparison": markdown(results), "conditions": sentence()}):
             console.print(f"wrote {path}")
     return 0
 

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks import accuracy, extraction
 from benchmarks.comparison.measure import Result
 from benchmarks.comparison.report import markdown, picture
+from benchmarks.machine import sentence
 from benchmarks.published import measured, pages_with
 
 
-def _results() -> list[Result]:
+def _compared() -> list[Result]:
     return [Result(**row) for row in measured("comparison")["results"]]
 
 
 def figures() -> dict[str, bytes]:
     """Name in docs/images -> PNG."""
-    return {"speed-error.png": picture(_results())}
+    return {"speed-error.png": picture(_compared())}
 
 
 def pages() -> dict[Path, str]:
-    """The pages that show a measured table."""
-    return pages_with({"comparison": markdown(_results())})
+    """README and the pages of docs/ that show a measured table."""
+    precise = [accuracy.Result(**row) for row in measured("accuracy")["results"]]
+    conditions = sentence(measured("comparison")["conditions"])
+    blocks = {"comparison": markdown(_compared()), "conditions": conditions}
+    return pages_with(blocks | accuracy.blocks(precise) | extraction.markdown(measured("extraction")))
