@@ -15,6 +15,7 @@ HUE_REACH_DEG = 50.0  # a hue farther than this from its nominal one is not that
 LEVEL_SHARE = 0.4  # a pixel shows an ink when its chroma exceeds this share of that ink's local level
 TILE_PX = 32
 SHRINK = 8  # pixels per side of a tile of the target area
+SURVEY_PIXELS = 20_000  # every other pixel of every other row of larger images tells the hues and levels
 MIN_CHROMA = 12  # below this, 8-bit hue is noise
 OPENCV_HUE_DEG = 2.0
 HUE_WIDTH_DEG = 40.0  # pixels farther from every center tell nothing about it
@@ -70,7 +71,7 @@ def _chroma(hsv):  # type: ignore[no-untyped-def]
 @compiled
 def _survey(hsv, chroma, step):  # type: ignore[no-untyped-def]
     """Histogram (180 hues, 256 chromas) over every ``step``-th pixel of every ``step``-th row."""
-    histogram = np.zeros((HUES, 256), np.int64)
+    histogram = np.zeros((HUES, 256), np.int32)
     for y in range(0, hsv.shape[0], step):
         for x in range(0, hsv.shape[1], step):
             if chroma[y, x] >= MIN_CHROMA:
@@ -191,19 +192,33 @@ def _centers(weight, nominal_deg):  # type: ignore[no-untyped-def]
     return shift, True
 
 
-def find_hues(histogram: NDArray[np.int64], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
+@compiled
+def _hue_weights(histogram):  # type: ignore[no-untyped-def]
+    """(180,) the chroma of the pixels of each hue, summed over those that are not pale; zeros without any."""
+    of_chroma = np.zeros(256, np.int64)
+    for hue in range(HUES):
+        for chroma in range(MIN_CHROMA, 256):
+            of_chroma[chroma] += histogram[hue, chroma]
+    limit, below, strong = STRONG_SHARE * of_chroma.sum(), 0, 0
+    while strong < 255 and below + of_chroma[strong] < limit:
+        below += of_chroma[strong]
+        strong += 1
+    weight = np.zeros(HUES)
+    for hue in range(HUES):
+        for chroma in range(max(MIN_CHROMA, strong // 8), 256):
+            weight[hue] += chroma * histogram[hue, chroma]
+    return weight
+
+
+def find_hues(histogram: NDArray[np.int32], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """(3,) hues in degrees around which the image's saturated pixels gather, or None without such pixels.
 
     Circular 3-means from the nominal hues on the chroma-weighted histogram. White balance and colored light move
     hues; a shift past ``HUE_REACH_DEG`` could rename the inks and is refused.
     """
-    of_chroma = histogram.sum(axis=0)
-    of_chroma[:MIN_CHROMA] = 0
-    if not of_chroma.any():
+    weight = _hue_weights(histogram)
+    if not weight.any():
         return None
-    strong = int(np.searchsorted(np.cumsum(of_chroma), STRONG_SHARE * of_chroma.sum()))
-    floor = max(MIN_CHROMA, strong // 8)
-    weight = histogram[:, floor:] @ np.arange(floor, 256, dtype=np.float64)
     shift, found = _centers(weight, nominal_deg)
     return (nominal_deg + shift) % 360 if found else None
 
@@ -216,7 +231,7 @@ def _upper_quartile(values: NDArray[np.float32]) -> float:
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
     """Stage 2: label every pixel of the target area with its ink; None when one of the three inks is absent."""
     hsv, chroma = colors.hsv, colors.chroma
-    step = 2 if chroma.size > 100_000 else 1
+    step = 2 if chroma.size > SURVEY_PIXELS else 1
     hues = find_hues(_survey(hsv, chroma, step), nominal_deg)
     if hues is None:
         return None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
 from .engine import compiled
+from .sight import Frame
 from .topology import Topology
 
 INKS = 5  # red, green, blue, black, white
@@ -26,14 +27,6 @@ CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
 ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
-
-
-class Frame(NamedTuple):
-    """The image coordinates of the polynomials: (x - x) / scale, (y - y) / scale."""
-
-    x: float
-    y: float
-    scale: float
 
 
 class Levels(NamedTuple):

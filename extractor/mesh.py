@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
+from .delaunay import delaunay
 from .engine import compiled
 
 MAX_FLIP_ROUNDS = 12
@@ -136,14 +137,8 @@ def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-unt
 
 def build_mesh(cells: Cells) -> Mesh | None:
     """Stage 6: Delaunay triangles of the centers, corrected by color; None with fewer than three cells."""
-    from scipy.spatial import Delaunay, QhullError
-
-    if len(cells.ink) < 3:
+    faces, neighbours = delaunay(cells.center_px)
+    if len(faces) == 0:  # all on one line
         return None
-    try:
-        delaunay = Delaunay(cells.center_px)
-    except QhullError:  # all on one line
-        return None
-    faces, neighbours = delaunay.simplices.astype(np.int32), delaunay.neighbors.astype(np.int32)
     _flip(cells.center_px, cells.ink, faces, neighbours)
     return Mesh(*_judge(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours))

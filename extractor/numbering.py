@@ -39,10 +39,10 @@ MIN_CELLS = 9  # or all, in a layout that has fewer
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 WITNESSES = 80  # faces that say which turn is that of the markers
-KEY = 1 << 16  # q KEY + r is one number for an axial place
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
 # From a cell's center to theirs, in axial steps, and in edges of an equilateral lattice.
+STEP_REACH = 6
 OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
@@ -69,24 +69,6 @@ class Numbering:
     conflicts: int
     ambiguous: bool = False
     origin: Origin = Origin.WHITE
-
-
-@compiled
-def _colors_at(image, point, radius, out):  # type: ignore[no-untyped-def]
-    """Write the mean color around each point, NaN outside the image."""
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    for i in range(point.shape[0]):
-        if not sample_patch(flat, height, width, point[i, 0], point[i, 1], radius[i], out[i]):
-            out[i] = np.nan
-
-
-def colors_at(
-    image: NDArray[np.uint8], point: NDArray[np.float64], radius: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(N, 3) the mean B, G, R around each of (N, 2) points; NaN outside the image or where a point is NaN."""
-    out = np.empty((len(point), 3))
-    _colors_at(image, np.ascontiguousarray(point), radius, out)
-    return out
 
 
 @compiled
@@ -143,20 +125,42 @@ def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignor
     return at, bad
 
 
+@compiled
+def _innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
+    """The sound face nearest to the middle of its part of the mesh, or -1: rims are often damaged."""
+    x, y = 0.0, 0.0
+    for f in members:
+        for k in range(3):
+            x += center[faces[f, k], 0]
+            y += center[faces[f, k], 1]
+    x, y = x / members.shape[0], y / members.shape[0]  # of sums over three, as below
+    best, nearest = -1, np.inf
+    for f in members:
+        a, b, c = faces[f]
+        if blocked[a] or blocked[b] or blocked[c]:
+            continue
+        dx = center[a, 0] + center[b, 0] + center[c, 0] - x
+        dy = center[a, 1] + center[b, 1] + center[c, 1] - y
+        if dx * dx + dy * dy < nearest:
+            best, nearest = f, dx * dx + dy * dy
+    return best
+
+
 def _number_part(
-    mesh: Mesh, part: NDArray[np.intp], front: int, reach: int, cells: int
+    cells: Cells, mesh: Mesh, part: NDArray[np.intp], front: int, reach: int
 ) -> tuple[NDArray[np.int32], int]:
-    """Walk a part of the mesh from its first face; cells that are contradicted are left out and it is walked again."""
-    blocked = np.zeros(cells, np.bool_)
+    """Walk a part of the mesh from its middle; cells that are contradicted are left out and it is walked again."""
+    count = len(cells.ink)
+    blocked = np.zeros(count, np.bool_)
     for _ in range(MAX_ROUNDS):
-        sound = part[~blocked[mesh.faces[part]].any(axis=1)]
-        if len(sound) == 0:
+        start = _innermost(cells.center_px, mesh.faces, part, blocked)
+        if start < 0:
             break
-        at, bad = _walk(sound[0], mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
+        at, bad = _walk(start, mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
         if not bad.any():
             return at, int(blocked.sum())
         blocked |= bad
-    return np.full((cells, 2), UNKNOWN, np.int32), int(blocked.sum())
+    return np.full((count, 2), UNKNOWN, np.int32), int(blocked.sum())
 
 
 @compiled
@@ -203,10 +207,10 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     outside is the reference, unless two do so equally well: then nothing is reported.
     """
     found: list[tuple[int, Numbering]] = []
-    parts = _largest_parts(cells, mesh)
+    parts = _largest_parts(mesh)
     for front in _fronts(image, cells, mesh):
         for part in parts:
-            at, conflicts = _number_part(mesh, part, front, 2 * lattice.layers + 2, len(cells.ink))
+            at, conflicts = _number_part(cells, mesh, part, front, 2 * lattice.layers + 2)
             found += _with_white(image, cells, lattice, at, front, conflicts)
             if not found:
                 found += _with_outline(cells, lattice, at, front, conflicts)
@@ -233,15 +237,36 @@ def _with_outline(
     return [(int((settled >= 0).sum()), Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE))]
 
 
+@compiled
+def _brightness(image, center, faces, turn, every):  # type: ignore[no-untyped-def]
+    """(F // every + 1, 2): the turn of every n-th face and its middle's brightness, NaN outside the image."""
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    out, color = np.full((turn.shape[0] // every + 1, 2), np.nan), np.zeros(3)
+    number_of = 0
+    for f in range(turn.shape[0]):
+        if turn[f] == 0:
+            continue
+        number_of += 1
+        if number_of % every != 0:
+            continue
+        x, y = 0.0, 0.0
+        for k in range(3):
+            x += center[faces[f, k], 0] / 3
+            y += center[faces[f, k], 1] / 3
+        nearest = np.inf
+        for k in range(3):
+            nearest = min(nearest, np.hypot(center[faces[f, k], 0] - x, center[faces[f, k], 1] - y))
+        if sample_patch(flat, height, width, x, y, 0.12 * nearest, color):
+            row = number_of // every - 1
+            out[row, 0], out[row, 1] = turn[f], color.sum()
+    return out
+
+
 def _fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
     """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
-    faces = np.flatnonzero(mesh.turn)
-    faces = faces[:: max(1, len(faces) // WITNESSES)]
-    corner = cells.center_px[mesh.faces[faces]]
-    middle = corner.mean(axis=1)
-    radius = 0.12 * np.linalg.norm(corner - middle[:, None], axis=2).min(axis=1)
-    ratio = colors_at(image, middle, radius).sum(axis=1)
-    plus, minus = (ratio[(mesh.turn[faces] == turn) & np.isfinite(ratio)] for turn in (1, -1))
+    every = max(1, int((mesh.turn != 0).sum()) // WITNESSES)
+    turn, brightness = _brightness(image, cells.center_px, mesh.faces, mesh.turn, every).T
+    plus, minus = brightness[turn == 1], brightness[turn == -1]
     if len(plus) < 4 or len(minus) < 4:
         return [1, -1]
     return [1] if np.median(plus) > np.median(minus) else [-1]
@@ -271,17 +296,11 @@ def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
     return part
 
 
-def _largest_parts(cells: Cells, mesh: Mesh) -> list[NDArray[np.intp]]:
-    """The faces of each of the largest connected parts of the mesh, the innermost first: rims are often damaged."""
+def _largest_parts(mesh: Mesh) -> list[NDArray[np.intp]]:
+    """The faces of each of the largest connected parts of the mesh."""
     part = _parts(mesh.neighbours, mesh.turn)
     sizes = np.bincount(part[part >= 0])
-    found = []
-    for number_of in np.argsort(-sizes, kind="stable")[:MAX_PARTS]:
-        faces = np.flatnonzero(part == number_of)
-        middle = cells.center_px[mesh.faces[faces]].mean(axis=1)
-        distance = ((middle - middle.mean(axis=0)) ** 2).sum(axis=1)
-        found.append(faces[np.argsort(distance, kind="stable")])
-    return found
+    return [np.flatnonzero(part == i) for i in np.argsort(-sizes, kind="stable")[:MAX_PARTS]]
 
 
 def _with_white(
@@ -301,7 +320,9 @@ def _with_white(
         return []
     for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
         steps = (low < DISTANCES) & (high >= DISTANCES)
-        places, where, mean = _whiteness(image, cells, at, known, basis, steps)
+        far = low >= WHITE_REACHES[0]
+        tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
+        places, where, mean = _whiteness(image, *tables, far)
         if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
             return []
         bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
@@ -321,40 +342,60 @@ def _with_white(
     return found
 
 
-def _whiteness(
-    image: NDArray[np.uint8],
-    cells: Cells,
-    at: NDArray[np.int32],
-    known: NDArray[np.intp],
-    basis: NDArray[np.float64],
-    steps: NDArray[np.bool_],
-) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+@compiled
+def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
     """The down-cells at these steps from numbered cells: axial places, (D, 2) px, and brightness against the inks.
 
     Far from the next cell a prediction may hit a colored cell. So there all three channels must be as strong as in
     the ink that has most of each: white is, in light of any color, and no ink is.
     """
-    center, radius = cells.center_px[known], 0.1 * np.sqrt(cells.area_px[known])
-    own = colors_at(image, center, radius)
-    around = center[:, None] + np.einsum("nij,kj->nki", basis, OFFSETS[steps])
-    count = around.shape[1]
-    keys, place_of = np.unique(((at[known, None] + STEPS[steps]) @ (KEY, 1)).reshape(-1), return_inverse=True)
-    places = np.stack([(keys + KEY // 2) // KEY, (keys + KEY // 2) % KEY - KEY // 2], axis=1)
-    votes = np.bincount(place_of)
-    columns = (around[..., 0], around[..., 1], np.repeat(radius, count), np.repeat(own.sum(axis=1), count))
-    x, y, reach, level = (np.bincount(place_of, weights=v.reshape(-1)) / votes for v in columns)
-    where = np.stack([x, y], axis=1)
-    color = colors_at(image, where, reach)
-    if DISTANCES[steps].min() < WHITE_REACHES[0]:
-        ratio = color.sum(axis=1) / np.maximum(level, 1.0)
-    else:
-        inks = [
-            np.median(own[cells.ink[known] == ink], axis=0)
-            for ink in (1, 2, 3)
-            if (cells.ink[known] == ink).any()
-        ]
-        ratio = (color / np.maximum(np.max(inks, axis=0), 1.0)).min(axis=1)
-    return places.astype(np.int32), where, np.where(np.isfinite(ratio), ratio, 0.0)
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    low_q, low_r, high_q, high_r = 1 << 20, 1 << 20, -(1 << 20), -(1 << 20)
+    for i in known:
+        low_q, high_q = min(low_q, at[i, 0]), max(high_q, at[i, 0])
+        low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
+    low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
+    rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
+    # x, y, radius and level, summed over the cells that see the place, and their number
+    sums = np.zeros((rows, columns, 5))
+    own, strongest = np.empty(3), np.zeros(3)
+    colors, count = np.full((4, known.shape[0], 3), np.nan), np.zeros(4, np.int64)
+    for n in range(known.shape[0]):
+        i = known[n]
+        radius = 0.1 * np.sqrt(area[i])
+        if not sample_patch(flat, height, width, center[i, 0], center[i, 1], radius, own):
+            continue
+        colors[ink[i], count[ink[i]]] = own
+        count[ink[i]] += 1
+        for k in range(steps.shape[0]):
+            cell = sums[at[i, 0] + steps[k, 0] - low_q, at[i, 1] + steps[k, 1] - low_r]
+            cell[0] += center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1]
+            cell[1] += center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1]
+            cell[2] += radius
+            cell[3] += own.sum()
+            cell[4] += 1.0
+    for channel in range(3):
+        for c in range(1, 4):
+            if count[c] > 0:
+                strongest[channel] = max(strongest[channel], np.median(colors[c, : count[c], channel]))
+    found = int((sums[:, :, 4] > 0.0).sum())
+    places, where, ratio = np.empty((found, 2), np.int32), np.empty((found, 2)), np.zeros(found)
+    found = 0
+    for q in range(rows):
+        for r in range(columns):
+            votes = sums[q, r, 4]
+            if votes == 0.0:
+                continue
+            x, y, radius, level = sums[q, r, :4] / votes
+            places[found, 0], places[found, 1] = q + low_q, r + low_r
+            where[found, 0], where[found, 1] = x, y
+            if sample_patch(flat, height, width, x, y, radius, own):
+                if far:
+                    ratio[found] = np.min(own / np.maximum(strongest, 1.0))
+                else:
+                    ratio[found] = own.sum() / max(level, 1.0)
+            found += 1
+    return places, where, ratio
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,23 +13,38 @@ from .attach import attach
 from .cells import Cells, find_cells
 from .color import find_target, nominal_hues_deg, segment, to_colors
 from .errors import LayoutError
-from .image import estimate_noise, prepare
+from .image import prepare
 from .mesh import build_mesh
+from .missed import missed
 from .numbering import Numbering, number
 from .placing import Places, place
 from .reference import Reference
 from .refine import PRESETS, Preset, Refiner
-from .regions import find_seeds, grow
+from .regions import find_seeds, grow, large_enough
 from .repair import repair
+from .sight import Sights
 from .tables import lattice_of
 from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason
 from .virtual import interpolate
 
-WORK_PIXELS = 1_400_000  # larger images are recognised at a reduced scale first
-MIN_WORK_EDGE_PX = 11.0  # shorter edges at the reduced scale need the full one
+WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
+MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
+
+
+class Found(NamedTuple):
+    """The cells of an image with their numbers."""
+
+    cells: Cells
+    numbering: Numbering
+
+
+def _scales(image: NDArray[np.uint8]) -> list[int]:
+    """By how much to reduce an image, one try after the other."""
+    scale = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / WORK_PIXELS)))
+    return [scale >> i for i in range(scale.bit_length())]
 
 
 class Stages:
@@ -86,57 +100,61 @@ class Extractor:
         bgr = stages.done("image", prepare(image))
         if bgr is None:
             return self._nothing(Reason.NO_COLOR, stages)
-        cells = self._recognise(bgr, stages)
+        reason, sights = Reason.NO_COLOR, Sights(bgr)
+        for scale in _scales(bgr):
+            found = self._number(sights, scale, stages)
+            if isinstance(found, Found) and (scale == 1 or self._whole(bgr, found, stages)):
+                return self._measure(sights, found, stages)
+            reason = found if isinstance(found, Reason) else reason
+        return self._nothing(reason, stages)
+
+    def _number(self, sights: Sights, scale: int, stages: Stages) -> Found | Reason:
+        """Stages 1 to 7 at 1/``scale`` of the image's scale, or why they do not number anything."""
+        bgr = sights.at(1).image
+        cells = self._recognise(sights, scale, stages)
         if cells is None:
-            return self._nothing(Reason.NO_COLOR, stages)
+            return Reason.NO_COLOR
         mesh = stages.done("mesh", build_mesh(cells))
         if mesh is None or int((mesh.turn != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
-            return self._nothing(Reason.NO_PATTERN, stages)
+            return Reason.NO_PATTERN
         numbering = stages.done("number", number(bgr, cells, mesh, self._lattice))
         if numbering is None:
-            return self._nothing(Reason.REFERENCE_LOST, stages)
+            return Reason.REFERENCE_LOST
         if numbering.ambiguous:
-            return self._nothing(Reason.AMBIGUOUS, stages)
-        return self._measure(bgr, cells, numbering, stages)
+            return Reason.AMBIGUOUS
+        return Found(cells, numbering)
 
-    def _recognise(self, bgr: NDArray[np.uint8], stages: Stages) -> Cells | None:
-        """Stages 1 to 5, at a reduced scale where the image is large and its cells are too."""
-        scale = int(np.ceil(np.sqrt(bgr.shape[0] * bgr.shape[1] / WORK_PIXELS)))
-        cells = self._recognise_at(bgr, scale, stages)
-        if scale > 1 and (cells is None or cells.edge_px < MIN_WORK_EDGE_PX * scale):
-            cells = self._recognise_at(bgr, 1, stages)
-        return cells
+    def _whole(self, bgr: NDArray[np.uint8], found: Found, stages: Stages) -> bool:
+        """Whether a finer scale would find no more cells than have been found."""
+        count = missed(bgr, found.cells, found.numbering, self._lattice)
+        return int(stages.done("missed", count)) <= MAX_MISSED * len(self._lattice.ink)
 
-    def _recognise_at(self, bgr: NDArray[np.uint8], scale: int, stages: Stages) -> Cells | None:
-        work = bgr
-        if scale > 1:
-            height, width = bgr.shape[0] // scale, bgr.shape[1] // scale
-            whole = bgr[: height * scale, : width * scale]
-            work = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
-        colors = stages.done("color", to_colors(work))
+    def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
+        """Stages 1 to 5; None where an ink is absent, or the cells are too small for a reduced scale."""
+        colors = stages.done("color", to_colors(sights.at(scale).image))
         target = stages.done("target", find_target(colors))
         segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
             return None
         seeds = stages.done("seeds", find_seeds(segmentation))
+        if scale > 1 and not large_enough(seeds):
+            return None
         regions = stages.done("grow", grow(segmentation, seeds))
-        triangles = stages.done("triangles", fit_triangles(bgr, regions, scale))
+        triangles = stages.done("triangles", fit_triangles(sights.at(1).image, regions, scale))
         return stages.done("cells", find_cells(seeds, triangles, scale))  # type: ignore[no-any-return]
 
-    def _measure(self, bgr: NDArray[np.uint8], cells: Cells, numbering: Numbering, stages: Stages) -> Markers:
+    def _measure(self, sights: Sights, found: Found, stages: Stages) -> Markers:
         """The places of what has been numbered, and what follows from them."""
-        numbering = stages.done("attach", attach(cells, numbering, self._lattice))
-        size = (bgr.shape[1], bgr.shape[0])
-        places = stages.done("place", place(cells, numbering, self._lattice, size))
-        return self.finish(bgr, places, numbering.mirrored, numbering.origin, stages)
+        numbering = stages.done("attach", attach(found.cells, found.numbering, self._lattice))
+        places = stages.done("place", place(found.cells, numbering, self._lattice, sights.size))
+        return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(
-        self, bgr: NDArray[np.uint8], places: Places, mirrored: bool, origin: Origin, stages: Stages
+        self, sights: Sights, places: Places, mirrored: bool, origin: Origin, stages: Stages
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        size = (bgr.shape[1], bgr.shape[0])
-        refined = stages.done("refine", self._refine(bgr, places, estimate_noise(bgr)))
-        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, size))
+        refined = stages.done("refine", self._refine(sights, places))
+        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, sights.size))
         virtual, virtual_status = stages.done(
             "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
         )

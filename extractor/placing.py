@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
+from .engine import compiled
 from .gradients import gradients
 from .numbering import Numbering
 from .tables import Lattice
@@ -19,6 +20,7 @@ MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in e
 SHARP_SHARE = 0.6
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
+X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,51 +49,83 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     """
     slope = gradients(cells.center_px, numbering.cell, lattice)
     here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
-    ids = lattice.corner_ids[numbering.cell[here]]
-    arms = lattice.marker_mm[ids] - lattice.center_mm[numbering.cell[here], None]
-    predicted = cells.center_px[here, None] + np.einsum("nij,nkj->nki", slope[here], arms)
-    edge = np.linalg.norm(predicted - np.roll(predicted, 1, axis=1), axis=2).mean(axis=1)
-    corner, fitted = _matched(cells.corner_px[here], predicted, edge, numbering.mirrored)
-    weight = np.repeat(np.where(fitted, 1.0, PREDICTED_WEIGHT), 3)
-    count = len(lattice.marker_mm)
-    xy, around = _means(ids.reshape(-1), corner.reshape(-1, 2), np.repeat(edge, 3), weight, count)
-    apart = np.linalg.norm(corner - xy[ids], axis=2) > MAX_SPREAD * around[ids]
-    xy[ids[apart & fitted[:, None]]] = np.nan
-    whole = np.isfinite(xy[ids, 0]).all(axis=1)
-    if fitted.mean() > SHARP_SHARE:
-        limit = np.array(size) - 1 - BORDER_PX
-        cut = ((predicted < BORDER_PX) | (predicted > limit)).any(axis=(1, 2))
-        whole &= fitted | cut
+    cell = numbering.cell[here]
+    ids = lattice.corner_ids[cell]
+    arms = lattice.marker_mm[ids] - lattice.center_mm[cell, None]
+    corner, edge, fitted, inside = _corners(
+        cells.center_px, cells.corner_px, slope, here, arms, numbering.mirrored, *size
+    )
+    sharp = bool(fitted.mean() > SHARP_SHARE) if len(fitted) else False
+    xy, around, whole = _merged(ids, corner, edge, fitted, fitted | ~inside, sharp, len(lattice.marker_mm))
     return Places(xy_px=xy, edge_px=around, cells=ids[whole])
 
 
-def _matched(
-    corner: NDArray[np.float64], predicted: NDArray[np.float64], edge: NDArray[np.float64], mirrored: bool
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(N, 3, 2) the triangles' corners as corners 0, 1, 2 of the cell, and where a triangle matched at all.
+@compiled
+def _corners(center, triangle, slope, here, arms, mirrored, width, height):  # type: ignore[no-untyped-def]
+    """(N, 3, 2) corners 0, 1, 2 of the cells ``here``, (N,) their mean edges, and (N,) where a triangle matched, and
+    which lie well inside the image.
 
-    Clockwise in the image the cell's corners run 0, 2, 1, seen from the back 0, 1, 2.
+    Clockwise in the image a cell's corners run 0, 2, 1, seen from the back 0, 1, 2.
     """
-    turned = corner if mirrored else corner[:, ::-1]
-    options = np.stack([np.roll(turned, shift, axis=1) for shift in range(3)], axis=1)
-    apart = options - predicted[:, None]
-    misfit = np.hypot(apart[..., 0], apart[..., 1]).max(axis=2)
-    best = np.where(np.isfinite(misfit), misfit, np.inf).argmin(axis=1)
-    row = np.arange(len(corner))
-    fitted = misfit[row, best] < MAX_CORNER_MISFIT * edge
-    return np.where(fitted[:, None, None], options[row, best], predicted), fitted
+    count = here.shape[0]
+    corner, edge = np.empty((count, 3, 2)), np.zeros(count)
+    fitted, inside = np.zeros(count, np.bool_), np.ones(count, np.bool_)
+    for n in range(count):
+        i, place = here[n], corner[n]
+        for k in range(3):
+            for axis in range(2):
+                place[k, axis] = center[i, axis]
+                place[k, axis] += slope[i, axis, 0] * arms[n, k, 0] + slope[i, axis, 1] * arms[n, k, 1]
+            x, y = place[k]
+            near = min(x, y, width - 1 - x, height - 1 - y)
+            inside[n] = inside[n] and near >= BORDER_PX
+        for k in range(3):
+            j = (k + 1) % 3
+            edge[n] += np.hypot(place[k, 0] - place[j, 0], place[k, 1] - place[j, 1]) / 3
+        best, first, step = MAX_CORNER_MISFIT * edge[n], -1, 1 if mirrored else 2
+        for shift in range(3):
+            worst = 0.0
+            for k in range(3):
+                j = (shift + step * k) % 3
+                apart = np.hypot(triangle[i, j, 0] - place[k, 0], triangle[i, j, 1] - place[k, 1])
+                worst = apart if not apart <= worst else worst  # a NaN stays
+            if worst < best:
+                best, first = worst, shift
+        if first >= 0:
+            fitted[n] = True
+            for k in range(3):
+                place[k] = triangle[i, (first + step * k) % 3]
+    return corner, edge, fitted, inside
 
 
-def _means(
-    ids: NDArray[np.int32],
-    xy: NDArray[np.float64],
-    edge: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    count: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weighted means of the corners and edges of each marker, NaN where it has none."""
-    total = np.bincount(ids, weights=weight, minlength=count)
-    sums = [np.bincount(ids, weights=weight * v, minlength=count) for v in (xy[:, 0], xy[:, 1], edge)]
-    with np.errstate(invalid="ignore"):
-        x, y, around = (s / total for s in sums)
-    return np.stack([x, y], axis=1), around
+@compiled
+def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
+    """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (N,) the cells
+    whose corners are all known, where most are sharp only those ``kept``."""
+    sums = np.zeros((count, 4))
+    for n in range(ids.shape[0]):
+        weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
+        for k in range(3):
+            row = sums[ids[n, k]]
+            row[X] += weight * corner[n, k, 0]
+            row[Y] += weight * corner[n, k, 1]
+            row[EDGE] += weight * edge[n]
+            row[WEIGHT] += weight
+    xy, around = np.full((count, 2), np.nan), np.full(count, np.nan)
+    for m in range(count):
+        if sums[m, WEIGHT] > 0.0:
+            xy[m, 0], xy[m, 1] = sums[m, X] / sums[m, WEIGHT], sums[m, Y] / sums[m, WEIGHT]
+            around[m] = sums[m, EDGE] / sums[m, WEIGHT]
+    mean = xy.copy()
+    for n in range(ids.shape[0]):
+        for k in range(3):
+            m = ids[n, k]
+            apart = np.hypot(corner[n, k, 0] - mean[m, 0], corner[n, k, 1] - mean[m, 1])
+            if fitted[n] and apart > MAX_SPREAD * around[m]:
+                xy[m] = np.nan
+    whole = np.ones(ids.shape[0], np.bool_)
+    for n in range(ids.shape[0]):
+        whole[n] = kept[n] or not sharp
+        for k in range(3):
+            whole[n] = whole[n] and np.isfinite(xy[ids[n, k], 0])
+    return xy, around, whole

@@ -13,13 +13,16 @@ from .engine import compiled
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
 from .levels import monomials
 from .sampling import clamp, sample_dot
-from .synthesis import AA, AB, BB, A, B
+from .synthesis import AA, AB, BB, MISFIT, PIXELS, A, B
 
 SAMPLES = 7  # at most, on each side of a gridline
 REACH_SIGMA = 2.0  # how far a profile reaches, in units of the blur
 CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
+STATION_PX = (
+    1.5  # of a gridline's length that one station tells about, bilinear samples being means of four pixels
+)
 BILINEAR_PX2 = 1.0 / 6.0  # variance that bilinear sampling adds to the blur, on the average
 ROOM = 4  # columns: height of the lower cell beside it, sines of the angles at both ends, contrast squared
 
@@ -120,16 +123,19 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
                 kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
                 step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
                 norm += kernel[m + samples] ** 2
-        information = room[e, 3] / (2 * np.sqrt(np.pi) * sigma) * length * (end - start) / stations
+        information = room[e, 3] / (2 * np.sqrt(np.pi) * sigma)
+        information *= min(length * (end - start) / stations, STATION_PX)
         for j in range(stations):
             t = start + (end - start) * (j + 0.5) / stations
             off = bow(t, length, lines[e, LEAVE], lines[e, ARRIVE])
             x = lines[e, X] + t * length * lines[e, UX] + off * nx
             y = lines[e, Y] + t * length * lines[e, UY] + off * ny
-            product = 0.0
+            product, squares = 0.0, 0.0
             for m in range(-samples, samples + 1):
                 f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
-                product += kernel[m + samples] * (clamp(f, -0.3, 1.3) - step_profile[m + samples])
+                rest = clamp(f, -0.3, 1.3) - step_profile[m + samples]
+                product += kernel[m + samples] * rest
+                squares += rest * rest
             offset = product / norm
             if not abs(offset) < max(1.0, 0.15 * length):
                 continue
@@ -138,4 +144,6 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
             out[e, BB] += information * t * t
             out[e, A] += information * (1 - t) * offset
             out[e, B] += information * t * offset
+            out[e, MISFIT] += information * squares / norm
+            out[e, PIXELS] += 2.0 * samples + 1.0
     return out

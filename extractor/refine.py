@@ -14,67 +14,75 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
+from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
-from .levels import Frame, Levels, black_at, cell_means, smooth_levels
+from .levels import Levels, black_at, cell_means, smooth_levels
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
-from .synthesis import (
-    AA,
-    AB,
-    BB,
-    BLUR,
-    BLUR_CURVATURE,
-    MISFIT,
-    PIXELS,
-    SHARE_A,
-    SHARE_B,
-    A,
-    B,
-    clear,
-    draw_cells,
-    edge_contrasts,
-    read_gridlines,
+from .sight import Sight, Sights
+from .stepping import (
+    MIN_NOISE,
+    PRIOR_BEYOND_PX,
+    box_of,
+    middles,
+    moved,
+    short_edge,
+    trust,
+    trusted_markers,
+    votes,
+    widening,
 )
+from .synthesis import A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
-MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_SIGMA_PX = 0.45  # blur and pixel; the bare pixel has 0.29
+MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
+MIN_EDGE_PX = 8.0  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
-PRIOR_BEYOND_PX = 1.0  # the same for those beyond the pattern's known part
-BLUR_EDGES = 200  # gridlines that the first estimate of the blur is taken from
+BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
 UNEXPLAINED = (
     25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
 )
-WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
 MAX_WIDEN = 0.3  # of the blur, in one step
-# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
-# normal density and N its integral.
-CONTRAST_TO_BLUR = 1.79
+# how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
+JUDGED_BY_PIXELS = 3, 8, 0.0
+JUDGED_BY_SAMPLES = 1, 4, 1.0
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
 class Steps(NamedTuple):
-    """What a preset does: stations per gridline in each round of profiles, and steps of synthesis at most, until the
-    no marker moves by more than ``enough`` of its standard deviations."""
+    """What a preset does.
 
-    profiles: tuple[int, ...]
+    Attributes:
+        profiles: stations per gridline at most, in the first and the last round of profiles.
+        finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
+        sharp: blur, as a share of the edges, below which an image needs no synthesis,
+        reduced: unless it could be reduced by so much, which makes synthesis cheap.
+        synthesis: steps of synthesis at most.
+        enough: no more steps once no marker moves by more than so many of its standard deviations.
+    """
+
+    profiles: tuple[int, int]
+    finest: float
+    sharp: float
+    reduced: float
     synthesis: int
     enough: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((3, 4, 24), 0, 0.0),
-    "balanced": Steps((2, 3), 4, 20.0),
-    "accurate": Steps((3, 4), 10, 0.7),
+    "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
+    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 8.0),
+    "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
 }
+FEW_STATIONS = 3  # in the last round of profiles, where synthesis follows
+JUDGING_STATIONS = 16  # where it failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +92,8 @@ class Refined:
     Attributes:
         xy_px: (M, 2) float64, NaN where nothing was measured.
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
-        explained: (M,) bool, the drawn pattern explains the image around the marker; where not, its place is from
-            profiles alone, and something lies on it.
+        explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
+            after synthesis, its place is from profiles alone).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
     """
@@ -113,6 +121,19 @@ class Fit(NamedTuple):
     moved: float
 
 
+class Across(NamedTuple):
+    """What changes across the gridlines; moves of a pixel do not change it.
+
+    Attributes:
+        contrasts: (E, 3) differences of level.
+        weights, room: as ``unmixing`` gives them.
+    """
+
+    contrasts: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    room: NDArray[np.float64]
+
+
 class Refiner:
     """Refines the markers of one layout; its buffers are kept from image to image, one set a thread."""
 
@@ -121,40 +142,63 @@ class Refiner:
         self._steps = STEPS[preset]
         self._kept = threading.local()
 
-    def __call__(self, image: NDArray[np.uint8], places: Places, noise: float) -> Refined:
+    def __call__(self, sights: Sights, places: Places) -> Refined:
         """Solve all markers together.
 
         Args:
-            image: (H, W, 3) uint8 BGR.
+            sights: the image.
             places: where the markers were found, to about a pixel.
-            noise: standard deviation of a channel, in grey levels; a first estimate.
 
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
-        mesh, height, width = self._mesh, image.shape[0], image.shape[1]
-        frame = Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
-        noise = max(noise, MIN_NOISE)
-        xy, beyond, maps = self._completed(places.xy_px)
+        edge = short_edge(places.xy_px, self._mesh.edges)
+        view = sights.at(self._scale(USUAL_SIGMA_PX, edge))
+        fit, across = self._begin(view, places)
+        scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
+        if scale != view.scale:
+            xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
+            view = sights.at(scale)
+            fit, across = self._begin(view, Places(xy, places.edge_px, places.cells))
+        return self._finish(view, fit, across, _in(view, places), edge / view.scale)
+
+    def _scale(self, sigma_px: float, edge_px: float) -> int:
+        """By how much to reduce an image with this blur and edges."""
+        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
+
+    def _begin(self, view: Sight, places: Places) -> tuple[Fit, Across]:
+        """The inks' levels, the blur, and the first round of profiles."""
+        mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
+        xy, beyond, maps = self._completed(view.reduced(places.xy_px))
+        usual = USUAL_SIGMA_PX / view.scale
         levels = smooth_levels(
-            cell_means(image, NO_MODEL, xy, mesh.cells, USUAL_SIGMA_PX),
-            cell_means(image, NO_MODEL, xy, mesh.black, USUAL_SIGMA_PX),
+            cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
+            cell_means(view.image, NO_MODEL, xy, mesh.black, usual),
             xy,
             mesh,
             noise,
-            frame,
+            view.frame,
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
-        for stations in self._steps.profiles:
-            fit = self._profile_step(image, fit, frame, stations)
+        across = self._across(view, fit)
+        fit = fit._replace(sigma=self._blur(view, fit, across))
+        return self._profile_step(view, fit, across, self._steps.profiles[0])[0], across
+
+    def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
+        """The last round of profiles, and synthesis where the blur asks for it."""
+        steps = self._steps
+        sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
+        stations = steps.profiles[1] if sharp else FEW_STATIONS
+        fit, trusted = self._profile_step(view, fit, across, stations)
+        if sharp:
+            return self._refined(view, fit, *self._sure(fit, places), trusted)
         start = fit
-        if self._steps.synthesis:
-            fit = fit._replace(sigma=max(np.sqrt(max(fit.sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
-        for _ in range(self._steps.synthesis):
-            fit = self._synthesis_step(image, fit, frame)
-            if fit.moved < self._steps.enough:
+        fit = fit._replace(sigma=_sharpened(fit.sigma))
+        for _ in range(steps.synthesis):
+            fit = self._synthesis_step(view, fit)
+            if fit.moved < steps.enough:
                 break
-        return self._result(fit, start, places)
+        return self._result(view, fit, start, across, places)
 
     def _completed(
         self, xy: NDArray[np.float64]
@@ -165,106 +209,83 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
-    def _profile_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame, stations: int) -> Fit:
+    def _across(self, view: Sight, fit: Fit) -> Across:
+        """The colors beside the gridlines."""
         mesh, levels = self._mesh, fit.levels
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
-        contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        weights, room = unmixing(
-            lines, contrasts, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.black, *frame
-        )
-        sigma = fit.sigma
-        if sigma == 0.0:
-            blurs = profile_blurs(image, lines, weights, room, max(1, len(lines) // BLUR_EDGES))
-            seen = blurs[np.isfinite(blurs)]
-            sigma = max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
-        sums = read_profiles(image, lines, weights, room, sigma, stations)
-        use = (sums[:, AA] > 0).astype(np.float64)
-        fit = fit._replace(sigma=sigma)
-        shift, information = self._solve(sums, sums[:, A], sums[:, B], use, lines, contrasts, False, fit)
-        return self._moved(fit, shift, information)
+        sides = mesh.cells, mesh.edge_cells, levels.cell
+        contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
+        return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
 
-    def _synthesis_step(self, image: NDArray[np.uint8], fit: Fit, frame: Frame) -> Fit:
+    def _profile_step(
+        self, view: Sight, fit: Fit, across: Across, stations: int
+    ) -> tuple[Fit, NDArray[np.bool_]]:
+        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
+        mesh = self._mesh
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
+        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
+        votes = sums, sums[:, A], sums[:, B], use
+        shift, information = self._solve(*votes, lines, across.contrasts, False, fit)
+        return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
+
+    def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
+        """The blur that some of the gridlines show."""
+        mesh = self._mesh
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        every = max(1, len(lines) // BLUR_EDGES)
+        blurs = profile_blurs(view.image, lines, across.weights, across.room, every)
+        seen = blurs[np.isfinite(blurs)]
+        return max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
+
+    def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
+        image, frame = view.image, view.frame
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
-        box = _box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape)
-        model = self._buffer(image.shape)
+        box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        clear(model, box)
-        draw_cells(
-            fit.xy,
-            mesh.cells,
-            mesh.cell_edges,
-            mesh.edges,
-            lines,
-            levels.cell,
-            levels.slope,
-            sigma,
-            box,
-            model,
-        )
-        bettered = self._level_step(image, model, fit, frame)
-        middles = 0.5 * (fit.xy[mesh.edges[:, 0]] + fit.xy[mesh.edges[:, 1]])
-        black = black_at(levels.black, middles, *frame)
+        model = self._drawn(fit, lines, box, image.shape)
+        bettered = self._level_step(view, model, fit)
+        middle = middles(lines)
+        black = black_at(levels.black, middle, *frame)
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
-        side = self._side_changes(levels, bettered, middles, frame)
-        off = np.einsum("ec,ec->e", contrasts, side)
-        to_a, to_b = sums[:, A] - off * sums[:, SHARE_A], sums[:, B] - off * sums[:, SHARE_B]
-        use, noise = _trust(sums, to_a, to_b)
-        noise = float(noise) if np.isfinite(noise) else fit.noise
-        fit = fit._replace(noise=noise, levels=bettered)
+        changes = bettered.cell - levels.cell, bettered.black - levels.black
+        to_a, to_b = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
+        use, noise = trust(sums, to_a, to_b, *JUDGED_BY_PIXELS)
+        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
+        widen = float(
+            np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
+        )
+        fit = fit._replace(noise=float(noise) if np.isfinite(noise) else fit.noise, levels=bettered)
         shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
-        sigma = self._blur_step(sums, use, contrasts, lines, fit, sigma)
-        return self._moved(fit._replace(sigma=sigma), shift, information)
+        return self._moved(fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX)), shift, information)
+
+    def _drawn(
+        self, fit: Fit, lines: NDArray[np.float64], box: NDArray[np.int64], shape: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """The pattern over black, in a buffer of the image's size."""
+        mesh, levels = self._mesh, fit.levels
+        model = self._buffer(shape)
+        clear(model, box)
+        sides = mesh.cells, mesh.cell_edges, mesh.edges, lines
+        draw_cells(fit.xy, *sides, levels.cell, levels.slope, fit.sigma, box, model)
+        return model
 
     def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
-        """The fit after a step; the deviations of ``moved`` are those with all other markers known."""
-        xx, xy, yy = information.diagonal.T
-        x, y = np.where(fit.beyond, 0.0, shift.T)
-        moved = float(np.sqrt(np.max(x * x * xx + 2 * x * y * xy + y * y * yy, initial=0.0)))
-        measured = fit.xy + shift
-        xy_px, beyond, maps = self._completed(np.where(_weak(information)[:, None], np.nan, measured))
+        """The fit after a step."""
+        measured, guiding, steps = moved(fit.xy, shift, information.diagonal, fit.beyond)
+        xy_px, beyond, maps = self._completed(guiding)
         return fit._replace(
-            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=moved
+            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=float(steps)
         )
 
-    def _level_step(
-        self, image: NDArray[np.uint8], model: NDArray[np.float32], fit: Fit, frame: Frame
-    ) -> Levels:
+    def _level_step(self, view: Sight, model: NDArray[np.float32], fit: Fit) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
         mesh, levels = self._mesh, fit.levels
-        drawn = cell_means(image, model, fit.xy, mesh.cells, 0.0)
-        black = cell_means(image, model, fit.xy, mesh.black, 0.0)
+        drawn = cell_means(view.image, model, fit.xy, mesh.cells, 0.0)
+        black = cell_means(view.image, model, fit.xy, mesh.black, 0.0)
         drawn[:, :3] += levels.cell
-        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, frame)
-
-    def _blur_step(
-        self,
-        sums: NDArray[np.float64],
-        use: NDArray[np.float64],
-        contrasts: NDArray[np.float64],
-        lines: NDArray[np.float64],
-        fit: Fit,
-        sigma: float,
-    ) -> float:
-        """The blur, by how far the gridlines' pixels say that it is another, once the levels are bettered."""
-        mesh, levels = self._mesh, fit.levels
-        now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        strength = np.maximum((contrasts * contrasts).sum(axis=1), 1e-9)
-        change = (contrasts * (now - contrasts)).sum(axis=1) / strength
-        curvature = use * sums[:, BLUR_CURVATURE]
-        total = curvature.sum()
-        if total <= 0:
-            return sigma
-        widen = ((use * sums[:, BLUR]).sum() + CONTRAST_TO_BLUR * sigma * (curvature * change).sum()) / total
-        return max(sigma + float(np.clip(widen, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
-
-    def _side_changes(
-        self, old: Levels, new: Levels, middles: NDArray[np.float64], frame: Frame
-    ) -> NDArray[np.float64]:
-        """(E, 3): the change of level of a gridline's two sides together."""
-        black = black_at(new.black - old.black, middles, *frame)
-        change = np.concatenate([new.cell - old.cell, np.zeros((1, 3))])
-        return np.asarray(np.nan_to_num(2 * black + change[self._mesh.edge_cells].sum(axis=1)))
+        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
 
     def _solve(
         self,
@@ -296,14 +317,28 @@ class Refiner:
             kept = self._kept.residual = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def _result(self, fit: Fit, start: Fit, places: Places) -> Refined:
-        """What is sure; where the drawing does not explain the image, as in glare, what the profiles had said."""
+    def _result(self, view: Sight, fit: Fit, start: Fit, across: Across, places: Places) -> Refined:
+        """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
-        if lost.any() and start is not fit:
+        if lost.any():
+            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS)
             profiled, wide = self._sure(start, places)
-            xy[lost], cov[lost] = profiled[lost], UNEXPLAINED * wide[lost]
-        return Refined(xy_px=xy, cov_px2=cov, explained=~lost, blur_px=fit.sigma, noise=fit.noise)
+            use = lost & trusted
+            xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]
+        return self._refined(view, fit, xy, cov, ~lost)
+
+    def _refined(
+        self,
+        view: Sight,
+        fit: Fit,
+        xy: NDArray[np.float64],
+        cov: NDArray[np.float64],
+        explained: NDArray[np.bool_],
+    ) -> Refined:
+        """The markers at the image's full scale."""
+        scale = view.scale
+        return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
@@ -319,37 +354,11 @@ class Refiner:
         return xy, cov
 
 
-@compiled
-def _trust(sums, to_a, to_b):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines whose pixels the pattern explains once they are moved, and the noise."""
-    count = sums.shape[0]
-    misfit, use = np.full(count, np.nan), np.zeros(count)
-    for e in range(count):
-        if sums[e, PIXELS] <= 8:
-            continue
-        aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
-        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
-        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
-        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (3 * sums[e, PIXELS] - 2)
-    usual = max(np.nanmedian(misfit), MIN_NOISE**2)
-    for e in range(count):
-        if np.isfinite(misfit[e]):
-            limit = usual * (1.25 + 5 * np.sqrt(2 / (3 * sums[e, PIXELS] - 2)))
-            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
-    return use, np.sqrt(usual)
+def _sharpened(sigma: float) -> float:
+    """The blur without that which the profiles' bilinear samples added."""
+    return float(max(np.sqrt(max(sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
 
 
-def _weak(information: Information) -> NDArray[np.bool_]:
-    """(M,) markers that the image says far less about than about most, in one direction at least."""
-    xx, xy, yy = information.diagonal.T
-    least = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-    shown = least > 4 * PRIOR_BEYOND_PX**-2
-    return np.asarray(least < WEAK * np.median(least[shown])) if shown.any() else ~shown
-
-
-def _box(xy: NDArray[np.float64], margin: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """(4,) x from, y from, x to, y to: the pattern's part of the image."""
-    known = xy[np.isfinite(xy[:, 0])]
-    low, high = np.floor(known.min(axis=0) - margin), np.ceil(known.max(axis=0) + margin) + 1
-    size = np.array([shape[1], shape[0]])
-    return np.concatenate([np.clip(low, 0, size), np.clip(high, 0, size)]).astype(np.int64)
+def _in(view: Sight, places: Places) -> Places:
+    """Places of the full image in a reduced one."""
+    return Places(view.reduced(places.xy_px), places.edge_px / view.scale, places.cells)

@@ -12,6 +12,8 @@ from .engine import compiled
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
 MIN_DOMAIN_PX = 4
+SAFE_AREA_PX = 20  # a cell with edges of 7 px
+MAX_SMALL = 0.1  # of the domains
 MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 
@@ -159,6 +161,11 @@ def find_seeds(segmentation: Segmentation) -> Seeds:
     xy, center, ink, area = _seeds(*_runs(segmentation.label))
     keep = area >= MIN_DOMAIN_PX
     return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
+
+
+def large_enough(seeds: Seeds) -> bool:
+    """Whether at most a few of the domains are too small to be recognised safely."""
+    return len(seeds.ink) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
 
 
 @compiled

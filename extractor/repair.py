@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .neighbourhood import INNER, predict
+from .neighbourhood import INNER, deviant, predict
 from .refine import Refined
 from .tables import Lattice
 from .types import Status
@@ -92,19 +92,22 @@ def _drop_outliers(
     table = lattice.neighbours
     for _ in range(ROUNDS):
         known = np.isfinite(xy[:, 0])
-        place, variance, leverage, support = predict(xy, known, lattice.marker_mm, table)
+        # only what may be too far is looked at closely
+        doubtful = deviant(xy, MAX_DEVIATION * edge * explained, lattice.ring_weights, table)
+        place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
         sigma = np.sqrt(variance * (1 + leverage))
-        deviation = np.linalg.norm(xy - place, axis=1)
+        apart = xy - place
+        deviation = np.hypot(apart[:, 0], apart[:, 1])
         with np.errstate(invalid="ignore"):
             allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
             allowed = np.where(explained, np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE), MAX_UNEXPLAINED)
             excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
         excess[known & ~explained & ~np.isfinite(place[:, 0])] = np.inf
+        if not (excess > 1.0).any():
+            break
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
         bad = (excess > 1.0) & (excess >= around)
-        if not bad.any():
-            break
         xy[bad] = np.nan
         cov[bad] = np.nan
 

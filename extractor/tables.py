@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .lattice import axial, layer_of, marker_id
-from .neighbourhood import neighbour_table
+from .neighbourhood import neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
 UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
@@ -29,6 +29,7 @@ class Lattice:
         axial: (U, 2) int32, the cells' (q, r).
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
+        ring_weights: (M, 18) float64, weights of these that give a marker's place; 0 where they are not all there.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
@@ -40,6 +41,7 @@ class Lattice:
     axial: NDArray[np.int32]
     layer: NDArray[np.int32]
     neighbours: NDArray[np.int32]
+    ring_weights: NDArray[np.float64]
     present: NDArray[np.bool_]
 
     @cached_property
@@ -53,6 +55,7 @@ def lattice_of(reference: Reference) -> Lattice:
     coordinates = axial(reference.layer, reference.index)
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
+    neighbours = neighbour_table(coordinates, int(reference.layer.max()))
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
     cell_of = np.full(len(coordinates), -1, np.int32)
     cell_of[lower_left] = np.arange(len(inked))
@@ -64,7 +67,8 @@ def lattice_of(reference: Reference) -> Lattice:
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
         layer=reference.layer,
-        neighbours=neighbour_table(coordinates, int(reference.layer.max())),
+        neighbours=neighbours,
+        ring_weights=ring_weights(reference.xy_mm, neighbours),
         present=reference.present,
     )
 

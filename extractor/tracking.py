@@ -15,6 +15,7 @@ from .errors import ImageError
 from .image import prepare
 from .pipeline import Extractor, Stages
 from .reference import Reference
+from .sight import Sights
 from .types import Markers, Origin, Reason, Status
 from .warm import Tables, WarmStart, completed, examine, predict, prove, tables_of
 
@@ -189,7 +190,7 @@ class Tracker:
         memory = self._memory
         assert memory is not None
         origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        markers = self._extractor.finish(bgr, start.places, memory.mirrored, origin, stages)
+        markers = self._extractor.finish(Sights(bgr), start.places, memory.mirrored, origin, stages)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT * memory.expected:
             return None

@@ -1,0 +1,165 @@
+"""What a step of refinement needs beside its votes: whom to trust, what changed, and how far the markers moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .engine import compiled
+from .gridlines import LENGTH, UX, UY, X, Y
+from .levels import monomials
+from .synthesis import AA, AB, BB, BLUR, BLUR_CURVATURE, MISFIT, PIXELS, SHARE_A, SHARE_B, A, B
+
+MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
+PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
+WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
+TRUSTED = 0.4  # of the gridlines around a marker, for it to be believed
+# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
+# normal density and N its integral.
+CONTRAST_TO_BLUR = 1.79
+
+
+@compiled
+def middles(lines):  # type: ignore[no-untyped-def]
+    """(E, 2) the middle of each gridline's chord."""
+    out = np.empty((lines.shape[0], 2))
+    for e in range(lines.shape[0]):
+        half = 0.5 * lines[e, LENGTH]
+        out[e, 0], out[e, 1] = lines[e, X] + half * lines[e, UX], lines[e, Y] + half * lines[e, UY]
+    return out
+
+
+@compiled
+def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them.
+
+    ``cell_change`` (K, 3) and ``black_change`` (3, 10) are the changes of the levels and of the black's polynomial.
+    """
+    count = sums.shape[0]
+    to_a, to_b, terms = np.empty(count), np.empty(count), np.empty(black_change.shape[1])
+    for e in range(count):
+        if sums[e, AA] == 0.0:
+            to_a[e], to_b[e] = 0.0, 0.0
+            continue
+        monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
+        off = 0.0
+        for channel in range(3):
+            change = 0.0
+            for k in range(terms.shape[0]):
+                change += 2.0 * terms[k] * black_change[channel, k]
+            for side in range(2):
+                if edge_cells[e, side] >= 0:
+                    change += cell_change[edge_cells[e, side], channel]
+            off += contrasts[e, channel] * change
+        to_a[e], to_b[e] = sums[e, A] - off * sums[e, SHARE_A], sums[e, B] - off * sums[e, SHARE_B]
+    return to_a, to_b
+
+
+@compiled
+def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved, and the noise (NaN where
+    nothing was read).
+
+    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``.
+    """
+    count = sums.shape[0]
+    misfit, use = np.full(count, np.nan), np.zeros(count)
+    for e in range(count):
+        if sums[e, PIXELS] <= least:
+            use[e] = unjudged if sums[e, AA] > 0.0 else 0.0
+            continue
+        aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
+        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
+        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
+        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
+    judged = misfit[np.isfinite(misfit)]
+    if judged.shape[0] == 0:
+        return use, np.nan
+    usual = max(np.median(judged), MIN_NOISE**2)
+    for e in range(count):
+        if np.isfinite(misfit[e]):
+            limit = usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
+            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+    return use, np.sqrt(usual)
+
+
+@compiled
+def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
+    """(M,) bool: enough of the gridlines that end there are trusted."""
+    out = np.zeros(spokes.shape[0], np.bool_)
+    for m in range(spokes.shape[0]):
+        total, count = 0.0, 0
+        for e in spokes[m]:
+            if e >= 0:
+                total += use[e]
+                count += 1
+        out[m] = total > TRUSTED * count
+    return out
+
+
+@compiled
+def short_edge(xy, edges):  # type: ignore[no-untyped-def]
+    """The length in px that nine tenths of the gridlines exceed; 0 without any."""
+    length, count = np.empty(edges.shape[0]), 0
+    for e in range(edges.shape[0]):
+        a, b = edges[e]
+        own = np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
+        if np.isfinite(own):
+            length[count] = own
+            count += 1
+    return np.partition(length[:count], count // 10)[count // 10] if count > 0 else 0.0
+
+
+@compiled
+def widening(sums, use, before, now, sigma):  # type: ignore[no-untyped-def]
+    """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``."""
+    curvature, pull = 0.0, 0.0
+    for e in range(sums.shape[0]):
+        if use[e] == 0.0:
+            continue
+        strength, change = 1e-9, 0.0
+        for channel in range(3):
+            strength += before[e, channel] ** 2
+            change += before[e, channel] * (now[e, channel] - before[e, channel])
+        weight = use[e] * sums[e, BLUR_CURVATURE]
+        curvature += weight
+        pull += use[e] * sums[e, BLUR] + CONTRAST_TO_BLUR * sigma * weight * change / strength
+    return pull / curvature if curvature > 0.0 else 0.0
+
+
+@compiled
+def moved(xy, shift, diagonal, beyond):  # type: ignore[no-untyped-def]
+    """(M, 2) the markers after a step, the same with NaN where the image hardly shows them, and the largest step of
+    those that are not ``beyond`` in standard deviations with all other markers known."""
+    count = xy.shape[0]
+    measured, guiding, least = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+    largest = 0.0
+    for m in range(count):
+        xx, cross, yy = diagonal[m]
+        least[m] = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + cross**2)
+        dx, dy = shift[m]
+        measured[m, 0], measured[m, 1] = xy[m, 0] + dx, xy[m, 1] + dy
+        if not beyond[m]:
+            largest = max(largest, dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy)
+    shown = least[least > 4 * PRIOR_BEYOND_PX**-2]
+    limit = WEAK * np.median(shown) if shown.shape[0] > 0 else np.inf
+    for m in range(count):
+        weak = least[m] < limit
+        guiding[m, 0] = np.nan if weak else measured[m, 0]
+        guiding[m, 1] = np.nan if weak else measured[m, 1]
+    return measured, guiding, np.sqrt(largest)
+
+
+@compiled
+def box_of(xy, margin, width, height):  # type: ignore[no-untyped-def]
+    """(4,) x from, y from, x to, y to: the pattern's part of the image."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for m in range(xy.shape[0]):
+        if np.isfinite(xy[m, 0]):
+            for axis in range(2):
+                low[axis], high[axis] = min(low[axis], xy[m, axis]), max(high[axis], xy[m, axis])
+    box, size = np.zeros(4, np.int64), (width, height)
+    if low[0] <= high[0]:
+        for axis in range(2):
+            box[axis] = int(min(max(np.floor(low[axis] - margin), 0.0), size[axis]))
+            box[2 + axis] = int(min(max(np.ceil(high[axis] + margin) + 1, 0.0), size[axis]))
+    return box
