@@ -29,9 +29,10 @@ MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadrat
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
-# surface hides the more from the map the farther this reaches; HEAVY_ERROR for the variance of a layer's quadratic.
+# surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
+# to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
 MILD_ERROR = 2.0
-HEAVY_ERROR = 1.9
+HEAVY_ERROR = 2.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,4 +178,4 @@ def _interpolate(
     lost[between[-1] + 1 :] = False
     lost &= of_place + (3 * MODEL_SIGMA * edge[ids]) ** 2 < (MAX_SIGMA * edge[ids]) ** 2
     place[ids[lost]] = (rows @ terms)[lost]
-    variance[ids[lost]] = HEAVY_ERROR * of_place[lost]
+    variance[ids[lost]] = HEAVY_ERROR * of_place[lost] + (MODEL_SIGMA * edge[ids[lost]]) ** 2
