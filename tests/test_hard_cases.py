@@ -351,14 +351,15 @@ def test_a_layer_with_few_markers_left_is_not_invented() -> None:
 # -- dirt
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_marker_put_back_beside_dirt_spreads_no_nan(seed: int) -> None:
+@pytest.mark.parametrize("preset", ["balanced", "accurate"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_marker_put_back_beside_dirt_spreads_no_nan(seed: int, preset: str) -> None:
     """Large dark blots: markers leave the solution and come back, and their cells' levels were never seen."""
     rng = np.random.default_rng(200 + seed)
     blots = tuple(Blob((float(x), float(y)), 1.6, BLACK_RGB) for x, y in rng.uniform(-3.5, 3.5, (2, 2)))
     shown = replace(scene(), damage=Damage(blobs=blots), surface=composed(Press(3.0, 0.4)), seed=seed)
     seen = render(shown, size=SIZE)
-    markers = extractor().extract(seen.image)
+    markers = extractor(preset=preset).extract(seen.image)
     sound(markers, seen)
     if markers.reason is None:
         assert markers.stages["refine"].noise == pytest.approx(2.0, rel=0.5)
