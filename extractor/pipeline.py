@@ -27,7 +27,7 @@ from .tables import lattice_of
 from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason
-from .virtual import interpolate
+from .virtual import place_virtual
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
 MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss
@@ -83,7 +83,8 @@ class Extractor:
         if preset not in PRESETS:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
-        self._refine = Refiner(topology_of(layout), preset)
+        self._mesh = topology_of(layout)
+        self._refine = Refiner(self._mesh, preset, layout.virtual_per_edge)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
     def extract(self, image: NDArray[Any]) -> Markers:
@@ -155,15 +156,14 @@ class Extractor:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
         refined = stages.done("refine", self._refine(sights, places))
         repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, sights.size))
-        virtual, virtual_status = stages.done(
-            "virtual", interpolate(self.layout, repaired.xy_px, repaired.status)
-        )
+        virtual = stages.done("virtual", place_virtual(self._mesh, repaired, refined.points))
         return Markers(
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,
-            virtual_xy_px=virtual,
-            virtual_status=virtual_status,
+            virtual_xy_px=virtual.xy_px,
+            virtual_cov_px2=virtual.cov_px2,
+            virtual_status=virtual.status,
             mirrored=mirrored,
             origin=origin,
             reason=None,
@@ -178,6 +178,7 @@ class Extractor:
             cov_px2=np.full((markers, 2, 2), np.nan),
             status=np.zeros(markers, np.uint8),
             virtual_xy_px=np.full((edges, count, 2), np.nan),
+            virtual_cov_px2=np.full((edges, count, 2, 2), np.nan),
             virtual_status=np.zeros((edges, count), np.uint8),
             mirrored=None,
             reason=reason,

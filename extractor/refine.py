@@ -18,6 +18,7 @@ from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Levels, black_at, cell_means, smooth_levels
+from .offsets import Reading, foot_of, measure
 from .placing import Places
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
 from .sight import Sight, Sights
@@ -53,6 +54,7 @@ MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
 JUDGED_BY_SAMPLES = 1, 4, 1.0
+NO_ROOM = np.empty((0, 4))
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
@@ -96,6 +98,7 @@ class Refined:
             after synthesis, its place is from profiles alone).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
+        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
     """
 
     xy_px: NDArray[np.float64]
@@ -103,12 +106,14 @@ class Refined:
     explained: NDArray[np.bool_]
     blur_px: float
     noise: float
+    points: NDArray[np.float64]
 
 
 class Fit(NamedTuple):
     """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
     (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
-    ``moved`` is by how many of its standard deviations the last step moved a marker at most."""
+    ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
+    step saw."""
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
@@ -119,6 +124,7 @@ class Fit(NamedTuple):
     levels: Levels
     information: Information
     moved: float
+    reading: Reading | None
 
 
 class Across(NamedTuple):
@@ -137,8 +143,9 @@ class Across(NamedTuple):
 class Refiner:
     """Refines the markers of one layout; its buffers are kept from image to image, one set a thread."""
 
-    def __init__(self, mesh: Topology, preset: Preset) -> None:
+    def __init__(self, mesh: Topology, preset: Preset, virtual_per_edge: int) -> None:
         self._mesh = mesh
+        self._virtual = virtual_per_edge
         self._steps = STEPS[preset]
         self._kept = threading.local()
 
@@ -179,7 +186,7 @@ class Refiner:
             view.frame,
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
-        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0)
+        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0, None)
         across = self._across(view, fit)
         fit = fit._replace(sigma=self._blur(view, fit, across))
         return self._profile_step(view, fit, across, self._steps.profiles[0])[0], across
@@ -225,8 +232,11 @@ class Refiner:
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
         use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
-        votes = sums, sums[:, A], sums[:, B], use
-        shift, information = self._solve(*votes, lines, across.contrasts, False, fit)
+        given = sums, sums[:, A], sums[:, B], use
+        shift, information = self._solve(*given, lines, across.contrasts, False, fit)
+        foot, sigma = across.weights[:, 3], _sharpened(fit.sigma)
+        reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
+        fit = fit._replace(reading=reading)
         return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
 
     def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
@@ -250,7 +260,7 @@ class Refiner:
         black = black_at(levels.black, middle, *frame)
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
-        to_a, to_b = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
+        to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
         use, noise = trust(sums, to_a, to_b, *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
@@ -258,7 +268,10 @@ class Refiner:
         )
         fit = fit._replace(noise=float(noise) if np.isfinite(noise) else fit.noise, levels=bettered)
         shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
-        return self._moved(fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX)), shift, information)
+        foot = foot_of(contrasts, black, off)
+        reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
+        fit = fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX), reading=reading)
+        return self._moved(fit, shift, information)
 
     def _drawn(
         self, fit: Fit, lines: NDArray[np.float64], box: NDArray[np.int64], shape: tuple[int, ...]
@@ -337,8 +350,11 @@ class Refiner:
         explained: NDArray[np.bool_],
     ) -> Refined:
         """The markers at the image's full scale."""
-        scale = view.scale
-        return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise)
+        scale, reading = view.scale, fit.reading
+        assert reading is not None
+        points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual)
+        points[..., :2], points[..., 2] = view.full(points[..., :2]), scale**2 * points[..., 2]
+        return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise, points)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""

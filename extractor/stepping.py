@@ -30,18 +30,18 @@ def middles(lines):  # type: ignore[no-untyped-def]
 
 @compiled
 def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them.
+    """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them; and
+    the change of the levels of both sides together, times the contrast.
 
     ``cell_change`` (K, 3) and ``black_change`` (3, 10) are the changes of the levels and of the black's polynomial.
     """
     count = sums.shape[0]
-    to_a, to_b, terms = np.empty(count), np.empty(count), np.empty(black_change.shape[1])
+    to_a, to_b, off = np.zeros(count), np.zeros(count), np.zeros(count)
+    terms = np.empty(black_change.shape[1])
     for e in range(count):
         if sums[e, AA] == 0.0:
-            to_a[e], to_b[e] = 0.0, 0.0
             continue
         monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
-        off = 0.0
         for channel in range(3):
             change = 0.0
             for k in range(terms.shape[0]):
@@ -49,9 +49,10 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
             for side in range(2):
                 if edge_cells[e, side] >= 0:
                     change += cell_change[edge_cells[e, side], channel]
-            off += contrasts[e, channel] * change
-        to_a[e], to_b[e] = sums[e, A] - off * sums[e, SHARE_A], sums[e, B] - off * sums[e, SHARE_B]
-    return to_a, to_b
+            off[e] += contrasts[e, channel] * change
+        to_a[e] = sums[e, A] - off[e] * sums[e, SHARE_A]
+        to_b[e] = sums[e, B] - off[e] * sums[e, SHARE_B]
+    return to_a, to_b, off
 
 
 @compiled

@@ -54,7 +54,9 @@ class Markers:
         cov_px2: (M, 2, 2) float64, NaN where lost.
         status: (M,) uint8, a ``Status`` each.
         virtual_xy_px: (E, m, 2) float64, in the order of the layout's edges, from the smaller id; NaN where lost.
-        virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
+        virtual_cov_px2: (E, m, 2, 2) float64, NaN where lost.
+        virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (along it, every virtual
+            marker is interpolated), or interpolated only.
         mirrored: the pattern is seen from its back; None when nothing was found.
         reason: why nothing or little was found; None when all went well.
         timings_ms: stage name -> milliseconds.
@@ -66,6 +68,7 @@ class Markers:
     cov_px2: NDArray[np.float64]
     status: NDArray[np.uint8]
     virtual_xy_px: NDArray[np.float64]
+    virtual_cov_px2: NDArray[np.float64]
     virtual_status: NDArray[np.uint8]
     mirrored: bool | None
     reason: Reason | None

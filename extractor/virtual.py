@@ -1,25 +1,100 @@
-"""Virtual markers: points on the gridlines between two markers, numbered by edge and place (section III-B-3)."""
+"""Virtual markers: points on the gridlines between two markers, numbered by edge and place (section III-B-3).
+
+Along its gridline a virtual marker is interpolated: through the smooth map that the markers define. Across it, it is
+measured, by the pixels around it: what they show beyond the drawn pattern, or beyond a blurred step where none was
+drawn, tells how far the gridline lies off.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .reference import Reference
+from .engine import compiled
+from .gridlines import FIRST_RING, local_maps
+from .repair import Repaired
+from .topology import Topology
 from .types import Status, VirtualStatus
 
+MAX_APART = 0.08  # of a measured point from the interpolated one, in edges: more is dirt
+BENT = 0.05  # of the way from the chord to the cubic may be wrong
 
-def interpolate(
-    reference: Reference, xy_px: NDArray[np.float64], status: NDArray[np.uint8]
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """(E, m, 2) points at the fractions (j+1)/(m+1) of every edge from its smaller id, and their (E, m) status.
 
-    Straight between the edge's two markers; lost where either of them is.
+class Virtual(NamedTuple):
+    """(E, m, 2) places, (E, m, 2, 2) covariances, (E, m) status; NaN and 0 where lost."""
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+def place_virtual(mesh: Topology, repaired: Repaired, points: NDArray[np.float64]) -> Virtual:
+    """The virtual markers at the fractions (j + 1) / (m + 1) of every edge from its smaller id.
+
+    Args:
+        points: (E, m, 3) measured points and their variance across, NaN where there is none.
+
+    Lost where either marker of the edge is; interpolated where nothing was measured, as on gridlines that border black
+    on both sides, or where what was measured lies too far off to be the gridline.
     """
-    count = reference.virtual_per_edge
-    fraction = ((np.arange(count) + 1) / (count + 1))[:, None]
-    start, end = xy_px[reference.edges[:, 0], None], xy_px[reference.edges[:, 1], None]
-    points = start * (1 - fraction) + end * fraction
-    known = (status[reference.edges] != Status.LOST).all(axis=1)
-    kind = np.where(known, VirtualStatus.INTERPOLATED, VirtualStatus.LOST).astype(np.uint8)
-    return points, np.repeat(kind[:, None], count, axis=1)
+    maps = local_maps(repaired.xy_px, mesh.near, mesh.offset, mesh.stencil)
+    known = repaired.status != Status.LOST
+    tables = mesh.edges, mesh.near, mesh.offset
+    return Virtual(*_place(repaired.xy_px, repaired.cov_px2, known, maps, *tables, points))
+
+
+@compiled
+def _tangent(maps, near, offset, a, b, chord):  # type: ignore[no-untyped-def]
+    """The map's derivative along the edge at marker a, towards b; the chord where it is not known."""
+    for k in range(FIRST_RING):
+        if near[a, k] == b and np.isfinite(maps[a, 0, 0]):
+            u, v = offset[a, k]
+            return maps[a, 0, 0] * u + maps[a, 0, 1] * v, maps[a, 1, 0] * u + maps[a, 1, 1] * v
+    return chord
+
+
+@compiled
+def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[no-untyped-def]
+    count, m = points.shape[0], points.shape[1]
+    places, spread = np.full((count, m, 2), np.nan), np.full((count, m, 2, 2), np.nan)
+    status = np.zeros((count, m), np.uint8)
+    for e in range(count):
+        a, b = edges[e]
+        if not (known[a] and known[b]):
+            continue
+        cx, cy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
+        length = np.hypot(cx, cy)
+        ax, ay = _tangent(maps, near, offset, a, b, (cx, cy))
+        bx, by = _tangent(maps, near, offset, b, a, (-cx, -cy))
+        for j in range(m):
+            t = (j + 1.0) / (m + 1.0)
+            s = 1.0 - t
+            # a cubic through both markers with the map's derivatives there
+            start, end, leave, arrive = s * s * (1 + 2 * t), t * t * (3 - 2 * t), s * s * t, s * t * t
+            x = start * xy[a, 0] + end * xy[b, 0] + leave * ax + arrive * bx
+            y = start * xy[a, 1] + end * xy[b, 1] + leave * ay + arrive * by
+            hidden = BENT**2 * ((x - xy[a, 0] - t * cx) ** 2 + (y - xy[a, 1] - t * cy) ** 2)
+            for i in range(2):
+                for k in range(2):
+                    spread[e, j, i, k] = s * s * cov[a, i, k] + t * t * cov[b, i, k]
+                spread[e, j, i, i] += hidden
+            status[e, j] = VirtualStatus.INTERPOLATED
+            tx, ty = cx / length, cy / length
+            across = (points[e, j, 1] - y) * tx - (points[e, j, 0] - x) * ty
+            if abs(across) < MAX_APART * length:  # not where there is none
+                x, y = x - across * ty, y + across * tx
+                along = (
+                    spread[e, j, 0, 0] * tx * tx
+                    + 2 * spread[e, j, 0, 1] * tx * ty
+                    + spread[e, j, 1, 1] * ty * ty
+                )
+                aside = points[e, j, 2]
+                spread[e, j, 0, 0] = along * tx * tx + aside * ty * ty
+                spread[e, j, 1, 1] = along * ty * ty + aside * tx * tx
+                spread[e, j, 0, 1] = (along - aside) * tx * ty
+                spread[e, j, 1, 0] = spread[e, j, 0, 1]
+                status[e, j] = VirtualStatus.MEASURED
+            places[e, j, 0], places[e, j, 1] = x, y
+    return places, spread, status

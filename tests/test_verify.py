@@ -48,6 +48,7 @@ def markers_at(
         cov_px2=np.full((count, 2, 2), np.nan),
         status=np.isfinite(xy_px).all(axis=1).astype(np.uint8),
         virtual_xy_px=np.full((edges, 5, 2), np.nan),
+        virtual_cov_px2=np.full((edges, 5, 2, 2), np.nan),
         virtual_status=np.zeros((edges, 5), np.uint8),
         mirrored=mirrored,
         reason=reason,
