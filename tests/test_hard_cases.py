@@ -207,6 +207,10 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 # -- places
 
 
+def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
+    return Refined(xy_px, cov_px2, np.ones(len(xy_px), np.bool_), 1.0, 2.0, np.empty((0, 0, 3)))
+
+
 @pytest.mark.parametrize("shift_px", [(0.0, 0.0), (-0.49, -0.49), (0.5, 0.5), (-1.0, 3.0), (7.3, -4.1)])
 def test_markers_at_the_images_border(shift_px: tuple[float, float]) -> None:
     """A frame that cuts the pattern: markers on the border's pixels, just outside and just inside."""
@@ -260,7 +264,7 @@ def test_places_far_from_the_origin_are_repaired_alike(offset_px: float) -> None
         moved[gone] = np.nan
         cov = np.tile(1e-4 * np.eye(2), (len(xy), 1, 1))
         cov[gone] = np.nan
-        refined = Refined(moved, cov, np.ones(len(xy), np.bool_), 1.0, 2.0)
+        refined = refined_at(moved, cov)
         side = int(origin) + 400
         results.append(repair(refined, np.full(len(xy), 20.0), lattice, (side, side)))
     near, far = results
@@ -342,7 +346,7 @@ def test_a_layer_with_few_markers_left_is_not_invented() -> None:
         some[outer[left:]] = np.nan
         some[lattice.layer == LAYERS - 1] = np.nan
         cov = np.where(np.isfinite(some)[:, :, None], 1e-4 * np.eye(2), np.nan)
-        refined = Refined(some, cov, np.ones(len(xy), np.bool_), 1.0, 2.0)
+        refined = refined_at(some, cov)
         repaired = repair(refined, np.full(len(xy), 20.0), lattice, (400, 400))
         assert not (np.linalg.norm(repaired.xy_px - xy, axis=1) > 0.5).any()
         np.testing.assert_array_equal(repaired.status == Status.LOST, np.isnan(repaired.xy_px[:, 0]))

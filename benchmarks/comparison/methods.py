@@ -16,8 +16,10 @@ from benchmarks.article.corners import plain_triangles
 from benchmarks.article.graph import connect
 from benchmarks.article.numbering import lattice_of, number
 from benchmarks.scenes import BOARD_LAYERS, Case, extractor_of, reference_of
-from extractor import Extractor, Markers
+from extractor import Extractor
+from extractor.color import find_target, nominal_hues_deg, segment, to_colors
 from extractor.refine import Preset
+from extractor.regions import find_seeds, grow
 
 Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
@@ -28,11 +30,7 @@ HALF_WINDOW_PX = (
 )
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
 REFERENCE = "OpenCV findChessboardCornersSB"
-# Stages before any is finer than the article's.
-RECOGNITION = (
-    "image", "color", "target", "segment", "seeds", "grow", "triangles", "cells", "mesh", "number", "attach", "place",
-)  # fmt: skip
-GROWING = RECOGNITION[:6]
+MEASURING = ("refine", "repair", "virtual")  # the stages after the 7th
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +71,12 @@ def ours(preset: Preset) -> Method:
 
 def places(case: Case, image: Image) -> Reading:
     """Stages 1 to 7: corners fitted to the edges of each triangle alone, and merged."""
-    markers, ms = _extracted(case, image, RECOGNITION)
-    return Reading(markers.stages["place"].xy_px, ms)
+    reader = extractor(case, "fast")
+    started = time.process_time()
+    markers = reader.extract(image)
+    ms, stages_ms = _since(started), markers.timings_ms
+    measuring = sum(stages_ms[stage] for stage in MEASURING) / sum(stages_ms.values())
+    return Reading(markers.stages["place"].xy_px, ms * (1 - measuring))
 
 
 def subpix_by_id(case: Case, image: Image) -> Reading:
@@ -89,19 +91,23 @@ def subpix_by_id(case: Case, image: Image) -> Reading:
 
 def article(case: Case, image: Image) -> Reading:
     """The article's way: regions grown by AGA, triangles fitted to their contours, corners merged and averaged, SSA."""
-    lattice = lattice_of(reference_of(case.pattern, case.layers))
-    markers, growing_ms = _extracted(case, image, GROWING)
+    layout = reference_of(case.pattern, case.layers)
+    lattice, hues_deg = lattice_of(layout), nominal_hues_deg(dict(layout.palette))
     started = time.process_time()
-    triangles = plain_triangles(markers.stages["grow"])
+    colors = to_colors(image)
+    segmentation = segment(colors, find_target(colors), hues_deg)
+    points = np.full((len(layout.layer), 2), np.nan)
+    if segmentation is None:
+        return Reading(points, _since(started))
+    triangles = plain_triangles(grow(segmentation, find_seeds(segmentation)))
     found = number(image, triangles, connect(triangles), lattice)
-    points = np.full_like(markers.xy_px, np.nan)
     if found is not None:
         ids = found.marker_of_corner.reshape(-1)
         corner = triangles.corner_px.reshape(-1, 2)[ids >= 0]
         count = np.bincount(ids[ids >= 0], minlength=len(points))
         sums = [np.bincount(ids[ids >= 0], corner[:, axis], len(points)) for axis in (0, 1)]
         points[count > 0] = np.stack(sums, axis=1)[count > 0] / count[count > 0, None]
-    return Reading(points, growing_ms + _since(started))
+    return Reading(points, _since(started))
 
 
 def sb(case: Case, image: Image) -> Reading:
@@ -150,16 +156,6 @@ def _points(corners: Any) -> Points:
 
 def _since(started: float) -> float:
     return 1e3 * (time.process_time() - started)
-
-
-def _extracted(case: Case, image: Image, stages: tuple[str, ...]) -> tuple[Markers, float]:
-    """A whole extraction, and its first stages' share of its time."""
-    reader = extractor(case, "fast")
-    started = time.process_time()
-    markers = reader.extract(image)
-    ms = _since(started)
-    part = sum(markers.timings_ms.get(stage, 0.0) for stage in stages)
-    return markers, ms * part / sum(markers.timings_ms.values())
 
 
 METHODS = (
