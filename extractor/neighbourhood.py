@@ -37,33 +37,36 @@ def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
 
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(M, 18) weights that give a marker's place from its two rings as ``predict`` does; 0 where one is not whole."""
-    weights = np.zeros(table.shape)
-    whole = np.flatnonzero((table >= 0).all(axis=1))
-    arms = marker_mm[table[whole]] - marker_mm[whole, None]
-    x, y = np.moveaxis(arms / np.linalg.norm(arms, axis=2).mean(axis=1)[:, None, None], 2, 0)
-    rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
+    """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predict`` does; 0 where
+    these are too few for its quadratic."""
+    there = table >= 0
+    arms = np.where(there[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
+    count = np.maximum(there.sum(axis=1), 1)
+    scale = np.linalg.norm(arms, axis=2).sum(axis=1) / count
+    x, y = np.moveaxis(arms / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
+    rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * there[..., None]
     gram = np.swapaxes(rows, 1, 2) @ rows
-    sound = np.linalg.cond(gram) < 1 / PIVOT if len(gram) else np.empty(0, np.bool_)
-    weights[whole[sound]] = np.linalg.solve(gram[sound], np.swapaxes(rows[sound], 1, 2))[:, 0]
+    gram[count < MIN_QUADRATIC] = 0.0
+    sound = np.linalg.eigvalsh(gram)[:, 0] > PIVOT * count
+    weights = np.zeros(table.shape)
+    weights[sound] = np.linalg.solve(gram[sound], np.swapaxes(rows[sound], 1, 2))[:, 0]
     return weights
 
 
 @compiled
 def deviant(xy_px, limit_px, weights, table):  # type: ignore[no-untyped-def]
-    """(M,) bool: known markers that lie farther than the limit (M,) from where two whole rings put them, and those
-    without two whole rings."""
+    """(M,) bool: known markers that lie farther than the limit (M,) from where their neighbours put them, or whose
+    neighbours are not all known, or too few."""
     out = np.zeros(xy_px.shape[0], np.bool_)
     for m in range(xy_px.shape[0]):
         if np.isnan(xy_px[m, 0]):
             continue
         x, y = xy_px[m]
         for k in range(table.shape[1]):
-            n = table[m, k]
-            x -= weights[m, k] * xy_px[n, 0]
-            y -= weights[m, k] * xy_px[n, 1]
-        # also where a neighbour is unknown, or the weights are none
-        out[m] = not x * x + y * y <= limit_px[m] ** 2
+            if table[m, k] >= 0:
+                x -= weights[m, k] * xy_px[table[m, k], 0]
+                y -= weights[m, k] * xy_px[table[m, k], 1]
+        out[m] = not x * x + y * y <= limit_px[m] ** 2  # also where that is not a number
     return out
 
 

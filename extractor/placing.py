@@ -51,17 +51,15 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
     cell = numbering.cell[here]
     ids = lattice.corner_ids[cell]
-    arms = lattice.marker_mm[ids] - lattice.center_mm[cell, None]
-    corner, edge, fitted, inside = _corners(
-        cells.center_px, cells.corner_px, slope, here, arms, numbering.mirrored, *size
-    )
+    seen = cells.center_px, cells.corner_px, slope, here
+    corner, edge, fitted, inside = _corners(*seen, cell, lattice.arms_mm, numbering.mirrored, *size)
     sharp = bool(fitted.mean() > SHARP_SHARE) if len(fitted) else False
     xy, around, whole = _merged(ids, corner, edge, fitted, fitted | ~inside, sharp, len(lattice.marker_mm))
     return Places(xy_px=xy, edge_px=around, cells=ids[whole])
 
 
 @compiled
-def _corners(center, triangle, slope, here, arms, mirrored, width, height):  # type: ignore[no-untyped-def]
+def _corners(center, triangle, slope, here, cell, arms_mm, mirrored, width, height):  # type: ignore[no-untyped-def]
     """(N, 3, 2) corners 0, 1, 2 of the cells ``here``, (N,) their mean edges, and (N,) where a triangle matched, and
     which lie well inside the image.
 
@@ -71,11 +69,11 @@ def _corners(center, triangle, slope, here, arms, mirrored, width, height):  # t
     corner, edge = np.empty((count, 3, 2)), np.zeros(count)
     fitted, inside = np.zeros(count, np.bool_), np.ones(count, np.bool_)
     for n in range(count):
-        i, place = here[n], corner[n]
+        i, arms, place = here[n], arms_mm[cell[n]], corner[n]
         for k in range(3):
             for axis in range(2):
                 place[k, axis] = center[i, axis]
-                place[k, axis] += slope[i, axis, 0] * arms[n, k, 0] + slope[i, axis, 1] * arms[n, k, 1]
+                place[k, axis] += slope[i, axis, 0] * arms[k, 0] + slope[i, axis, 1] * arms[k, 1]
             x, y = place[k]
             near = min(x, y, width - 1 - x, height - 1 - y)
             inside[n] = inside[n] and near >= BORDER_PX

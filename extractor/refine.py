@@ -159,7 +159,7 @@ class Refiner:
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
         edge = short_edge(places.xy_px, self._mesh.edges)
-        view = sights.at(self._scale(USUAL_SIGMA_PX, edge))
+        view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
         scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
         if scale != view.scale:
@@ -234,7 +234,7 @@ class Refiner:
         use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
         given = sums, sums[:, A], sums[:, B], use
         shift, information = self._solve(*given, lines, across.contrasts, False, fit)
-        foot, sigma = across.weights[:, 3], _sharpened(fit.sigma)
+        foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
         return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)

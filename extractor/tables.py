@@ -29,7 +29,7 @@ class Lattice:
         axial: (U, 2) int32, the cells' (q, r).
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
-        ring_weights: (M, 18) float64, weights of these that give a marker's place; 0 where they are not all there.
+        ring_weights: (M, 18) float64, weights of these that give a marker's place; 0 where they are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
@@ -48,6 +48,11 @@ class Lattice:
     def center_mm(self) -> NDArray[np.float64]:
         """(U, 2) the centers of the colored cells."""
         return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
+
+    @cached_property
+    def arms_mm(self) -> NDArray[np.float64]:
+        """(U, 3, 2) from the centers of the colored cells to their corners."""
+        return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])
 
 
 def lattice_of(reference: Reference) -> Lattice:

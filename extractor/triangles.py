@@ -19,8 +19,8 @@ MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4
 MAX_GROWTH = 3.0  # of a domain's area over its region's
-STATIONS = 4
-HALF_PROFILE = 5  # samples on each side of an edge
+STATIONS = 3
+HALF_PROFILE = 4  # samples on each side of an edge
 WINDOW = 0.8  # reach of a profile in units of the way from the cell's center to the middle of the edge
 FINE_REACH_PX = 8.0  # profiles that reach farther are followed by narrower ones
 MIN_CONTRAST = 12.0  # of an ink against what lies beyond its edge, over the three channels, 8-bit
@@ -134,7 +134,7 @@ def _edge_line(flat, height, width, a, b, center, ink, share, line):  # type: ig
             offset[used] = (ux * nx + uy * ny) * (area * step - share)
             along[used] = t - 0.5
             used += 1
-    if used < 4:
+    if used < STATIONS:
         return False
     middle, level = along[:used].mean(), offset[:used].mean()
     slope = ((along[:used] - middle) * (offset[:used] - level)).sum() / ((along[:used] - middle) ** 2).sum()
