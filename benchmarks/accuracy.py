@@ -18,7 +18,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
+if __name__ == "__main__":  # before numpy and numba: times are of one core
+    os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 
 import cv2
 import numpy as np
@@ -29,7 +30,7 @@ from rich.table import Table
 
 from benchmarks.machine import sentence, write_json
 from benchmarks.published import publish
-from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bound_px, extractor_of, inner_markers, shortest_edges
+from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bounds_px, extractor_of, inner_markers, shortest_edges
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
 from extractor.refine import PRESETS, Preset
@@ -79,8 +80,7 @@ def measure(group: str, case: Case, seeds: int) -> Iterator[Result]:
     """All presets on the same images."""
     scene = case.scene()
     inner = inner_markers(scene.layout)
-    everything = np.ones_like(inner)
-    bounds = bound_px(scene, inner), bound_px(scene, everything)
+    bounds = bounds_px(scene, inner, np.ones_like(inner))
     seen = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
     visible = seen[0].truth.visible
     true = seen[0].truth.marker_xy_px

@@ -17,9 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = (
-    "1"  # before numpy and numba: times are of one core
-)
+if __name__ == "__main__":  # before numpy and numba: times are of one core
+    os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2
@@ -202,7 +201,7 @@ def grown_words(unit: str, fit: dict[str, Any]) -> str:
 
 def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
     """Everything, as data and as tables."""
-    runs = 7 if quick else 61
+    runs = 7 if quick else 31
     usual = standard_layout("honeycomb", LAYERS)
     presets = [speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
     large = speed("12 MP", standard_layout("honeycomb", 20), 70.0, side_px(12.0), max(3, runs // 4))

@@ -105,7 +105,7 @@ def shortest_edges(layout: Layout, true_px: NDArray[np.float64]) -> NDArray[np.f
     return shortest
 
 
-def bound_px(scene: Scene, chosen: NDArray[np.bool_]) -> float:
-    """The exact Cramer-Rao bound of some markers: RMS per axis, px; those that are not visible are left out."""
-    covariance = exact_bound(scene, size=STANDARD_SIZE)[chosen]
-    return float(np.sqrt(np.nanmean(np.einsum("mii->m", covariance)) / 2))
+def bounds_px(scene: Scene, *choices: NDArray[np.bool_]) -> list[float]:
+    """The exact Cramer-Rao bound of choices of markers: RMS per axis, px; those that are not visible are left out."""
+    trace = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
+    return [float(np.sqrt(np.nanmean(trace[chosen]) / 2)) for chosen in choices]

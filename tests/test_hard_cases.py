@@ -73,7 +73,13 @@ def sound(markers: Markers, seen: Rendered | None = None) -> NDArray[np.bool_]:
     if markers.reason is None:
         refined = markers.stages["refine"]
         assert np.isfinite(refined.blur_px) and np.isfinite(refined.noise)
-    np.testing.assert_array_equal(np.isfinite(markers.virtual_xy_px[..., 0]), markers.virtual_status != 0)
+    placed = markers.virtual_status != 0
+    np.testing.assert_array_equal(np.isfinite(markers.virtual_xy_px[..., 0]), placed)
+    assert (
+        np.isfinite(markers.virtual_cov_px2[placed]).all()
+        and np.isnan(markers.virtual_cov_px2[~placed]).all()
+    )
+    assert (np.linalg.eigvalsh(markers.virtual_cov_px2[placed]) > 0).all()
     if seen is not None:
         true = seen.truth.marker_xy_px
         edges = extractor().layout.edges

@@ -27,7 +27,7 @@ from benchmarks.comparison.report import markdown, scene_table
 from benchmarks.machine import sentence, write_json
 from benchmarks.published import publish
 
-REPETITIONS, QUICK_REPETITIONS = 21, 3
+REPETITIONS, QUICK_REPETITIONS = 11, 3
 
 
 def main(arguments: list[str] | None = None) -> int:

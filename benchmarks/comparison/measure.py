@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from benchmarks.comparison.methods import METHODS, REFERENCE, Method
-from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bound_px, inner_markers, shortest_edges
+from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bounds_px, inner_markers, shortest_edges
 from cmpdesign.layout import Layout
 from cmpdesign.scene import Rendered, Scene, render
 from cmpdesign.scene.standard import STANDARD_SIZE
@@ -114,9 +114,7 @@ def _results(
     case: Case, scenes: dict[bool, Scene], methods: list[Method], tallies: dict[str, _Tally]
 ) -> Iterator[Result]:
     owed = {board: _owed(scene) for board, scene in scenes.items()}
-    bounds = {
-        board: tuple(bound_px(scene, chosen) for chosen in owed[board]) for board, scene in scenes.items()
-    }
+    bounds = {board: bounds_px(scene, *owed[board]) for board, scene in scenes.items()}
     for method in methods:
         tally, (every, inner) = tallies[method.name], owed[method.board]
         errors = np.array(tally.errors)
