@@ -83,7 +83,7 @@ def picture(results: Sequence[Result]) -> bytes:
     from matplotlib import pyplot
     from matplotlib.lines import Line2D
 
-    figure, axis = pyplot.subplots(figsize=(7.0, 5.2))
+    figure, axis = pyplot.subplots(figsize=(9.2, 4.8))
     drawn = [r for r in results if r.found_share >= MIN_FOUND]
     for r in drawn:
         axis.plot(
@@ -102,12 +102,11 @@ def picture(results: Sequence[Result]) -> bytes:
     axis.grid(True, which="both", alpha=0.25)
     methods = [Line2D([], [], color=COLORS[name], marker="o", linestyle="", label=name) for name in flat]
     scenes = [Line2D([], [], color="#444444", marker=MARKS[name], linestyle="", label=name) for name in MARKS]
-    first = axis.legend(
-        handles=methods, fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False
-    )
-    axis.add_artist(first)
-    axis.legend(handles=scenes, fontsize=8, loc="lower left", bbox_to_anchor=(1.01, 0.0), frameon=False)
+    figure.subplots_adjust(left=0.08, right=0.64, top=0.97, bottom=0.12)
+    style = {"fontsize": 8, "frameon": False}
+    figure.legend(handles=methods, loc="upper left", bbox_to_anchor=(0.65, 0.98), **style)
+    figure.legend(handles=scenes, loc="lower left", bbox_to_anchor=(0.65, 0.1), **style)
     data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=100, metadata={"Software": None}, bbox_inches="tight")
+    figure.savefig(data, format="png", dpi=100, metadata={"Software": None})
     pyplot.close(figure)
     return data.getvalue()
