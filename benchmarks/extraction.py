@@ -173,7 +173,9 @@ def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str
     x, y = [unit(result) for result in results], [result.best_ms for result in results]
     large = len(results) // 2
     stages = {
-        stage: exponent(x[large:], [max(result.stages_ms[stage], 1e-3) for result in results[large:]])
+        stage: exponent(
+            x[large:], [max(result.stages_ms.get(stage, 0.0), 1e-3) for result in results[large:]]
+        )
         for stage in results[-1].stages_ms
     }
     intercept, slope = per_unit(x, y)
