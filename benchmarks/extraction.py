@@ -240,7 +240,7 @@ def markdown(results: dict[str, Any]) -> dict[str, str]:
         rows, fit = results[key], results["growth"][unit]
         head = "MP" if unit == "megapixels" else "markers"
         lines = [
-            f"| {head} | {' | '.join(format(r[unit], 'g') for r in rows)} |",
+            f"| {head} | {' | '.join(f'{r[unit]:.0f}' if r[unit] > 30 else f'{r[unit]:.1f}' for r in rows)} |",
             "|---" * (len(rows) + 1) + "|",
         ]
         lines.append(f"| ms | {' | '.join(format(r['best_ms'], '.1f') for r in rows)} |")
