@@ -1,14 +1,17 @@
 """Molds: time of each step over the number of bosses, the boolean way beside it, and whole processes.
 
-    python benchmarks/molds.py            plates, booleans, a pad of 22 layers
-    python benchmarks/molds.py --large    and one of 44
+    python -m benchmarks.molds            plates, booleans, a pad of 22 layers
+    python -m benchmarks.molds --large    and one of 44
+    python -m benchmarks.molds --quick    small ones, to see that it runs
 
-Times are of one core (user and system time), so that a busy machine does not blur them; whole processes show
-wall time too. A large mold is made by two processes: its core seconds are of both, its memory of the larger one.
+Times are of one core (user and system time; the least of some runs), so that a busy machine blurs them less; whole
+processes show wall time too. A large mold is made by two processes: its core seconds are of both, its memory of the
+larger one.
 """
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import os
 import subprocess
@@ -21,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.machine import sentence, write_json
 from cmpdesign import build_layout, load_design
 from cmpdesign.layout import RED
 from cmpdesign.mold.measure import measure
@@ -29,9 +33,11 @@ from cmpdesign.mold.shells import Feature, Slab, slab_solid, slab_volume_mm3
 from cmpdesign.mold.stack import stack_of
 from cmpdesign.writers.step import Solid, read_step, solid_to_step
 
-LAYERS = (10, 20, 39, 60)
+LAYERS, QUICK_LAYERS = (10, 20, 39, 60), (3, 6)
+# Runs of plates up to the boolean one's size; the larger one is run once.
+RUNS = 3
 STEPS = ("describe", "build", "check", "write", "read")
-BOOLEAN_LAYERS = 39
+BOOLEAN_LAYERS, QUICK_BOOLEAN_LAYERS = 39, 6
 EXPONENT_LIMIT = 1.15
 
 
@@ -115,37 +121,67 @@ def process(layers: int, folder: Path) -> tuple[float, float, float, str]:
     return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2**20, digest.hexdigest()[:16]
 
 
-def plates() -> None:
+def least(layers: int, runs: int) -> tuple[int, list[float], float]:
+    """The least seconds of each step over some runs."""
+    found = [direct(layers) for _ in range(runs)]
+    times = np.array([times for _, times, _ in found]).min(axis=0).tolist()
+    return found[0][0], times, max(error for _, _, error in found)
+
+
+def plates(quick: bool) -> dict[str, Any]:
     slab_solid(red_plate(2))  # the kernel's libraries are loaded before the clock runs
+    many, compared = (QUICK_LAYERS, QUICK_BOOLEAN_LAYERS) if quick else (LAYERS, BOOLEAN_LAYERS)
     print("Boss plates, seconds of one core")
     print(f"{'bosses':>8}" + "".join(f"{step:>10}" for step in STEPS) + f"{'volume off by':>16}")
     counts, table = [], []
-    for layers in LAYERS:
-        bosses, times, error = direct(layers)
+    for layers in many:
+        bosses, times, error = least(layers, RUNS if layers <= compared and not quick else 1)
         counts.append(bosses)
         table.append(times)
         print(f"{bosses:>8}" + "".join(f"{t:>10.3f}" for t in times) + f"{error:>16.1e}", flush=True)
     slopes = [float(np.polyfit(np.log(counts), np.log(column), 1)[0]) for column in np.array(table).T]
     print(f"{'exponent':>8}" + "".join(f"{slope:>10.2f}" for slope in slopes) + f"   limit {EXPONENT_LIMIT}")
-    ours = table[LAYERS.index(BOOLEAN_LAYERS)][1:]
-    other = boolean(BOOLEAN_LAYERS)
-    print(f"\nBooleans, {BOOLEAN_LAYERS**2} bosses" + " " * 3 + "".join(f"{step:>10}" for step in STEPS[1:]))
+    ours = table[many.index(compared)][1:]
+    other = boolean(compared)
+    print(f"\nBooleans, {compared**2} bosses" + " " * 3 + "".join(f"{step:>10}" for step in STEPS[1:]))
     print(f"{'boolean':>24}" + "".join(f"{t:>10.3f}" for t in other))
     print(f"{'direct':>24}" + "".join(f"{t:>10.3f}" for t in ours))
     print(f"{'ratio':>24}" + "".join(f"{b / a:>10.1f}" for a, b in zip(ours, other, strict=True)), flush=True)
+    seconds = {
+        bosses: dict(zip(STEPS, times, strict=True)) for bosses, times in zip(counts, table, strict=True)
+    }
+    exponents = dict(zip(STEPS, slopes, strict=True))
+    booleans = {compared**2: dict(zip(STEPS[1:], other, strict=True))}
+    return {"seconds": seconds, "exponents": exponents, "booleans": booleans}
 
 
-def processes(large: bool) -> None:
+def processes(sizes: tuple[int, ...]) -> list[dict[str, Any]]:
     print("\nWhole processes: cmpdesign build honeycomb --only mold")
     print(f"{'layers':>8}{'cells':>8}{'wall s':>10}{'core s':>10}{'GB':>8}  digest of the files")
+    found = []
     with tempfile.TemporaryDirectory() as folder:
-        for layers in (22, 22, 44) if large else (22, 22):
+        for layers in sizes:
             wall, core, memory, digest = process(layers, Path(folder))
             print(
                 f"{layers:>8}{3 * layers**2:>8}{wall:>10.1f}{core:>10.1f}{memory:>8.2f}  {digest}", flush=True
             )
+            found.append({"layers": layers, "wall_s": wall, "core_s": core, "gb": memory, "digest": digest})
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Molds: time, memory and growth.")
+    parser.add_argument("--quick", action="store_true", help="small plates and a small pad")
+    parser.add_argument("--large", action="store_true", help="a pad of 44 layers, too")
+    parser.add_argument("--json", type=Path, help="write conditions and figures to this file")
+    options = parser.parse_args()
+    print(sentence())
+    figures = plates(options.quick)
+    sizes = (2, 2) if options.quick else (22, 22, 44) if options.large else (22, 22)
+    figures["processes"] = processes(sizes)
+    if options.json:
+        write_json(options.json, figures)
 
 
 if __name__ == "__main__":
-    plates()
-    processes("--large" in sys.argv)
+    main()

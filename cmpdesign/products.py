@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from cmpdesign.checks import Finding
     from cmpdesign.design import Design
     from cmpdesign.layout import Layout
@@ -30,11 +33,13 @@ class Made:
         files: path relative to the output folder, with "/" -> content; the same bytes for the same design.
         figures: what the product measures of itself, as JSON values; its member in ``report.json``.
         findings: what will not or may not work.
+        pictures: name -> (H, W, 3) uint8 BGR, of what was made; they are shown in ``preview.png``.
     """
 
     files: Mapping[str, str | bytes]
     figures: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
 
 Maker = Callable[["Design", "Layout"], Made]
@@ -55,16 +60,16 @@ class Product:
     usual: bool = False
 
 
-REPORT = "report"
+PREVIEW, REPORT = "preview", "report"
 PRODUCTS: Mapping[str, Product] = {
     "svg": Product("cmpdesign.products:_svg", "pattern.svg", usual=True),
     "layout": Product("cmpdesign.products:_layout", "layout.json", usual=True),
-    "preview": Product("cmpdesign.products:_preview", "preview.png", usual=True),
+    # The preview and the report are no ``Maker``s: they show what the others made and measured.
+    PREVIEW: Product("cmpdesign.writers.preview:preview_png", "preview.png", usual=True),
     "laser": Product("cmpdesign.writers.laser.product:product", "laser/"),
     "mold": Product("cmpdesign.mold.make:make_mold", "mold/"),
     "mesh": Product("cmpdesign.mold.meshes:make_meshes", "mesh/"),
     "print": Product("cmpdesign.writers.print_sheet:make_print_sheet", "print/"),
-    # The report comes last and is no ``Maker``: it is written from what the others measured.
     REPORT: Product("cmpdesign.report:report_to_json", "report.json", usual=True),
 }
 USUAL = ",".join(name for name, product in PRODUCTS.items() if product.usual)
@@ -85,12 +90,18 @@ def chosen_products(only: str) -> list[str]:
     return [name for name in PRODUCTS if name in names]
 
 
+def product_folders() -> list[str]:
+    """Folders that products fill, as "mold/"."""
+    return [product.where for product in PRODUCTS.values() if product.where.endswith("/")]
+
+
 def make_products(
     names: Sequence[str], design: Design, layout: Layout, report: Report
 ) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
     """Make the named products.
 
-    A product that has figures brings ``report.json`` with it, named or not.
+    A product that has figures brings ``report.json`` with it, one that has pictures ``preview.png``, named or
+    not.
 
     Returns:
         All files by relative path, in the registry's order, and the products' findings.
@@ -98,8 +109,14 @@ def make_products(
     Raises:
         CmpDesignError: one of them cannot be made; nothing has been written.
     """
-    made = {name: _maker(name)(design, layout) for name in names if name != REPORT}
-    files = {path: content for product in made.values() for path, content in product.files.items()}
+    made = {name: _maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
+    pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}
+    if pictures or PREVIEW in names:
+        from cmpdesign.writers.preview import preview_png
+
+        made[PREVIEW] = Made({PRODUCTS[PREVIEW].where: preview_png(layout, pictures)})
+    in_order = [made[name] for name in PRODUCTS if name in made]
+    files = {path: content for product in in_order for path, content in product.files.items()}
     figures = {name: product.figures for name, product in made.items() if product.figures}
     if figures or REPORT in names:
         from cmpdesign.report import report_to_json
@@ -126,9 +143,3 @@ def _layout(design: Design, layout: Layout) -> Made:
     from cmpdesign.writers.layout_file import layout_to_json
 
     return Made({PRODUCTS["layout"].where: layout_to_json(layout)})
-
-
-def _preview(design: Design, layout: Layout) -> Made:
-    from cmpdesign.writers.preview import layout_to_png
-
-    return Made({PRODUCTS["preview"].where: layout_to_png(layout)})

@@ -24,6 +24,21 @@ REACH_MM, ACROSS_MM, INSIDE_MM = 2.5, 0.6 * THICK_MM, 3.0
 LEAST_CONTRAST = 40.0
 PASSES = 3
 MM_PER_INCH = 25.4
+NO_CODE = "no print sheet's code was found; scan the whole sheet, lying straight, at 150 dpi or more"
+
+
+@dataclass(frozen=True, eq=False)
+class SheetBars:
+    """A sheet's code, and its bars as they lie in the picture.
+
+    Attributes:
+        key: the code's text.
+        x_px, y_px: (2, 2) first and last end of each bar.
+    """
+
+    key: SheetKey
+    x_px: Points
+    y_px: Points
 
 
 @dataclass(frozen=True)
@@ -32,14 +47,18 @@ class SheetReading:
 
     Attributes:
         key: the code's text.
+        dpi: the picture's resolution in x and y, if it is known.
         length_x_px, length_y_px: of the two bars.
         scale_x, scale_y: print over design; None without the picture's resolution.
         ratio: scale_x / scale_y, which needs no resolution.
         skew_deg: by how much the angle between the x and the y bar exceeds 90 degrees.
         rotation_deg: of the x bar in the picture, clockwise.
+        perspective_mm: how far the bars' ends lie off any print however stretched and skewed, as they do when
+            a camera looks from aside; ratio and skew are then the camera's, too.
     """
 
     key: SheetKey
+    dpi: tuple[float, float] | None
     length_x_px: float
     length_y_px: float
     scale_x: float | None
@@ -47,49 +66,64 @@ class SheetReading:
     ratio: float
     skew_deg: float
     rotation_deg: float
+    perspective_mm: float
 
     def to_json(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "key"} | {
-            "name": self.key.name,
-            "digest": self.key.digest,
+        return {"name": self.key.name, "digest": self.key.digest} | {
+            name: getattr(self, name) for name in self.__dataclass_fields__ if name != "key"
         }
 
 
-def read_sheet(image: Image, dpi: float | None = None) -> SheetReading | str:
-    """Read a sheet's key and bars, or say in a few words why that fails.
+def find_bars(image: Image) -> SheetBars | str:
+    """Find a sheet's code and bars, or say in a few words why that fails.
 
     Args:
         image: (H, W, 3) BGR, 8 or 16 bits.
-        dpi: the scan's resolution; without it only the ratio of the scales is known.
     """
     grey = _grey(image)
-    reason = "no print sheet's code was found; scan the whole sheet, lying straight, at 150 dpi or more"
+    reason = NO_CODE
     for key, corners in _codes(grey):
         x_bar, y_bar = (_measure_bar(grey, corners, *bar) for bar in (X_BAR, Y_BAR))
         if x_bar is not None and y_bar is not None:
-            return _reading(key, x_bar, y_bar, dpi)
+            return SheetBars(key, x_bar, y_bar)
         reason = "the code was read, but a scale bar beside it is covered, cut off or too pale"
     return reason
 
 
-def _reading(
-    key: SheetKey, x_bar: tuple[Points, Points], y_bar: tuple[Points, Points], dpi: float | None
-) -> SheetReading:
-    x, y = x_bar[1] - x_bar[0], y_bar[1] - y_bar[0]
+def measured(bars: SheetBars, dpi: tuple[float, float] | None = None) -> SheetReading:
+    """The print's scales, as far as they are known, and its skew.
+
+    Args:
+        bars: as found.
+        dpi: the scan's resolution in x and y; without it pixels are taken for square, and only the ratio of the
+            scales is known.
+    """
+    per_px = np.ones(2) if dpi is None else MM_PER_INCH / np.array(dpi)
+    x, y = (np.diff(ends, axis=0)[0] * per_px for ends in (bars.x_px, bars.y_px))
     length_x, length_y = float(np.hypot(*x)), float(np.hypot(*y))
     # The y bar runs up the page, against the image's y.
     between = np.degrees(np.arctan2(x[1] * y[0] - x[0] * y[1], x @ y))
-    per_mm = None if dpi is None else dpi / MM_PER_INCH * BAR_MM
     return SheetReading(
-        key,
-        length_x,
-        length_y,
-        None if per_mm is None else length_x / per_mm,
-        None if per_mm is None else length_y / per_mm,
-        length_x / length_y,
-        float(between) - 90.0,
-        float(np.degrees(np.arctan2(x[1], x[0]))),
+        key=bars.key,
+        dpi=dpi,
+        length_x_px=float(np.hypot(*(bars.x_px[1] - bars.x_px[0]))),
+        length_y_px=float(np.hypot(*(bars.y_px[1] - bars.y_px[0]))),
+        scale_x=None if dpi is None else length_x / BAR_MM,
+        scale_y=None if dpi is None else length_y / BAR_MM,
+        ratio=length_x / length_y,
+        skew_deg=float(between) - 90.0,
+        rotation_deg=float(np.degrees(np.arctan2(x[1], x[0]))),
+        perspective_mm=_perspective_mm(bars),
     )
+
+
+def _perspective_mm(bars: SheetBars) -> float:
+    """What is left of the four ends when the best affine map is taken away."""
+    ends = np.column_stack([np.array([*X_BAR, *Y_BAR]), np.ones(4)])
+    seen = np.concatenate([bars.x_px, bars.y_px])
+    affine, *_ = np.linalg.lstsq(ends, seen, rcond=None)
+    off_mm = (ends @ affine - seen) @ np.linalg.inv(affine[:2])
+    return float(np.hypot(*off_mm.T).max())
 
 
 def _grey(image: Image) -> NDArray[np.uint8]:
@@ -109,8 +143,9 @@ def _codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
 
     detectors = (cv2.QRCodeDetectorAruco(), cv2.QRCodeDetector())
     for left, top, part in _regions(grey):
-        for side, detector in product(SEARCH_PX, detectors):
-            factor = min(1.0, side / max(part.shape))
+        # Pictures smaller than a size are taken as they are, once.
+        factors = dict.fromkeys(min(1.0, side / max(part.shape)) for side in SEARCH_PX)
+        for factor, detector in product(factors, detectors):
             size = cv2.INTER_AREA
             small = part if factor == 1 else cv2.resize(part, None, fx=factor, fy=factor, interpolation=size)
             text, corners, _ = detector.detectAndDecode(small)
@@ -133,8 +168,8 @@ def _regions(grey: NDArray[np.uint8]) -> Iterator[tuple[int, int, NDArray[np.uin
 
 def _measure_bar(
     grey: NDArray[np.uint8], corners: Points, first: tuple[float, float], last: tuple[float, float]
-) -> tuple[Points, Points] | None:
-    """Both ends of a bar in the picture, to a fraction of a pixel."""
+) -> Points | None:
+    """(2, 2) both ends of a bar in the picture, to a fraction of a pixel."""
     ends = np.array([first, last])
     found = ends
     basis = _plane(corners)
@@ -147,7 +182,7 @@ def _measure_bar(
             return None
         found = np.array([start, end])
         basis = _through(basis, ends, found)
-    return found[0], found[1]
+    return found
 
 
 def _plane(corners: Points) -> Points:

@@ -36,6 +36,19 @@ def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     return np.asarray(_neighbours(axial, layers))
 
 
+def inner_table(axial: NDArray[np.int32], layer: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(M, 18) int32: for markers of the outermost layer, the nearest ones of the other layers; else -1."""
+    from scipy.spatial import cKDTree
+
+    table = np.full((len(layer), len(RING)), -1, np.int32)
+    outer, inner = np.flatnonzero(layer == layer.max()), np.flatnonzero(layer < layer.max())
+    count = min(len(RING), len(inner))
+    place = axial @ np.array([[1.0, 0.0], [0.5, 0.75**0.5]])
+    near = cKDTree(place[inner]).query(place[outer], count)[1].reshape(len(outer), -1)
+    table[outer, :count] = inner[near]
+    return table
+
+
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
     """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predict`` does; 0 where
     these are too few for its quadratic."""

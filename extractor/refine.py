@@ -34,7 +34,7 @@ from .stepping import (
     votes,
     widening,
 )
-from .synthesis import A, B, clear, draw_cells, edge_contrasts, read_gridlines
+from .synthesis import AA, A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
 
 Preset = Literal["fast", "balanced", "accurate"]
@@ -54,6 +54,7 @@ MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
 JUDGED_BY_SAMPLES = 1, 4, 1.0
+PARDON = 0.1  # of the contrast: what glare and uneven light do to a profile
 NO_ROOM = np.empty((0, 4))
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
@@ -189,14 +190,15 @@ class Refiner:
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0, None)
         across = self._across(view, fit)
         fit = fit._replace(sigma=self._blur(view, fit, across))
-        return self._profile_step(view, fit, across, self._steps.profiles[0])[0], across
+        fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
+        return fit, across
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
         stations = steps.profiles[1] if sharp else FEW_STATIONS
-        fit, trusted = self._profile_step(view, fit, across, stations)
+        fit, trusted = self._profile_step(view, fit, across, stations, judged=sharp)
         if sharp:
             return self._refined(view, fit, *self._sure(fit, places), trusted)
         start = fit
@@ -225,13 +227,19 @@ class Refiner:
         return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
 
     def _profile_step(
-        self, view: Sight, fit: Fit, across: Across, stations: int
+        self, view: Sight, fit: Fit, across: Across, stations: int, *, judged: bool
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should."""
+        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should.
+
+        Gridlines are ``judged`` only where they are already close: farther off, the best of them look wrong.
+        """
         mesh = self._mesh
         lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
-        use, _ = trust(sums, sums[:, A], sums[:, B], *JUDGED_BY_SAMPLES)
+        use = (sums[:, AA] > 0).astype(np.float64)
+        if judged:
+            pardon = PARDON**2 * across.room[:, 3]
+            use, _ = trust(sums, sums[:, A], sums[:, B], pardon, *JUDGED_BY_SAMPLES)
         given = sums, sums[:, A], sums[:, B], use
         shift, information = self._solve(*given, lines, across.contrasts, False, fit)
         foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
@@ -261,7 +269,7 @@ class Refiner:
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        use, noise = trust(sums, to_a, to_b, *JUDGED_BY_PIXELS)
+        use, noise = trust(sums, to_a, to_b, np.zeros(len(sums)), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
             np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
@@ -335,7 +343,7 @@ class Refiner:
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS)
+            start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS, judged=True)
             profiled, wide = self._sure(start, places)
             use = lost & trusted
             xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]

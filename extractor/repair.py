@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .neighbourhood import INNER, deviant, predict
+from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
 from .refine import Refined
 from .tables import Lattice
 from .types import Status
@@ -20,6 +20,7 @@ from .types import Status
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
+MAX_FRAYED = 0.25  # in edges, of a marker of the outermost layer from where the others put it
 MAX_UNEXPLAINED = 0.08  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
@@ -58,6 +59,7 @@ def repair(
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
     _drop_outliers(xy, cov, edge_px, refined.explained, lattice)
+    _drop_frayed(xy, cov, edge_px, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
@@ -111,6 +113,21 @@ def _drop_outliers(
         bad = (excess > 1.0) & (excess >= around)
         xy[bad] = np.nan
         cov[bad] = np.nan
+
+
+def _drop_frayed(
+    xy: NDArray[np.float64], cov: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
+) -> None:
+    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
+
+    An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
+    """
+    outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
+    place, _, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
+    apart = xy - place
+    with np.errstate(invalid="ignore"):
+        bad = (np.hypot(apart[:, 0], apart[:, 1]) > MAX_FRAYED * edge) & (support >= MIN_QUADRATIC)
+    xy[bad], cov[bad] = np.nan, np.nan
 
 
 def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:

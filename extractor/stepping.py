@@ -56,11 +56,12 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
 
 
 @compiled
-def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped-def]
+def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) weights, 1 for gridlines that look as the pattern does once they are moved, and the noise (NaN where
     nothing was read).
 
-    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``.
+    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
+    misfit of less than its ``pardon`` (E,) is always forgiven.
     """
     count = sums.shape[0]
     misfit, use = np.full(count, np.nan), np.zeros(count)
@@ -78,7 +79,7 @@ def trust(sums, to_a, to_b, values, least, unjudged):  # type: ignore[no-untyped
     usual = max(np.median(judged), MIN_NOISE**2)
     for e in range(count):
         if np.isfinite(misfit[e]):
-            limit = usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
+            limit = max(usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2))), pardon[e])
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
     return use, np.sqrt(usual)
 
@@ -99,7 +100,7 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
 
 @compiled
 def short_edge(xy, edges):  # type: ignore[no-untyped-def]
-    """The length in px that nine tenths of the gridlines exceed; 0 without any."""
+    """The length in px that all but a hundredth of the gridlines exceed; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e]
@@ -107,7 +108,7 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.partition(length[:count], count // 10)[count // 10] if count > 0 else 0.0
+    return np.partition(length[:count], count // 100)[count // 100] if count > 0 else 0.0
 
 
 @compiled

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .lattice import axial, layer_of, marker_id
-from .neighbourhood import neighbour_table, ring_weights
+from .neighbourhood import inner_table, neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
 UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
@@ -29,6 +29,7 @@ class Lattice:
         axial: (U, 2) int32, the cells' (q, r).
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
+        inner: (M, 18) int32, for markers of the outermost layer the nearest ones of the others, else -1.
         ring_weights: (M, 18) float64, weights of these that give a marker's place; 0 where they are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
@@ -41,6 +42,7 @@ class Lattice:
     axial: NDArray[np.int32]
     layer: NDArray[np.int32]
     neighbours: NDArray[np.int32]
+    inner: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
     present: NDArray[np.bool_]
 
@@ -73,6 +75,7 @@ def lattice_of(reference: Reference) -> Lattice:
         axial=coordinates[lower_left],
         layer=reference.layer,
         neighbours=neighbours,
+        inner=inner_table(coordinates, reference.layer),
         ring_weights=ring_weights(reference.xy_mm, neighbours),
         present=reference.present,
     )

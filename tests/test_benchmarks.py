@@ -49,6 +49,19 @@ def test_a_quick_run_prints_and_writes(name: str, keys: set[str], tmp_path: Path
         assert scene["rms_inner_px"] > 0.9 * scene["bound_inner_px"]
 
 
+def test_the_benchmark_of_molds_runs(tmp_path: Path) -> None:
+    out = tmp_path / "figures.json"
+    command = [sys.executable, "-m", "benchmarks.molds", "--quick", "--json", str(out)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stderr
+    figures = json.loads(out.read_text(encoding="utf-8"))
+    assert set(figures) == {"conditions", "seconds", "exponents", "booleans", "processes"}
+    assert list(figures["seconds"]) == ["9", "36"] and list(figures["booleans"]) == ["36"]
+    first, second = figures["processes"]
+    # Two processes, the same bytes.
+    assert first["digest"] == second["digest"] and first["gb"] < 1.5
+
+
 def test_exponents_are_slopes_in_the_logarithm() -> None:
     code = (
         "from benchmarks.extraction import exponent, per_unit, side_px\n"

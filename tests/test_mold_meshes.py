@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from itertools import pairwise
 
+import cv2
 import numpy as np
 import pytest
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.mold import meshes as product
+from cmpdesign.mold.job_sheet import job_sheet
 from cmpdesign.mold.meshes import make_meshes, part_mesh
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import parts_of
+from cmpdesign.mold.pictures import exploded
 from cmpdesign.mold.stack import stack_of
 from cmpdesign.products import Made
 from cmpdesign.writers.mesh_3mf import meshes_to_3mf, read_3mf
@@ -89,20 +93,23 @@ def test_an_open_mesh_is_refused() -> None:
         product._checked("tent", tent, tent.volume_mm3(), 1e-9, {})
 
 
-def test_crowned_meshes_are_closed() -> None:
-    design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+@pytest.mark.parametrize("crown", ["sphere", "cylinder"])
+def test_crowned_meshes_are_closed(crown: str) -> None:
+    design = load_design("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
     stack = stack_of(design, build_layout(design))
     for mesh, volume in pad_meshes(stack):
         product._checked(mesh.name, mesh, volume, 1e-9, {})
-    for part in parts_of(stack)[:4]:
+    for part in parts_of(stack):
         product._checked(part.name, *part_mesh(part), {})
 
 
-def test_files_are_the_same_again(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(product, "part_pictures", lambda mold: {})
-    design = load_design("honeycomb", {"layers": "2"})
-    again = make_meshes(design, build_layout(design)).files
-    assert [name for name, data in again.items() if data != made.files[name]] == []
+def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
+    design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+    stack = stack_of(design, build_layout(design))
+    page = job_sheet("dome", stack, parts_of(stack), [])
+    assert "flush" not in page and "wipe along the dome" in page
+    # The white cell alone would be a tenth of a milligram.
+    assert page.count("<td class=n>2.00 g</td>") == 7
 
 
 def test_pictures_show_bosses_from_above_only() -> None:
@@ -116,10 +123,35 @@ def test_pictures_show_bosses_from_above_only() -> None:
     assert spread[0] > spread[1] + 30
 
 
+def test_every_part_has_its_pictures(made: Made) -> None:
+    parts = {name.removeprefix("mold/") for name in made.figures if name.startswith("mold/")}
+    assert set(made.pictures) == {"exploded"} | {f"{p}-{side}" for p in parts for side in ("above", "below")}
+    for name, picture in made.pictures.items():
+        data = content(made, f"pictures/{name}.png")
+        np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(data, np.uint8), 1), picture)
+        # A part fills its picture, and does not touch the picture's rim.
+        ink = (picture < 250).any(axis=2)
+        assert 0.02 < ink.mean() < 0.9 and not ink[[0, -1]].any() and not ink[:, [0, -1]].any(), name
+
+
+def test_exploded_parts_lie_above_each_other_and_apart() -> None:
+    design = load_design("honeycomb", {"layers": "2"})
+    parts = parts_of(stack_of(design, build_layout(design)))
+    groups = exploded(parts, [part_mesh(part)[0] for part in parts])
+    assert list(groups)[:3] == ["base", "pin", "frame"] and len(groups["pin"]) == 4
+    ends = [
+        (min(m.points[:, 2].min() for m in g), max(m.points[:, 2].max() for m in g)) for g in groups.values()
+    ]
+    assert all(below[1] + 2 < above[0] for below, above in pairwise(ends))
+    # A boss plate is used upside down: below are its bosses' tips only.
+    x, _, z = groups["boss-red"][0].points.T
+    assert np.ptp(x[z < z.min() + 1e-6]) < 0.5 * np.ptp(x[z > z.max() - 1e-6])
+
+
 def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
     page = made.files["mesh/job-sheet.html"]
     assert isinstance(page, str)
-    for word in ("boss-red", "Solaris", "ml", "exploded.png"):
+    for word in ("boss-red", "Solaris", "mm³", "exploded.png", "draw it off flush"):
         assert word in page
     for name in (
         f"mesh/pictures/{part}-{side}.png" for part in ("base", "lid") for side in ("above", "below")

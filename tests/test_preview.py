@@ -10,7 +10,7 @@ from cmpdesign.build import build_layout
 from cmpdesign.design import Design, load_design
 from cmpdesign.layout import COLORS, Layout
 from cmpdesign.patterns import patterns
-from cmpdesign.writers.preview import LONG_SIDE_PX, MARGIN_PX, TITLE_PX, draw_preview, layout_to_png
+from cmpdesign.writers.preview import LONG_SIDE_PX, MARGIN_PX, TITLE_PX, draw_preview, preview_png
 
 
 def layout(pattern: str, **more: object) -> Layout:
@@ -37,8 +37,8 @@ def test_every_cell_has_its_color_at_its_centre(pattern: str) -> None:
 @pytest.mark.parametrize("name", ["tac3d", "gelsight-mini", "square"])
 def test_the_png_is_deterministic_and_readable(name: str) -> None:
     built = build_layout(load_design(name))
-    data = layout_to_png(built)
-    assert data == layout_to_png(built)
+    data = preview_png(built)
+    assert data == preview_png(built)
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     np.testing.assert_array_equal(image, draw_preview(built))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,12 +16,15 @@ from cmpdesign import build_layout, load_design
 from cmpdesign.cli import app
 from cmpdesign.design import Design
 from cmpdesign.errors import DesignError
+from cmpdesign.resolution import resolution_dpi
 from cmpdesign.sheet_key import SheetKey, parse_key
-from cmpdesign.sheet_reading import SheetReading, read_sheet
+from cmpdesign.sheet_reading import SheetBars, SheetReading, find_bars, measured
+from cmpdesign.sheet_verdict import PERSPECTIVE_TOLERANCE_MM
 from cmpdesign.writers.layout_file import layout_to_json
 from cmpdesign.writers.print_sheet import make_print_sheet
 
 DPI = 200.0
+Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def design(**values: str) -> Design:
@@ -28,8 +32,8 @@ def design(**values: str) -> Design:
 
 
 @pytest.fixture(scope="module")
-def scan() -> np.ndarray:  # type: ignore[type-arg]
-    """The sheet rasterised by a renderer that is not ours."""
+def scan() -> Pixels:
+    """The SVG sheet rasterised by a renderer that is not ours."""
     import resvg_py
 
     parameters = design()
@@ -39,7 +43,19 @@ def scan() -> np.ndarray:  # type: ignore[type-arg]
     return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR))
 
 
-def warped(image: np.ndarray, matrix: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+@pytest.fixture(scope="module")
+def pdf_scan() -> Pixels:
+    """The PDF sheet rasterised by a browser's renderer."""
+    import pypdfium2
+
+    parameters = design()
+    pdf = make_print_sheet(parameters, build_layout(parameters)).files["print/sheet.pdf"]
+    assert isinstance(pdf, bytes)
+    page = pypdfium2.PdfDocument(pdf)[0]
+    return np.ascontiguousarray(page.render(scale=DPI / 72).to_numpy()[:, :, :3])
+
+
+def warped(image: Pixels, matrix: np.ndarray[Any, Any]) -> Pixels:
     """The image through a 2x2 matrix, moved into a larger frame, a little blurred and noisy."""
     height, width = image.shape[:2]
     corners = np.array([(0, 0), (width, 0), (0, height), (width, height)]) @ matrix.T
@@ -52,14 +68,15 @@ def warped(image: np.ndarray, matrix: np.ndarray) -> np.ndarray:  # type: ignore
     return np.clip(cv2.GaussianBlur(result, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8)
 
 
-def reading(image: np.ndarray, dpi: float | None = DPI) -> SheetReading:  # type: ignore[type-arg]
-    found = read_sheet(image, dpi)
-    assert isinstance(found, SheetReading), found
-    return found
+def reading(image: Pixels, dpi: float | None = DPI) -> SheetReading:
+    found = find_bars(image)
+    assert isinstance(found, SheetBars), found
+    return measured(found, None if dpi is None else (dpi, dpi))
 
 
-def test_a_true_print_reads_true(scan: np.ndarray) -> None:  # type: ignore[type-arg]
-    found = reading(scan)
+@pytest.mark.parametrize("printed", ["scan", "pdf_scan"])
+def test_a_true_print_reads_true(printed: str, request: pytest.FixtureRequest) -> None:
+    found = reading(request.getfixturevalue(printed))
     assert found.key.digest == build_layout(design()).digest
     assert (found.key.layers, found.key.pitch_mm, found.key.name) == (6, 1.5, "honeycomb")
     assert (found.scale_x, found.scale_y) == pytest.approx((1, 1), abs=5e-4)
@@ -71,34 +88,31 @@ def test_a_true_print_reads_true(scan: np.ndarray) -> None:  # type: ignore[type
     [(0.97, 1.0, 0, 0), (1.01, 0.985, 0.4, 3), (1, 1, -0.3, 92), (1, 1.02, 0, 181)],
 )
 def test_scale_skew_and_turn_are_measured(
-    scan: np.ndarray,
-    scale_x: float,
-    scale_y: float,
-    skew: float,
-    turn: float,  # type: ignore[type-arg]
+    pdf_scan: Pixels, scale_x: float, scale_y: float, skew: float, turn: float
 ) -> None:
     lean = np.radians(skew)
     # The y bar runs up the page; leaning it to the left opens the angle to the x bar.
     stretch = np.array([(scale_x, scale_y * np.sin(lean)), (0, scale_y * np.cos(lean))])
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    found = reading(warped(scan, np.array([(c, -s), (s, c)]) @ stretch))
+    found = reading(warped(pdf_scan, np.array([(c, -s), (s, c)]) @ stretch))
     assert (found.scale_x, found.scale_y) == pytest.approx((scale_x, scale_y), abs=1e-3)
     assert found.skew_deg == pytest.approx(skew, abs=0.03)
+    assert found.perspective_mm < 0.05
     assert (found.rotation_deg - turn + 180) % 360 == pytest.approx(180, abs=0.05)
 
 
-def test_without_resolution_the_ratio_is_known(scan: np.ndarray) -> None:  # type: ignore[type-arg]
+def test_without_resolution_the_ratio_is_known(scan: Pixels) -> None:
     found = reading(warped(scan, np.diag([1.02, 1.0])), None)
     assert found.scale_x is None and found.ratio == pytest.approx(1.02, abs=1e-3)
 
 
-def test_what_cannot_be_read_says_why(scan: np.ndarray) -> None:  # type: ignore[type-arg]
+def test_what_cannot_be_read_says_why(scan: Pixels) -> None:
     blank = np.full_like(scan, 255)
-    assert "no print sheet's code" in str(read_sheet(blank))
+    assert "no print sheet's code" in str(find_bars(blank))
     covered = scan.copy()
     height = covered.shape[0]
     covered[: int(height - 34 / 25.4 * DPI)] = 255
-    assert "a scale bar" in str(read_sheet(covered, DPI))
+    assert "a scale bar" in str(find_bars(covered))
 
 
 def test_keys_survive_odd_names() -> None:
@@ -107,22 +121,119 @@ def test_keys_survive_odd_names() -> None:
     assert parse_key("https://example.org") is None and parse_key("CMP1|a|b|c|d|e") is None
 
 
-def test_verify_reports_the_print(scan: np.ndarray, tmp_path: Path) -> None:  # type: ignore[type-arg]
-    cv2.imwrite(str(tmp_path / "true.png"), scan)
-    cv2.imwrite(str(tmp_path / "small.png"), warped(scan, np.diag([0.97, 0.97])))
-    (tmp_path / "layout.json").write_text(layout_to_json(build_layout(design())))
-    (tmp_path / "other.json").write_text(layout_to_json(build_layout(design(layers="5"))))
+def leaning(image: Pixels, tilt_deg: float, away_mm: float = 400.0) -> Pixels:
+    """The sheet as a camera sees it that looks at its middle from aside."""
+    height, width = image.shape[:2]
+    away, tilt = away_mm / 25.4 * DPI, np.radians(tilt_deg)
+    x, y = np.array([(0, 0), (width, 0), (width, height), (0, height)], dtype=float).T
+    u, v = x - width / 2, y - height / 2
+    depth = away - u * np.sin(tilt)
+    seen = np.stack([width / 2 + u * np.cos(tilt) * away / depth, height / 2 + v * away / depth], axis=-1)
+    ground = np.stack([x, y], axis=-1).astype(np.float32)
+    matrix = cv2.getPerspectiveTransform(ground, seen.astype(np.float32))
+    return np.asarray(cv2.warpPerspective(image, matrix, (width, height), borderValue=(255, 255, 255)))
 
-    def run(layout: str, picture: str, *more: str) -> tuple[int, str]:
-        arguments = ["verify", str(tmp_path / layout), str(tmp_path / picture), "--sheet-dpi", "200", *more]
-        result = CliRunner().invoke(app, arguments)
+
+@pytest.mark.parametrize("tilt", [5.0, 10.0])
+def test_a_camera_that_looks_from_aside_is_found_out(scan: Pixels, tilt: float) -> None:
+    assert reading(leaning(scan, 0.0), None).perspective_mm < 0.03
+    assert reading(leaning(scan, tilt), None).perspective_mm > PERSPECTIVE_TOLERANCE_MM
+
+
+def saved(image: Pixels, path: Path, **options: Any) -> Path:
+    from PIL import Image
+
+    Image.fromarray(image[:, :, ::-1]).save(path, **options)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["png", "jpg", "tif", "bmp"])
+def test_files_state_their_resolution(kind: str, tmp_path: Path) -> None:
+    blank = np.full((20, 30, 3), 255, np.uint8)
+    assert resolution_dpi(saved(blank, tmp_path / f"a.{kind}", dpi=(300, 150))) == pytest.approx(
+        (300, 150), abs=0.02
+    )
+    assert "dpi, which programs write" in str(
+        resolution_dpi(saved(blank, tmp_path / f"b.{kind}", dpi=(72, 72)))
+    )
+    assert isinstance(resolution_dpi(saved(blank, tmp_path / f"c.{kind}")), str)
+
+
+def test_files_without_a_resolution_of_their_own_say_why(tmp_path: Path) -> None:
+    from PIL import Image
+
+    blank = np.full((20, 30, 3), 255, np.uint8)
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0x829A] = 0.01
+    photo = saved(blank, tmp_path / "photo.jpg", dpi=(300, 300), exif=exif)
+    assert "a photo's resolution tag" in str(resolution_dpi(photo))
+    assert "states no resolution" in str(resolution_dpi(saved(blank, tmp_path / "plain.png")))
+    (tmp_path / "broken.png").write_bytes(b"nothing")
+    assert "cannot be read" in str(resolution_dpi(tmp_path / "broken.png"))
+
+
+class Run:
+    """``cmpdesign verify`` on pictures in a folder with two layouts."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "layout.json").write_text(layout_to_json(build_layout(design())))
+        (folder / "other.json").write_text(layout_to_json(build_layout(design(layers="5"))))
+
+    def __call__(self, picture: Path, *more: str, layout: str = "layout.json") -> tuple[int, str]:
+        result = CliRunner().invoke(app, ["verify", str(self.folder / layout), str(picture), *more])
         return result.exit_code, result.stdout
 
-    assert run("layout.json", "true.png")[0] == 0
-    code, text = run("layout.json", "small.png")
+
+def test_verify_reads_a_sheet_by_itself(scan: Pixels, tmp_path: Path) -> None:
+    run = Run(tmp_path)
+    true = saved(scan, tmp_path / "true.png", dpi=(DPI, DPI))
+    code, text = run(true)
+    assert code == 0 and re.search(r"scale x (1.000|0.999)\d, y (1.000|0.999)\d at 200 dpi", text), text
+    small = saved(warped(scan, np.diag([0.97, 1.0])), tmp_path / "small.png", dpi=(DPI, DPI))
+    code, text = run(small)
     assert code == 1 and "scale in x is 0.97" in text
-    code, text = run("other.json", "true.png", "--json")
-    assert code == 1 and "another layout" in json.loads(text)["sheets"][0]["reason"]
+    code, text = run(true, "--json", layout="other.json")
+    (sheet,) = json.loads(text)["images"]
+    assert code == 1 and "another layout" in sheet["reason"]
+    assert sheet["sheet"]["scale_x"] == pytest.approx(1, abs=5e-4)
+    assert sheet["sheet"]["dpi"] == pytest.approx([DPI, DPI], abs=0.01)
+    code, text = run(saved(leaning(scan, 10.0), tmp_path / "aside.png"))
+    assert code == 1 and "seen at an angle" in text
+
+
+def test_verify_says_when_the_scales_are_not_known(scan: Pixels, tmp_path: Path) -> None:
+    run = Run(tmp_path)
+    for name, options, words in (
+        ("none", {}, "the file states no resolution"),
+        ("screen", {"dpi": (96, 96)}, "the file states 96 dpi"),
+        ("wrong", {"dpi": (600, 600)}, "by which the bars are 16.7 x 16.7 mm"),
+    ):
+        code, text = run(saved(scan, tmp_path / f"{name}.png", **options))
+        assert code == 0 and "scale x / y 1.000" in text and words in text, text
+    # What is given counts, whatever the file says.
+    code, text = run(tmp_path / "wrong.png", "--sheet-dpi", "200")
+    assert code == 0 and "at 200 dpi" in text
+    code, text = run(tmp_path / "wrong.png", "--sheet-dpi", "0")
+    assert code == 0 and "no resolution is given" in text
+    uneven = cv2.resize(scan, None, fx=1.0, fy=1.5)
+    code, text = run(saved(uneven, tmp_path / "uneven.png", dpi=(DPI, 1.5 * DPI)))
+    assert code == 0 and re.search(r"y (1.000|0.999)\d at 200 x 300 dpi", text), text
+
+
+def test_verify_tells_sheets_from_views(scan: Pixels, tmp_path: Path) -> None:
+    run = Run(tmp_path)
+    pitch_px = 24
+    view = tmp_path / "view.png"
+    arguments = ["render", str(tmp_path / "layout.json"), "-o", str(view), "--pitch", str(pitch_px)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    sheet = saved(scan, tmp_path / "sheet.png", dpi=(DPI, DPI))
+    code, text = run(view, str(sheet), "--json", "-o", str(tmp_path / "made"))
+    seen, printed = json.loads(text)["images"]
+    assert code == 0 and seen["measured"] == 127 and printed["sheet"]["name"] == "honeycomb"
+    assert json.loads((tmp_path / "made" / "verify.json").read_text()) == json.loads(text)
+    code, text = run(view, "--sheet-dpi", "200")
+    assert code == 1 and "no print sheet's code" in text
 
 
 def test_pdf_is_true_to_size_and_the_same_again() -> None:
@@ -154,7 +265,10 @@ def test_the_page_about_molds_says_what_works(tmp_path: Path, monkeypatch: pytes
     for command in commands:
         if command.startswith("verify"):
             svg = Path("out/print/sheet.svg").read_text(encoding="utf-8")
-            Path("scan.png").write_bytes(bytes(resvg_py.svg_to_bytes(svg_string=svg, dpi=300)))
+            png = np.frombuffer(bytes(resvg_py.svg_to_bytes(svg_string=svg, dpi=300)), np.uint8)
+            saved(np.asarray(cv2.imdecode(png, cv2.IMREAD_COLOR)), Path("scan.png"), dpi=(300, 300))
         result = CliRunner().invoke(app, command.split())
         assert result.exit_code == 0, (command, result.output)
+        if command.startswith("verify"):
+            assert "at 300 dpi" in result.output
     assert {path.name for path in Path("out").iterdir()} >= {"mold", "mesh", "print", "layout.json"}

@@ -6,6 +6,8 @@ import json
 import sys
 from types import ModuleType
 
+import cv2
+import numpy as np
 import pytest
 from conftest import small_layout
 
@@ -16,6 +18,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout import Layout
 from cmpdesign.products import PRODUCTS, USUAL, Made, Product, chosen_products, make_products
 from cmpdesign.report import report
+from cmpdesign.writers.preview import draw_preview
 
 FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
 
@@ -49,6 +52,26 @@ def test_a_product_brings_its_figures_and_findings(with_ruler: None) -> None:
     assert files["ruler/ruler.txt"] == "honeycomb"
     assert json.loads(files["report.json"])["ruler"] == {"ticks": len(small_layout().edges)}
     assert findings == (FINDING,)
+
+
+def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside and below the pattern's drawing, which stays as it is; the preview comes with them, unasked."""
+    tall, wide = np.zeros((400, 200, 3), np.uint8), np.full((200, 400, 3), (0, 0, 255), np.uint8)
+    module = ModuleType("camera")
+    module.make = lambda design, layout: Made({"a.txt": ""}, pictures={"tall": tall, "wide": wide})  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "camera", module)
+    monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
+    files, _ = make("camera")
+    assert set(files) == {"a.txt", "preview.png"}
+    data = files["preview.png"]
+    assert isinstance(data, bytes)
+    image, plain = cv2.imdecode(np.frombuffer(data, np.uint8), 1), draw_preview(small_layout())
+    height, width = plain.shape[:2]
+    np.testing.assert_array_equal(image[:height, :width], plain)
+    assert (image[:height, width:] == 0).all(axis=2).mean() > 0.9
+    assert (image[height:] == (0, 0, 248)).all(axis=2).sum() > 10_000
+    again, _ = make("camera")
+    assert again == files
 
 
 def test_choosing() -> None:

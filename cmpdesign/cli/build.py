@@ -9,7 +9,7 @@ import typer
 
 from cmpdesign.cli.terminal import console, print_warning, printable
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.products import PRODUCTS, USUAL, chosen_products, make_products
+from cmpdesign.products import PRODUCTS, USUAL, chosen_products, make_products, product_folders
 
 if TYPE_CHECKING:
     from cmpdesign.report import Report
@@ -33,19 +33,29 @@ def build(
         str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
     ] = USUAL,
 ) -> None:
-    """Write a design's files: SVG, layout file, preview and report, or what --only names."""
+    """Write a design's files: SVG, layout file, preview and report, or what --only names.
+
+    Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, unless
+    they were changed since.
+    """
     from cmpdesign.build import build_layout
     from cmpdesign.design import load_design
     from cmpdesign.report import report
     from cmpdesign.writers.atomic import write_folder
+    from cmpdesign.writers.earlier import LIST_NAME, remove, stale_files, with_lists
 
     names = chosen_products(only)
     parameters = load_design(design, overrides(override))
     layout = build_layout(parameters)
     figures = report(parameters, layout)
     files, findings = make_products(names, parameters, layout, figures)
-    for path in write_folder(output, files):
-        console().print(f"wrote {printable(path)}")
+    listed = with_lists(files, product_folders())
+    stale = stale_files(output, listed)
+    for path in write_folder(output, listed):
+        if path.name != LIST_NAME:
+            console().print(f"wrote {printable(path)}")
+    for path in remove(stale):
+        console().print(f"removed {printable(path)}, of an earlier build")
     print_figures(figures)
     for finding in (*figures.findings, *findings):
         verb = "will not work" if finding.severity == "error" else "may not work"

@@ -1,11 +1,15 @@
-"""``cmpdesign verify``: are these pictures the layout's pattern, seen and numbered as designed?"""
+"""``cmpdesign verify``: are these pictures the layout's pattern, seen and numbered as designed?
+
+A picture that shows a print sheet's code is judged as a print: whose it is, and how true.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +19,7 @@ from cmpdesign.cli.terminal import BAD_INPUT, console, one_line, print_error, pr
 
 if TYPE_CHECKING:
     from cmpdesign.images import Image
+    from cmpdesign.sheet_verdict import SheetVerdict
     from cmpdesign.verify import Verdict
     from extractor import Extractor
     from extractor.reference import Reference
@@ -27,7 +32,7 @@ class Outcome:
     """One image's name with its verdict, or with the error that says why it could not be read."""
 
     name: str
-    verdict: Verdict | None
+    verdict: Verdict | SheetVerdict | None
     error: str | None
 
     @property
@@ -55,22 +60,19 @@ def verify(
     ] = 0.9,
     sheet_dpi: Annotated[
         float | None,
-        typer.Option(min=0, help="The pictures are print sheets scanned at this resolution (0: unknown)."),
+        typer.Option(
+            min=0, help="The pictures are print sheets of this resolution (0: unknown), whatever files say."
+        ),
     ] = None,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from extractor import Extractor, load_layout
 
-    if sheet_dpi is not None:
-        from cmpdesign.cli.verify_sheet import verify_sheets
-
-        verify_sheets(layout, images, sheet_dpi, output, as_json)
     reference = load_layout(layout)
-    extractor = Extractor(reference)
+    judge = _Judge(reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug)
     names = _distinct([path.stem for path in images])
     outcomes = [
-        _outcome(path, name, extractor, reference, min_share, (output, debug))
-        for path, name in _with_progress(list(zip(images, names, strict=True)))
+        judge.outcome(path, name) for path, name in _with_progress(list(zip(images, names, strict=True)))
     ]
     report = _report(reference, outcomes, min_share)
     if output is not None:
@@ -82,26 +84,34 @@ def verify(
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
-def _outcome(
-    path: Path,
-    name: str,
-    extractor: Extractor,
-    reference: Reference,
-    min_share: float,
-    folders: tuple[Path | None, Path | None],
-) -> Outcome:
-    """An image that cannot be read is reported and does not keep the others from being processed."""
-    from cmpdesign.images import ImageFileError, read_image
-    from cmpdesign.verify import verify as verify_image
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """What pictures are judged by; the extractor is made when the first picture needs it."""
 
-    try:
-        image = read_image(path)
-    except ImageFileError as error:
-        print_error(error)
-        return Outcome(printable(path), None, one_line(error))
-    verdict = verify_image(extractor, reference, image, min_share)
-    _write_pictures(image, reference, verdict, name, *folders)
-    return Outcome(printable(path), verdict, None)
+    reference: Reference
+    extractor: Callable[[], Extractor]
+    min_share: float
+    sheet_dpi: float | None
+    output: Path | None
+    debug: Path | None
+
+    def outcome(self, path: Path, name: str) -> Outcome:
+        """An image that cannot be read is reported and does not keep the others from being processed."""
+        from cmpdesign.images import ImageFileError, read_image
+        from cmpdesign.sheet_verdict import judge_sheet
+        from cmpdesign.verify import verify as verify_image
+
+        try:
+            image = read_image(path)
+        except ImageFileError as error:
+            print_error(error)
+            return Outcome(printable(path), None, one_line(error))
+        sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
+        if sheet.is_sheet or self.sheet_dpi is not None:
+            return Outcome(printable(path), sheet, None)
+        verdict = verify_image(self.extractor(), self.reference, image, self.min_share)
+        _write_pictures(image, self.reference, verdict, name, self.output, self.debug)
+        return Outcome(printable(path), verdict, None)
 
 
 def _write_pictures(
@@ -127,7 +137,11 @@ def _lines(outcomes: list[Outcome]) -> str:
     return "".join(f"{item.name}: {_line(item.verdict)}\n" for item in outcomes if item.verdict is not None)
 
 
-def _line(verdict: Verdict) -> str:
+def _line(verdict: Verdict | SheetVerdict) -> str:
+    from cmpdesign.verify import Verdict
+
+    if not isinstance(verdict, Verdict):
+        return verdict.line()
     repaired = verdict.repaired + verdict.fitted
     counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
     head = "verified" if verdict.verified else f"not verified: {verdict.reason}"

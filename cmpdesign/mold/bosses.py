@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.mold.loops import Loop, Points, inset_cells, polygon
+from cmpdesign.mold.loops import Loop, Points, inset_cells
 from cmpdesign.mold.shells import Feature
 from cmpdesign.mold.stack import Stack
 
 # A stencil's hole widens upwards, so that the paste lets go when it is lifted.
 STENCIL_LEAN = float(np.tan(np.radians(10.0)))
-
-
-def root_corners(stack: Stack, cell: Points) -> Points:
-    """The cavity at its open side: the cell less half the gap on every side."""
-    return polygon(cell).moved(-stack.options.gap_mm / 2).points
 
 
 def bosses(stack: Stack, cells: Points) -> list[Feature]:

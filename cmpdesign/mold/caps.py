@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmpdesign.mold.crown import Crown
+from cmpdesign.mold.crown import END_SLOPE, Crown
 
 
 def with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
@@ -45,7 +45,25 @@ def cap_solid(crown: Crown) -> Any:
     face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
     if sphere:
         return BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(0.0, 0.0, 1.0))).Shape()
-    return BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 2 * crown.length_mm, 0.0)).Shape()
+    return _between_ends(BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 2 * crown.length_mm, 0.0)).Shape(), crown)
+
+
+def _between_ends(bar: Any, crown: Crown) -> Any:
+    """A cylinder's cap, cut off by its leaning ends."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    # A trapezium across the bar, a little wider and higher than it.
+    aside, top, end = crown.reach_mm + 1.0, crown.height_mm + 1.0, crown.length_mm
+    narrower = end - top / END_SLOPE
+    outline = BRepBuilderAPI_MakePolygon()
+    for y, z in ((-end, 0.0), (end, 0.0), (narrower, top), (-narrower, top)):
+        outline.Add(gp_Pnt(-aside, y, z))
+    outline.Close()
+    face = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
+    return BRepAlgoAPI_Common(bar, BRepPrimAPI_MakePrism(face, gp_Vec(2 * aside, 0.0, 0.0)).Shape()).Shape()
 
 
 def _arc_middle(crown: Crown, y: float) -> tuple[float, float, float]:

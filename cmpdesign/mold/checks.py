@@ -12,8 +12,9 @@ from cmpdesign.checks import Finding
 from cmpdesign.errors import DesignError
 from cmpdesign.layout import COLORS
 from cmpdesign.mold.bosses import bosses
+from cmpdesign.mold.crown import Crown
 from cmpdesign.mold.loops import Points, frusta_volume_mm3, inset_cells
-from cmpdesign.mold.stack import LAYERS, Stack
+from cmpdesign.mold.stack import LAYERS, Stack, crown_edge_mm
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ DRAFT_WARNING_DEG = 0.5
 WEB_WARNING_MM = 0.05
 # Layers that differ more than this at the pad's edge wrinkle.
 MISMATCH_WARNING_MM = 0.1
+# Flat tips of bosses press the crowned base layer by this share of the black layer at most, before it bulges.
+SAG_WARNING = 0.1
 # A dome's layers, measured across, may thin to this share of their thickness at the apex.
 THIN_WARNING = 0.85
 LEAST_WALL_MM = 0.3
@@ -49,6 +52,7 @@ LEAST_WALL_MM = 0.3
 def check_mold(stack: Stack) -> list[Finding]:
     """Findings, errors first."""
     found = [*_bosses(stack), *_draft(stack), *_sheets(stack), *_curing(stack), *_shapes(stack)]
+    found += _unused(stack)
     return sorted(found, key=lambda finding: finding.severity)
 
 
@@ -187,15 +191,20 @@ def _sheets(stack: Stack) -> Iterator[Finding]:
 
 def _curing(stack: Stack) -> Iterator[Finding]:
     tool = stack.options.tool
+    by_remedy: dict[str, list[str]] = {}
     for name, silicone in zip(LAYERS, stack.silicones, strict=True):
         if tool in silicone.inhibited_by.value:
-            subject = f"materials at the {name} layer on which {silicone.name} may not cure ({tool})"
-            yield Finding(subject, 1, 0, "", silicone.remedy, "warning")
+            by_remedy.setdefault(silicone.remedy, []).append(f"{name}: {silicone.name}")
+    for remedy, names in by_remedy.items():
+        subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
+        yield Finding(subject, len(names), 0, "", remedy, "warning")
     layers = list(zip(LAYERS, stack.silicones, strict=True))
     for (below, under), (above, over) in pairwise(layers):
-        if under.cure == "tin" and over.cure == "platinum":
+        # Neither cures against the other, the makers say.
+        if under.cure != over.cure:
             subject = (
-                f"tin-cured layers ({below}: {under.name}) under a platinum-cured one ({above}: {over.name})"
+                f"{under.cure}-cured layers ({below}: {under.name}) under a {over.cure}-cured one "
+                f"({above}: {over.name})"
             )
             yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
     scales = [silicone.scale for silicone in stack.silicones]
@@ -224,12 +233,41 @@ def _shapes(stack: Stack) -> Iterator[Finding]:
         yield Finding("mold.fillet_mm", option.fillet_mm, float(size) / 2, "mm", "make it smaller", "error")
     if stack.crown is None:
         return
-    thin = float(np.cos(np.radians(stack.crown.slope_deg)))
+    yield from _crown(stack, stack.crown)
+
+
+def _crown(stack: Stack, crown: Crown) -> Iterator[Finding]:
+    thin = float(np.cos(np.radians(crown.slope_deg)))
     if thin < THIN_WARNING:
         remedy = "make mold.crown_radius_mm larger, or expect thinner layers at the pad's edge"
         yield Finding(
             "thickness at the crown's foot over that at its apex", thin, THIN_WARNING, "", remedy, "warning"
         )
+    if stack.layout.cell_corners.shape[1] != 3:
+        return
+    sag, limit = facet_sag_mm(stack), SAG_WARNING * stack.thickness_mm[1]
+    if sag > limit:
+        remedy = "make pitch_mm smaller or mold.crown_radius_mm larger: tips of bosses are flat"
+        yield Finding("crown over a flat boss's tip", sag, limit, "mm", remedy, "warning")
+
+
+def _unused(stack: Stack) -> Iterator[Finding]:
+    """What was asked for and has no effect, or another one than it says."""
+    option, layout = stack.options, stack.layout
+    if stack.crown is None:
+        remedy = 'not used on a flat pad: set mold.crown = "sphere" or "cylinder", or leave it out'
+        if option.crown_radius_mm is not None:
+            yield Finding("mold.crown_radius_mm", option.crown_radius_mm, 0.0, "mm", remedy, "warning")
+        if "projection" in option.model_fields_set and option.projection != "equidistant":
+            yield Finding(f'mold.projection = "{option.projection}"', 1, 0, "", remedy, "warning")
+        return
+    edge = crown_edge_mm(option, layout)
+    if edge > layout.border_mm:
+        remedy = "taken that wide around the crown, so that vents find room: make it larger, or mold.vent_mm smaller"
+        yield Finding("border_mm", layout.border_mm, edge, "mm", remedy, "warning")
+    if "clip" in layout.parameters:
+        subject = f"clip outlines of a pad whose edge follows its crown ({option.crown})"
+        yield Finding(subject, 1, 0, "", "only cells are clipped; leave it out to keep them all", "warning")
 
 
 def moat_to_pin_mm(stack: Stack) -> float:
@@ -240,6 +278,25 @@ def moat_to_pin_mm(stack: Stack) -> float:
     pins = shapely.points(stack.pins_mm)
     away = stack.options.parting_mm + stack.options.moat_mm + stack.pin_diameter_mm / 2
     return float(shapely.distance(pad, pins).min()) - away
+
+
+def facet_sag_mm(stack: Stack) -> float:
+    """How far the crown rises over the flat facets of plates, at most; 0 on a flat pad.
+
+    Over a chord between points of a sphere or cylinder of radius R, the circle rises by R - sqrt(R^2 - a^2), a
+    being half the chord; over a triangle, by the same of its circumcircle's radius. Along z it is the more by
+    the slope.
+    """
+    if stack.crown is None:
+        return 0.0
+    corners = np.concatenate([stack.cells(color) for color in stack.colors])
+    points = np.concatenate([corners, stack.crown.z_mm(corners.reshape(-1, 2)).reshape(-1, 3, 1)], axis=-1)
+    sides = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=-1)
+    double_area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=-1)
+    reach = float((sides.prod(axis=1) / (2 * double_area)).max())
+    radius = stack.crown.radius_mm
+    rise = radius - np.sqrt(max(radius**2 - reach**2, 0.0))
+    return float(rise / np.cos(np.radians(stack.crown.slope_deg)))
 
 
 def boss_volume_mm3(stack: Stack, color: int) -> float:

@@ -17,16 +17,18 @@ from cmpdesign.mold.loops import Points
 
 # Steeper walls of a pad are seen at a grazing angle and no longer pull straight off the plates.
 STEEPEST_DEG = 60.0
+# The ends of a cylindrical crown lean like this: upright ones would tear every layer, which has no thickness there.
+END_SLOPE = 1.0
 
 
 @dataclass(frozen=True)
 class Crown:
-    """A spherical or cylindrical (axis along y) cap.
+    """A spherical or cylindrical (axis along y) cap; a cylinder is cut off at both ends by planes at 45 degrees.
 
     Attributes:
         radius_mm: of the sphere or cylinder.
         reach_mm: half width of the cap at its foot, where its height is 0.
-        length_mm: half length of a cylindrical cap in y; the reach of a spherical one.
+        length_mm: half length of a cylindrical cap in y at its foot; the reach of a spherical one.
     """
 
     shape: Literal["sphere", "cylinder"]
@@ -51,15 +53,22 @@ class Crown:
         heights: NDArray[np.float64] = np.sqrt(self.radius_mm**2 - away**2) - np.sqrt(
             self.radius_mm**2 - self.reach_mm**2
         )
+        if self.shape == "cylinder":
+            heights = np.clip(END_SLOPE * (self.length_mm - np.abs(xy_mm[:, 1])), 0, heights)
         return heights
 
     def volume_mm3(self) -> float:
-        """Closed form: a spherical cap, or a circular segment times its length."""
+        """Closed form: a spherical cap, or a circular segment times its length, less what the ends cut off."""
         height, radius = self.height_mm, self.radius_mm
         if self.shape == "sphere":
             return float(np.pi * height**2 * (3 * radius - height) / 3)
         half = np.arcsin(self.reach_mm / radius)
-        return float(2 * self.length_mm * radius**2 * (half - np.sin(half) * np.cos(half)))
+        level = radius - height
+        under_arc = self.reach_mm * level + radius**2 * half
+        segment = under_arc - 2 * self.reach_mm * level
+        # The segment's first moment over its chord: the integral of z^2 / 2.
+        moment = self.reach_mm * (radius**2 + level**2 - self.reach_mm**2 / 3) - level * under_arc
+        return float(2 * (self.length_mm * segment - moment / END_SLOPE))
 
 
 def projected(xy_mm: Points, shape: str, radius_mm: float, projection: str) -> Points:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.mold.bosses import STENCIL_LEAN, root_corners
-from cmpdesign.mold.crown import Crown
-from cmpdesign.mold.loops import Loop, Points, frustum_volume_mm3, polygon
+from cmpdesign.mold.bosses import STENCIL_LEAN
+from cmpdesign.mold.crown import END_SLOPE, Crown
+from cmpdesign.mold.loops import Loop, Points, frustum_volume_mm3, inset_cells, polygon
 from cmpdesign.mold.stack import Stack
 
 FOOT_POINTS = 96
@@ -31,7 +31,7 @@ class Dish:
         points: (P, 3) corners of facets.
         foot: the points that bound the crown at z = 0, counter-clockwise.
         facets: corners of each facet, counter-clockwise from above.
-        ends: upright facets at the ends of a cylinder, counter-clockwise from outside.
+        ends: leaning facets at the ends of a cylinder, counter-clockwise from outside.
         outlines: facet -> (the boss's or hole's outline where it meets the facet, its other end), in plan.
         height_mm: from an outline to its other end, along z.
     """
@@ -56,7 +56,7 @@ class Dish:
         for facet in self.facets:
             corners = self.points[list(facet)]
             total += polygon(corners[:, :2]).area_mm2() * float(corners[:, 2].mean())
-        return total
+        return total + sum(_under_mm3(self.points[list(end)]) for end in self.ends)
 
     def outlines_volume_mm3(self) -> float:
         """Of all bosses or holes; a shear along z leaves a frustum's volume as it is."""
@@ -83,14 +83,25 @@ def bare_dish(stack: Stack) -> Dish:
 def dish_of(stack: Stack, color: int, through: bool) -> Dish:
     """The dish of a color's plate or (``through``) stencil; a facet's number is its cell's."""
     dish = bare_dish(stack)
-    height = stack.options.stencil_mm if through else stack.thickness_mm[1]
+    option = stack.options
+    height = option.stencil_mm if through else stack.thickness_mm[1]
+    grows = (STENCIL_LEAN if through else -stack.lean) * height
+    inset = option.gap_mm / 2 + (option.clearance_mm if through else 0.0)
+    # A boss's edges are rounder at its root than at its tip, a stencil's hole begins with the tip's radius.
+    radius = option.tip_radius_mm - min(grows, 0.0) if option.tip_radius_mm else 0.0
     outlines = {}
     for cell in np.flatnonzero(stack.layout.cell_color == color).tolist():
-        start = polygon(root_corners(stack, dish.points[list(dish.facets[cell]), :2]))
-        if through:
-            start = start.moved(-stack.options.clearance_mm)
-        outlines[cell] = start, start.moved((STENCIL_LEAN if through else -stack.lean) * height)
+        (start,) = inset_cells(dish.points[None, list(dish.facets[cell]), :2], inset, radius)
+        outlines[cell] = start.chorded(), start.chorded().moved(grows)
     return replace(dish, outlines=outlines, height_mm=height)
+
+
+def _under_mm3(corners: Points) -> float:
+    """Between a flat polygon and z = 0: a fan of prisms, each under a triangle."""
+    a, b, c = corners[0], corners[1:-1], corners[2:]
+    x1, y1 = (b - a)[:, :2].T
+    x2, y2 = (c - a)[:, :2].T
+    return float(((x1 * y2 - x2 * y1) / 2 * (a[2] + b[:, 2] + c[:, 2]) / 3).sum())
 
 
 def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
@@ -104,8 +115,9 @@ def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
     x[[0, -1]] = crown.reach_mm, -crown.reach_mm
     z = crown.z_mm(np.column_stack([x, 0 * x]))
     z[[0, -1]] = 0.0
-    back = np.column_stack([x, np.full_like(x, crown.length_mm), z])
-    front = np.column_stack([-x, np.full_like(x, -crown.length_mm), z])
+    y = crown.length_mm - z / END_SLOPE
+    back = np.column_stack([x, y, z])
+    front = np.column_stack([-x, -y, z])
     n = ARCH_POINTS
     return (
         np.concatenate([back, front]),

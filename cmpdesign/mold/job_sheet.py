@@ -13,10 +13,13 @@ from cmpdesign.mold.stack import LAYERS, Stack
 
 # Silicone that stays in cups and syringes, in percent of what is cast.
 LOSS_PERCENT = 30
+# Less than a gram of either part cannot be weighed to a percent on a scale of 0.01 g.
+LEAST_MIX_G = 2.0
 _STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ddd;text-align:left}"
     "td.n{text-align:right}figure{display:inline-block;margin:0 1em 1em 0}img{max-width:27em;width:100%}"
+    "img.whole{max-width:46em}"
     "li{margin:.4em 0}.warning{background:#fff3d6;padding:.5em 1em}"
 )
 
@@ -26,7 +29,7 @@ def job_sheet(name: str, stack: Stack, parts: Sequence[Part], findings: Sequence
     body = [
         f"<h1>Casting {escape(name)}</h1>",
         *(f'<p class="warning">{escape(str(finding))}</p>' for finding in findings),
-        '<img src="pictures/exploded.png" alt="all parts above each other, in the order of use">',
+        '<img class="whole" src="pictures/exploded.png" alt="all parts above each other, in the order of use">',
         "<h2>Mix</h2>",
         _pours(stack),
         "<h2>Steps</h2>",
@@ -48,18 +51,23 @@ def _pours(stack: Stack) -> str:
         silicone = base if name == LAYERS[0] else cover if name == LAYERS[2] else marker
         grams = volume * silicone.density_g_cm3.value / 1000
         cells = (
-            f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume / 1000:.3f} ml</td>"
-            f"<td class=n>{grams:.3f} g</td><td class=n>{grams * (1 + LOSS_PERCENT / 100):.2f} g</td>"
+            f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume:.1f} mm³</td>"
+            f"<td class=n>{grams:.4f} g</td>"
+            f"<td class=n>{max(grams * (1 + LOSS_PERCENT / 100), LEAST_MIX_G):.2f} g</td>"
             f"<td class=n>{silicone.pot_life_min.value:g} min</td><td "
             f"class=n>{silicone.cure_h.value:g} h</td>"
         )
         rows.append(f"<tr>{cells}</tr>")
-    head = f"<tr><th>layer<th>silicone<th>cast<th>cast<th>mix (+{LOSS_PERCENT} %)<th>pot life<th>cure</tr>"
+    mix = f"mix (+{LOSS_PERCENT} %, at least {LEAST_MIX_G:g} g)"
+    head = f"<tr><th>layer<th>silicone<th>cast<th>cast<th>{mix}<th>pot life<th>cure</tr>"
     return f"<table>{head}{''.join(rows)}</table>"
 
 
 def _steps(stack: Stack) -> list[str]:
     """The way of working that the parts are made for."""
+    domed = stack.crown is not None
+    spread = "spread it over the dome; the plates shape it" if domed else "draw it off flush with the frame"
+    even = "wipe along the dome with a soft card" if domed else "draw off flush"
     steps = [
         "Degrease all parts; try whether a drop of each silicone cures on them; spray release agent "
         "on everything "
@@ -69,8 +77,7 @@ def _steps(stack: Stack) -> list[str]:
         "through the vents and over the land into the moat. Cure level; lift the lid with the two "
         "jack screws (M3).",
         "Lay the frame on the base. Mix the black layer with a retarder and a thixotropic agent, so "
-        "that it stays "
-        "dough, and draw it off flush with the frame.",
+        f"that it stays dough, and {spread}.",
     ]
     for color in stack.colors:
         name = COLORS[color]
@@ -80,7 +87,7 @@ def _steps(stack: Stack) -> list[str]:
             f"stand on the base layer. Let the dough set, lift the plate straight up by its jack screws. Lay "
             f"<i>stencil-{name}</i> on, wipe {name} silicone through it, vacuum until bubbles have "
             "left, wipe again, "
-            "lift the stencil, draw off flush."
+            f"lift the stencil, {even}."
         )
     steps += [
         "Cure the marker layer fully, wipe it with isopropanol.",

@@ -7,7 +7,14 @@ from typing import Any
 
 from cmpdesign.design import Design
 from cmpdesign.layout import COLORS, Layout
-from cmpdesign.mold.checks import boss_volume_mm3, check_mold, moat_to_pin_mm, plate_web_mm, refuse_impossible
+from cmpdesign.mold.checks import (
+    boss_volume_mm3,
+    check_mold,
+    facet_sag_mm,
+    moat_to_pin_mm,
+    plate_web_mm,
+    refuse_impossible,
+)
 from cmpdesign.mold.finish import finished_all
 from cmpdesign.mold.parts import Part, parts_of
 from cmpdesign.mold.stack import LAYERS, Stack, stack_of
@@ -55,6 +62,8 @@ def mold_figures(stack: Stack) -> dict[str, Any]:
             "stencil to cavity, each side": stack.options.clearance_mm,
             "moat to pin hole": round(moat_to_pin_mm(stack), 6),
             f"between bosses of one plate ({plate})": round(web, 6),
+            # Below zero: flat tips press a crowned base layer.
+            "boss tips to base layer, at least": -round(facet_sag_mm(stack), 6) + 0.0,
         },
     }
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.design import Design
+from cmpdesign.images import to_png
 from cmpdesign.layout import Layout
 from cmpdesign.mold.checks import check_mold, refuse_impossible
 from cmpdesign.mold.finish import MoldError
@@ -15,7 +16,7 @@ from cmpdesign.mold.job_sheet import job_sheet
 from cmpdesign.mold.loops import boxes_of
 from cmpdesign.mold.pad import pad_meshes
 from cmpdesign.mold.parts import Part, parts_of
-from cmpdesign.mold.pictures import exploded_png, part_pictures
+from cmpdesign.mold.pictures import mold_pictures
 from cmpdesign.mold.shells import slab_solid, slab_volume_mm3
 from cmpdesign.mold.stack import Stack, stack_of
 from cmpdesign.mold.tessellate import chorded, mesh_of_solid
@@ -53,10 +54,10 @@ def make_meshes(design: Design, layout: Layout) -> Made:
     files[f"{FOLDER}/mold.3mf"] = meshes_to_3mf(laid_out, f"{design.name} mold")
     files[f"{FOLDER}/pad.glb"] = meshes_to_glb(pad, OPACITY)
     files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad")
-    pictures = {**part_pictures(mold), "exploded.png": exploded_png(parts, mold)}
-    files |= {f"{FOLDER}/pictures/{name}": png for name, png in pictures.items()}
+    pictures = mold_pictures(parts, mold)
+    files |= {f"{FOLDER}/pictures/{name}.png": to_png(picture) for name, picture in pictures.items()}
     files[f"{FOLDER}/job-sheet.html"] = job_sheet(design.name, stack, parts, findings)
-    return Made(files, figures, tuple(findings))
+    return Made(files, figures, tuple(findings), pictures)
 
 
 def part_mesh(part: Part) -> tuple[Mesh, float, float]:

@@ -62,8 +62,9 @@ class Part:
     @property
     def pulled(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """The box, in the part's own frame, in which its walls are pulled from silicone."""
-        edge = self.stack.edges(2)[1].points
-        (left, bottom), (right, top) = edge.min(axis=0), edge.max(axis=0)
+        # Layers that shrink differently differ in size.
+        edges = np.concatenate([self.stack.edges(layer)[1].points for layer in range(3)])
+        (left, bottom), (right, top) = edges.min(axis=0), edges.max(axis=0)
         if self.turned:
             bottom, top = -top, -bottom
         apex = self.stack.crown.height_mm if self.stack.crown else 0.0

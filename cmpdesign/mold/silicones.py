@@ -22,7 +22,7 @@ class Silicone(BaseModel):
     """A casting silicone.
 
     Attributes:
-        cure: the chemistry; a tin silicone under a platinum one keeps that from curing.
+        cure: the chemistry; tin and platinum silicones do not cure against each other.
         shrinkage_percent: linear, after full cure.
         density_g_cm3, pot_life_min, cure_h: at room temperature, for the job sheet.
         inhibited_by: materials of parts on which its surface stays sticky.

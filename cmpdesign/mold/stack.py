@@ -22,7 +22,7 @@ from cmpdesign.design import Design
 from cmpdesign.errors import DesignError
 from cmpdesign.fiducials import fiducial_positions
 from cmpdesign.layout import BLACK, COLORS, Layout
-from cmpdesign.mold.crown import STEEPEST_DEG, Crown, projected
+from cmpdesign.mold.crown import END_SLOPE, STEEPEST_DEG, Crown, projected
 from cmpdesign.mold.loops import Loop, Points, circle, polygon, rounded_rectangle
 from cmpdesign.mold.options import MoldOptions
 from cmpdesign.mold.silicones import Silicone, load_silicone
@@ -166,11 +166,17 @@ def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, 
         raise DesignError(
             f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make it larger"
         )
-    edge = max(layout.border_mm, option.vent_mm + 2 * FOOT_MM)
+    edge = crown_edge_mm(option, layout)
     if option.crown == "sphere":
         crown = Crown("sphere", radius, reach, reach)
         # The inscribed polygon's sides come nearer than its corners.
         return crown, round_outline(2 * (reach / scale + edge) / np.cos(np.pi / 360))
-    length = float(np.abs(points[:, 1]).max()) + FOOT_MM
+    height = Crown("cylinder", radius, reach, np.inf).height_mm
+    length = float(np.abs(points[:, 1]).max()) + FOOT_MM + height / END_SLOPE
     crown = Crown("cylinder", radius, reach, length)
     return crown, rectangle(2 * (reach / scale + edge), 2 * (length / scale + edge))
+
+
+def crown_edge_mm(option: MoldOptions, layout: Layout) -> float:
+    """Width of the flat edge around a crown: the border's, or what vents need."""
+    return max(layout.border_mm, option.vent_mm + 2 * FOOT_MM if option.vents else 0.0)

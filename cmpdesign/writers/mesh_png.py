@@ -1,4 +1,4 @@
-"""Meshes drawn to a PNG without a graphics card: parallel projection, depth buffer, dark outlines."""
+"""Meshes drawn without a graphics card: parallel projection, depth buffer, dark outlines."""
 
 from __future__ import annotations
 
@@ -39,11 +39,33 @@ class View:
 ABOVE, BELOW = View(-60.0, 35.0), View(-60.0, -35.0)
 
 
-def meshes_to_png(meshes: Sequence[Mesh], view: View = ABOVE, size_px: tuple[int, int] = (800, 600)) -> bytes:
-    """The picture, framed to the meshes, on white."""
-    from cmpdesign.images import to_png
+@dataclass(frozen=True, eq=False)
+class Framing:
+    """Where meshes come to lie in a picture that they fill.
 
-    return to_png(draw_meshes(meshes, view, size_px))
+    Attributes:
+        axes: of the view.
+        middle: (3,) of the meshes' box, along these axes, mm.
+        scale: pixels per mm.
+        size_px: width and height.
+    """
+
+    axes: Floats
+    middle: Floats
+    scale: float
+    size_px: tuple[int, int]
+
+    @classmethod
+    def of(cls, meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) -> Framing:
+        seen = np.concatenate([mesh.points for mesh in meshes]) @ view.axes().T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        scale = (1 - 2 * MARGIN) * float((np.array(size_px) / (high - low)[:2]).min())
+        return cls(view.axes(), (low + high) / 2, scale, size_px)
+
+    def to_px(self, points: Floats) -> Floats:
+        """(..., 3) points in pixels, y down; z grows towards the viewer in the same unit."""
+        x, y, z = np.moveaxis((points @ self.axes.T - self.middle) * self.scale, -1, 0)
+        return np.stack([self.size_px[0] / 2 + x, self.size_px[1] / 2 - y, z], axis=-1)
 
 
 def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) -> NDArray[np.uint8]:
@@ -53,11 +75,10 @@ def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) ->
     from cmpdesign.writers.mesh_raster import rasterize
 
     width, height = (OVERSAMPLING * side for side in size_px)
-    seen = [mesh.points @ view.axes().T for mesh in meshes]
-    corners = np.concatenate([points[mesh.triangles] for points, mesh in zip(seen, meshes, strict=True)])
+    framing = Framing.of(meshes, view, (width, height))
+    scaled = np.concatenate([framing.to_px(mesh.points)[mesh.triangles] for mesh in meshes])
     colors = np.concatenate([np.tile(_bgr(mesh.color), (len(mesh.triangles), 1)) for mesh in meshes])
-    scaled = _framed(corners, width, height)
-    shades = _shades(corners, view)
+    shades = _shades(scaled * (1, -1, 1), view)
     depth = np.full((height, width), -np.inf)
     number = np.full((height, width), -1, dtype=np.int64)
     rasterize(scaled, depth, number)
@@ -74,21 +95,12 @@ def _bgr(color: str) -> Floats:
     return np.array([int(color[i : i + 2], 16) for i in (5, 3, 1)], dtype=np.float64)
 
 
-def _framed(corners: Floats, width: int, height: int) -> Floats:
-    """Corners in pixels, y down; z grows towards the viewer in the same unit."""
-    flat = corners.reshape(-1, 3)
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    scale = (1 - 2 * MARGIN) * min(width / (high[0] - low[0]), height / (high[1] - low[1]))
-    middle = (low + high) / 2
-    moved = (corners - middle) * scale
-    return np.stack([width / 2 + moved[..., 0], height / 2 - moved[..., 1], moved[..., 2]], axis=-1)
-
-
 def _shades(corners: Floats, view: View) -> Floats:
-    """(T,) brightness of each triangle; the light stands behind the viewer's shoulder."""
+    """(T,) brightness of each triangle; the light stands behind the viewer's shoulder, from below at his knee."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    return np.asarray(AMBIENT + (1 - AMBIENT) * np.clip(normals @ LIGHT, 0, 1))
+    light = LIGHT * (1, 1 if view.elevation_deg >= 0 else -1, 1)
+    return np.asarray(AMBIENT + (1 - AMBIENT) * np.clip(normals @ light, 0, 1))
 
 
 def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats) -> NDArray[np.bool_]:
@@ -102,3 +114,12 @@ def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats) -> NDArr
         index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
         lines[index] |= jump
     return lines
+
+
+def write(picture: NDArray[np.uint8], text: str, at: tuple[float, float], left: int) -> None:
+    """A name at the right of what it belongs to, with a line to it."""
+    import cv2
+
+    (x, y), ink = (round(value) for value in at), (70, 70, 70)
+    cv2.line(picture, [x + 6, y], [left - 6, y], (190, 190, 190), 1, cv2.LINE_AA)
+    cv2.putText(picture, text, [left, y + 5], cv2.FONT_HERSHEY_SIMPLEX, 0.55, ink, 1, cv2.LINE_AA)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,11 +25,21 @@ _FAINT = (150, 142, 134)
 Image = NDArray[np.uint8]
 
 
-def layout_to_png(layout: Layout) -> bytes:
-    """The preview as PNG bytes: pattern, overall dimensions, key figures, ids where there is room."""
+def preview_png(layout: Layout, pictures: Mapping[str, Image] | None = None) -> bytes:
+    """The preview as PNG bytes: pattern, overall dimensions, key figures, ids where there is room.
+
+    Args:
+        layout: the pattern.
+        pictures: of what else was made, by name; they follow beside and below.
+    """
     import cv2
 
-    return bytes(cv2.imencode(".png", draw_preview(layout))[1])
+    image = draw_preview(layout)
+    if pictures:
+        from cmpdesign.writers.preview_pictures import with_pictures
+
+        image = with_pictures(image, pictures, _PAPER)
+    return bytes(cv2.imencode(".png", image)[1])
 
 
 def draw_preview(layout: Layout) -> Image:

@@ -19,7 +19,7 @@ INK, PAPER = "#000000", "#ffffff"
 # Free for the printer's grip, and for the key at the left and the bottom.
 MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
 CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 1.0, 0.1
-PATCH_MM = 6.0
+PATCH_MM, FRAME_MM = 6.0, 0.2
 Points = NDArray[np.float64]
 
 
@@ -70,7 +70,8 @@ def _places(option: SheetOptions, layout: Layout, width: float, height: float) -
             f"sheet.pads = {wanted}: only {columns * rows} fit on {option.page}; ask for fewer or "
             "choose a larger page"
         )
-    corner = np.array([left, MARGIN_MM]) + around / 2
+    # In the middle of the room across.
+    corner = np.array([left + (room[0] - columns * step[0]) / 2, MARGIN_MM]) + around / 2
     return [corner + step * (n % columns, n // columns) for n in range(wanted)]
 
 
@@ -134,6 +135,7 @@ def _key(layout: Layout, height: float) -> list[Shapes | Text]:
         f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, {width:.4g} x {tall:.4g} mm",
         f"digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
+        "print at 100 %, not fitted to the page",
     )
     items: list[Shapes | Text] = [Shapes(modules, INK, "code"), Shapes([x_bar, y_bar], INK, "scale")]
     items += [Text(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
@@ -149,7 +151,7 @@ def _patches(layout: Layout, width: float, height: float) -> list[Shapes | Text]
     for number, name in enumerate(names):
         x = width - MARGIN_MM - (len(names) - number) * (PATCH_MM + 8)
         y = height - MARGIN_MM - PATCH_MM - 6
-        frame = box(x - 0.1, y - 0.1, PATCH_MM + 0.2, PATCH_MM + 0.2)
+        frame = box(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
         items += [Shapes([frame], INK), Shapes([box(x, y, PATCH_MM, PATCH_MM)], layout.palette[name])]
         items += [
             Text(name, x, y + PATCH_MM + 3, 2.2),
