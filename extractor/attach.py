@@ -18,6 +18,8 @@ SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
 MAX_MISFIT = 0.3  # in cells, between where the map puts a cell and the layout's place for it
 MAX_SIGMA = 0.12  # of the map there, in cells
+ROBUST_ROUNDS = 4  # what dirt has cut is among the witnesses, too
+EXACT = 0.02  # of a cell: witnesses that fit so well are not judged
 RIDGE = 1e-3  # holds the curvature of the map where the witnesses lie in a row
 
 
@@ -74,14 +76,18 @@ def _predicted_mm(
     scale = distance.mean(axis=1)
     x, y = np.moveaxis((center_px[witness] - center_px[loose, None]) / scale[:, None, None], 2, 0)
     rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
-    weight = 1.0 / (0.3 + (distance / scale[:, None]) ** 2)
-    normal = np.einsum("lwi,lw,lwj->lij", rows, weight, rows) + RIDGE * np.diag([0, 0, 0, 1, 1, 1])
-    sides = np.einsum("lwi,lw,lwk->lik", rows, weight, target - target.mean(axis=1, keepdims=True))
-    sound = np.linalg.cond(normal) < 1e8
-    normal[~sound] = np.eye(6)
-    terms = np.linalg.solve(normal, sides)
-    residual = rows @ terms - (target - target.mean(axis=1, keepdims=True))
-    variance = np.einsum("lw,lwk->l", weight, residual**2) / (2 * weight.sum(axis=1))
+    near_weight = 1.0 / (0.3 + (distance / scale[:, None]) ** 2)
+    weight, offset = near_weight, target - target.mean(axis=1, keepdims=True)
+    for _ in range(ROBUST_ROUNDS):
+        normal = np.einsum("lwi,lw,lwj->lij", rows, weight, rows) + RIDGE * np.diag([0, 0, 0, 1, 1, 1])
+        sides = np.einsum("lwi,lw,lwk->lik", rows, weight, offset)
+        sound = np.linalg.cond(normal) < 1e8
+        normal[~sound] = np.eye(6)
+        terms = np.linalg.solve(normal, sides)
+        squares = ((rows @ terms - offset) ** 2).sum(axis=2)
+        usual = 2 * np.median(squares, axis=1) + (EXACT * size) ** 2
+        weight = near_weight / (1 + squares / usual[:, None])
+    variance = (weight * squares).sum(axis=1) / (2 * weight.sum(axis=1))
     leverage = np.linalg.inv(normal)[:, 0, 0] * weight.mean(axis=1)
     # the image's size of a cell, from the map's slope
     slope = np.abs(np.linalg.det(terms[:, 1:3])) ** 0.5 / scale

@@ -123,11 +123,12 @@ class Extractor:
             return Reason.REFERENCE_LOST
         if numbering.ambiguous:
             return Reason.AMBIGUOUS
-        return Found(cells, numbering)
+        return Found(cells, stages.done("attach", attach(cells, numbering, self._lattice)))
 
     def _whole(self, bgr: NDArray[np.uint8], found: Found, stages: Stages) -> bool:
-        """Whether a finer scale would find no more cells than have been found."""
-        count = missed(bgr, found.cells, found.numbering, self._lattice)
+        """Whether a finer scale would number no more cells than have been numbered."""
+        loose = int((found.numbering.cell < 0).sum())
+        count = loose + missed(bgr, found.cells, found.numbering, self._lattice)
         return int(stages.done("missed", count)) <= MAX_MISSED * len(self._lattice.ink)
 
     def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
@@ -146,8 +147,8 @@ class Extractor:
 
     def _measure(self, sights: Sights, found: Found, stages: Stages) -> Markers:
         """The places of what has been numbered, and what follows from them."""
-        numbering = stages.done("attach", attach(found.cells, found.numbering, self._lattice))
-        places = stages.done("place", place(found.cells, numbering, self._lattice, sights.size))
+        cells, numbering = found
+        places = stages.done("place", place(cells, numbering, self._lattice, sights.size))
         return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(

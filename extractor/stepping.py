@@ -12,7 +12,8 @@ from .synthesis import AA, AB, BB, BLUR, BLUR_CURVATURE, MISFIT, PIXELS, SHARE_A
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
 WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
-TRUSTED = 0.4  # of the gridlines around a marker, for it to be believed
+TRUSTED = 0.4  # of a gridline, for its places to be measured
+BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
 # normal density and N its integral.
 CONTRAST_TO_BLUR = 1.79
@@ -94,7 +95,7 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
             if e >= 0:
                 total += use[e]
                 count += 1
-        out[m] = total > TRUSTED * count
+        out[m] = total > BELIEVED * count
     return out
 
 

@@ -30,6 +30,7 @@ from extractor.regions import Regions  # noqa: E402
     ("name", "keys"),
     [
         ("startup", {"conditions", "processes", "largest"}),
+        ("contact", {"conditions", "contacts", "closed_forms_percent"}),
         (
             "extraction",
             {"conditions", "presets", "large", "over_pixels", "over_markers", "growth"},

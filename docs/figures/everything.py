@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import drawings, fields, gallery, hero, measured, stages
+from . import contact, drawings, fields, gallery, hero, measured, stages
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
@@ -13,7 +13,7 @@ IMAGES = DOCS / "images"
 def pictures() -> dict[str, bytes]:
     """Name in docs/images -> PNG or SVG."""
     found: dict[str, bytes] = {}
-    for part in (hero, drawings, stages, gallery, measured):
+    for part in (hero, drawings, stages, gallery, contact, measured):
         found |= part.figures()
     return found
 

@@ -1,0 +1,36 @@
+"""Contact: what an object does to the soft layer that carries the pattern.
+
+elastomer + object + motion -> displacement and traction of the surface
+"""
+
+from __future__ import annotations
+
+from cmpdesign.contact.elastomer import Elastomer
+from cmpdesign.contact.errors import ContactError
+from cmpdesign.contact.heightmap import HeightMap
+from cmpdesign.contact.motion import Motion
+from cmpdesign.contact.objects import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
+from cmpdesign.contact.result import Contact, Relief
+from cmpdesign.contact.solve import solve, solve_path
+from cmpdesign.contact.table import ContactSetup, contact_from
+
+__all__ = [
+    "Ball",
+    "Contact",
+    "ContactError",
+    "ContactSetup",
+    "Cube",
+    "Cylinder",
+    "Elastomer",
+    "HeightMap",
+    "Indenter",
+    "Motion",
+    "Punch",
+    "Relief",
+    "Rib",
+    "Ring",
+    "Wedge",
+    "contact_from",
+    "solve",
+    "solve_path",
+]

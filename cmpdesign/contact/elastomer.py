@@ -1,0 +1,37 @@
+"""The elastic layer: bonded to a rigid support below, touched from above."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cmpdesign.contact.errors import require
+
+
+@dataclass(frozen=True)
+class Elastomer:
+    """A linear elastic layer of even thickness on a rigid support that it cannot slide on.
+
+    Attributes:
+        thickness_mm: h, above 0.
+        young_mpa: Young's modulus, above 0. It scales forces; displacements do not depend on it.
+        poisson: 0 to 0.5; silicones are nearly incompressible, 0.5.
+
+    Raises:
+        ContactError: a value out of range.
+    """
+
+    thickness_mm: float
+    young_mpa: float
+    poisson: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("thickness_mm", "young_mpa"):
+            value = getattr(self, name)
+            require(math.isfinite(value) and value > 0, name, f"{value:g}", "above 0 and finite")
+        require(0 <= self.poisson <= 0.5, "poisson", f"{self.poisson:g}", "from 0 to 0.5 (incompressible)")
+
+    @property
+    def shear_mpa(self) -> float:
+        """The shear modulus E / (2 (1 + nu))."""
+        return self.young_mpa / (2 * (1 + self.poisson))

@@ -1,0 +1,105 @@
+"""From a solved state to the result that is handed out, with its warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.contact.increment import TOLERANCE, TOLERANCE_RUBBING, Problem, State
+from cmpdesign.contact.result import Contact
+from cmpdesign.contact.strain import LINEAR_UP_TO, largest_strain
+
+Array = NDArray[np.float64]
+# Cells over which a contact's pressure should at least be spread.
+FEWEST_CELLS = 12
+
+
+def report(problem: Problem, state: State) -> Contact:
+    """The contact of a state: forces, strain and warnings worked out, fields turned to (ny, nx, 3)."""
+    grid, traction, moved = problem.grid, state.traction_mpa, state.displacement_mm
+    strain = largest_strain(problem.elastomer, moved, traction, grid.step_mm)
+    friction = np.hypot(traction[0], traction[1])
+    fields = [np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (moved, traction)]
+    found = Contact(
+        x_mm=grid.x_mm,
+        y_mm=grid.y_mm,
+        displacement_mm=fields[0],
+        traction_mpa=fields[1],
+        in_contact=state.in_contact,
+        slipping=state.in_contact & (friction >= (1 - 1e-9) * state.limit_mpa),
+        force_n=traction.sum(axis=(1, 2)) * grid.step_mm**2,
+        moment_nmm=_moment(problem, state),
+        largest_strain=strain,
+        warnings=tuple(_warnings(problem, state, strain)),
+        iterations=state.iterations,
+        residual_mm=state.residual_mm,
+        thickness_mm=problem.elastomer.thickness_mm,
+    )
+    for values in (found.displacement_mm, found.traction_mpa, found.in_contact, found.slipping):
+        values.setflags(write=False)
+    return found
+
+
+def _moment(problem: Problem, state: State) -> Array:
+    """About the object's centre where it now is, arms in the plane of the flat surface."""
+    (x0, y0), (dx, dy) = problem.indenter.centre_mm, state.motion.shear_mm
+    x, y = problem.grid.xy_mm + state.displacement_mm[:2] - np.reshape((x0 + dx, y0 + dy), (2, 1, 1))
+    fx, fy, fz = state.traction_mpa * problem.grid.step_mm**2
+    return np.array([np.sum(y * fz), -np.sum(x * fz), np.sum(x * fy - y * fx)])
+
+
+def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
+    step, thickness = problem.grid.step_mm, problem.elastomer.thickness_mm
+    if not state.in_contact.any():
+        if state.motion.press_mm > 0:
+            yield "the object touches nothing in the solved area; move centre_mm or take a larger size_mm"
+        return
+    if strain > LINEAR_UP_TO:
+        yield (
+            f"the largest strain is {strain:.2g}, above {LINEAR_UP_TO:g}: linear theory is an estimate there, not a "
+            "prediction; press or shear less, or take a thicker layer or an object with rounder edges"
+        )
+    if folds(state.displacement_mm, step):
+        yield "the surface folds over itself: its map has a negative Jacobian; press or shear less"
+    yield from _grid_warnings(problem, state.in_contact)
+    if step > thickness:
+        yield (
+            f"the grid's step of {step:.3g} mm is above the thickness of {thickness:.3g} mm; "
+            f"take grid above {math.ceil(max(problem.grid.shape) * step / thickness)} or a smaller size_mm"
+        )
+    allowed = (TOLERANCE_RUBBING if problem.friction > 0 else TOLERANCE) * state.motion.press_mm
+    if state.residual_mm > allowed:
+        yield (
+            f"the solver left a gap of {state.residual_mm:.2g} mm, above {allowed:.2g} mm; "
+            "take a coarser grid or rounder edges"
+        )
+
+
+def _grid_warnings(problem: Problem, touched: NDArray[np.bool_]) -> Iterator[str]:
+    step, radius = problem.grid.step_mm, problem.indenter.smallest_radius_mm
+    if radius < step:
+        yield (
+            f"the object's sharpest edge has a radius of {radius:.3g} mm, below the grid's step of {step:.3g} mm: "
+            "stress and strain there depend on the grid; take a finer grid or a rounder edge"
+        )
+    if np.count_nonzero(touched) < FEWEST_CELLS:
+        yield (
+            f"the contact covers {np.count_nonzero(touched)} cells of {step:.3g} mm, below {FEWEST_CELLS}; "
+            "take a finer grid or a smaller size_mm"
+        )
+    at_edge = np.count_nonzero(touched) - np.count_nonzero(touched[1:-1, 1:-1])
+    if at_edge:
+        yield (
+            f"the contact reaches the edge of the solved area in {at_edge} cells: nothing is touched "
+            "beyond it, though the layer goes on; take a larger size_mm or a smaller object"
+        )
+
+
+def folds(displacement_mm: Array, step_mm: float) -> bool:
+    """Whether the map of the plane by (3, ny, nx) has a Jacobian that is not positive somewhere."""
+    ux_y, ux_x = np.gradient(displacement_mm[0], step_mm)
+    uy_y, uy_x = np.gradient(displacement_mm[1], step_mm)
+    return bool(((1 + ux_x) * (1 + uy_y) - ux_y * uy_x).min() <= 0)

@@ -1,0 +1,99 @@
+"""What a contact does to the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.contact.grid import Grid
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A solved contact, in the layout frame. Row i of every field is at ``y_mm[i]``, column j at ``x_mm[j]``.
+
+    Attributes:
+        x_mm, y_mm: the cells' centres, (nx,) and (ny,).
+        displacement_mm: of the surface's points, (ny, nx, 3).
+        traction_mpa: what the object does to the surface, (ny, nx, 3); z is minus the pressure.
+        in_contact: (ny, nx) bool.
+        slipping: in contact, with all the friction that there is, (ny, nx) bool.
+        force_n: of the object on the layer, (3,); z is negative.
+        moment_nmm: of these tractions about the object's centre at the height of the surface, (3,).
+        largest_strain: the larger of the largest principal strain of the surface and depth over thickness.
+        warnings: what makes the result doubtful, each with value, limit and remedy.
+        iterations: how often the layer's answer was computed.
+        residual_mm: root mean square of the gap that is left in the contact.
+        thickness_mm: of the layer.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    displacement_mm: Array = field(repr=False)
+    traction_mpa: Array = field(repr=False)
+    in_contact: Mask = field(repr=False)
+    slipping: Mask = field(repr=False)
+    force_n: Array
+    moment_nmm: Array
+    largest_strain: float
+    warnings: tuple[str, ...]
+    iterations: int
+    residual_mm: float
+    thickness_mm: float
+
+    def surface(self) -> Relief:
+        """The surface as a smooth function of the layout frame."""
+        return relief(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """A surface: (N, 2) mm of the flat layer to (N, 3) mm, by a bicubic spline of the displacement.
+
+    Beyond the solved area the displacement falls smoothly to zero within one thickness (at least 6 cells).
+    """
+
+    grid: Grid
+    coefficients: Array = field(repr=False)
+
+    def __call__(self, xy_mm: Array, /) -> Array:
+        """Where the points (N, 2) of the flat layer are, (N, 3) mm."""
+        from scipy.ndimage import map_coordinates
+
+        xy = np.asarray(xy_mm, dtype=np.float64)
+        column = (xy[:, 0] - self.grid.x_mm[0]) / self.grid.step_mm
+        row = (xy[:, 1] - self.grid.y_mm[0]) / self.grid.step_mm
+        found = np.empty((len(xy), 3))
+        for axis in range(3):
+            found[:, axis] = map_coordinates(
+                self.coefficients[axis], np.stack([row, column]), order=3, mode="constant", prefilter=False
+            )
+        found[:, :2] += xy
+        return found
+
+
+def relief(contact: Contact) -> Relief:
+    """The spline, with the displacement led to zero around the solved area."""
+    from scipy.ndimage import spline_filter
+
+    step = float(contact.x_mm[1] - contact.x_mm[0])
+    margin = max(6, int(np.ceil(contact.thickness_mm / step)))
+    margin = min(margin, max(contact.in_contact.shape))
+    # Four cells of zeros at the rim, so that the spline ends there without a trace.
+    ramp = np.concatenate([np.zeros(4), 0.5 - 0.5 * np.cos(np.pi * np.arange(1, margin + 1) / (margin + 1))])
+    rim = len(ramp)
+    ny, nx = contact.in_contact.shape
+    fade = np.outer(*(np.concatenate([ramp, np.ones(n), ramp[::-1]]) for n in (ny, nx)))
+    padded = [np.pad(contact.displacement_mm[..., axis], rim, mode="edge") * fade for axis in range(3)]
+    around = step * (np.arange(rim) + 1)
+    grid = Grid(
+        np.concatenate([contact.x_mm[0] - around[::-1], contact.x_mm, contact.x_mm[-1] + around]),
+        np.concatenate([contact.y_mm[0] - around[::-1], contact.y_mm, contact.y_mm[-1] + around]),
+        step,
+    )
+    return Relief(grid, np.stack([spline_filter(values, order=3, mode="mirror") for values in padded]))

@@ -1,0 +1,146 @@
+"""The [contact] table of a scene: the same names as in Python, lengths and angles also with units."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+
+from cmpdesign.contact.elastomer import Elastomer
+from cmpdesign.contact.errors import ContactError
+from cmpdesign.contact.heightmap import HeightMap
+from cmpdesign.contact.motion import Motion
+from cmpdesign.contact.objects import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
+from cmpdesign.contact.result import Contact
+from cmpdesign.contact.solve import solve
+from cmpdesign.units import parse_angle_deg, parse_length_mm
+
+KINDS: Mapping[str, type[Indenter]] = {
+    kind.__name__.lower(): kind for kind in (Ball, Cube, Cylinder, Punch, Rib, Ring, Wedge, HeightMap)
+}
+SignedLength = Annotated[float, BeforeValidator(parse_length_mm)]
+SignedAngle = Annotated[float, BeforeValidator(parse_angle_deg)]
+Model = TypeVar("Model", bound=BaseModel)
+STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class ContactSetup:
+    """Everything that ``solve`` takes, checked; ``dataclasses.replace`` gives it another motion or place."""
+
+    elastomer: Elastomer
+    indenter: Indenter
+    motion: Motion
+    friction: float
+    size_mm: tuple[float, float]
+    grid: int
+    steps: int
+
+    def solve(self) -> Contact:
+        """The contact.
+
+        Raises:
+            ContactError: the object misses the solved area, or the grid does not fit it.
+        """
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return solve(**given)
+
+
+class _Table(BaseModel):
+    model_config = STRICT
+
+    elastomer: dict[str, Any]
+    indenter: dict[str, Any]
+    motion: dict[str, Any]
+    # "inf" is a number in TOML, and sticks wherever it presses.
+    friction: float = Field(0.5, ge=0, allow_inf_nan=True)
+    size_mm: tuple[SignedLength, SignedLength] = (30.0, 30.0)
+    grid: int = Field(256, strict=True)
+    steps: int = Field(4, strict=True)
+
+
+def contact_from(table: Mapping[str, Any], folder: str | Path = ".") -> ContactSetup:
+    """A contact from its table; a height map's ``path`` is read from ``folder``.
+
+    >>> contact_from({
+    ...     "elastomer": {"thickness_mm": 4, "young_mpa": 0.3},
+    ...     "indenter": {"kind": "ball", "radius_mm": "1cm", "centre_mm": [2, 0]},
+    ...     "motion": {"press_mm": 0.5},
+    ... }).indenter
+    Ball(centre_mm=(2.0, 0.0), turn_deg=0.0, radius_mm=10.0)
+
+    Raises:
+        ContactError: an unknown, missing or impossible value, on one line with its place in the table.
+    """
+    read = _checked(_Table, table, "contact")
+    given = {name: getattr(read, name) for name in ("friction", "size_mm", "grid", "steps")}
+    return ContactSetup(
+        elastomer=_made(Elastomer, read.elastomer, "contact.elastomer"),
+        indenter=_indenter(read.indenter, Path(folder)),
+        motion=_made(Motion, read.motion, "contact.motion"),
+        **given,
+    )
+
+
+def _indenter(table: Mapping[str, Any], folder: Path) -> Indenter:
+    rest = dict(table)
+    kind = rest.pop("kind", None)
+    if kind not in KINDS:
+        raise ContactError(
+            f"contact.indenter.kind is {kind!r}{_nearest(str(kind), KINDS)}; there are {', '.join(KINDS)}"
+        )
+    if KINDS[kind] is not HeightMap:
+        made: Indenter = _made(KINDS[kind], rest, "contact.indenter")
+        return made
+    placed = ("centre_mm", "turn_deg")
+    fields = {"path": (str, ...), "depth_mm": (SignedLength | None, None)}
+    fields |= {name: _field(HeightMap, name) for name in ("pixel_mm", *placed)}
+    read = _checked(create_model("HeightMap", __config__=STRICT, **fields), rest, "contact.indenter")  # type: ignore[call-overload]
+    values = read.model_dump()
+    return HeightMap.read(folder / values.pop("path"), **values)
+
+
+def _made(kind: type[Any], table: Mapping[str, Any], where: str) -> Any:
+    """A dataclass of numbers from a table with its fields' names."""
+    fields = {field.name: _field(kind, field.name) for field in dataclasses.fields(kind)}
+    read = _checked(create_model(kind.__name__, __config__=STRICT, **fields), table, where)  # type: ignore[call-overload]
+    try:
+        return kind(**read.model_dump())
+    except ContactError as error:
+        raise ContactError(f"{where}: {error}") from None
+
+
+def _field(kind: type[Any], name: str) -> tuple[Any, Any]:
+    """A field's type and default for pydantic: the unit is in its name, and it is a pair if its default is."""
+    found = {field.name: field for field in dataclasses.fields(kind)}[name]
+    number: Any = {"mm": SignedLength, "deg": SignedAngle}.get(name.rpartition("_")[2], float)
+    if isinstance(found.default, tuple):
+        number = tuple[number, number]
+    return number, ... if found.default is dataclasses.MISSING else found.default
+
+
+def _checked(model: type[Model], table: Mapping[str, Any], where: str) -> Model:
+    try:
+        return model.model_validate(dict(table))
+    except ValidationError as error:
+        raise ContactError("; ".join(_told(item, model, where) for item in error.errors())) from None
+
+
+def _told(item: Any, model: type[BaseModel], where: str) -> str:
+    path = ".".join([where, *(str(part) for part in item["loc"])])
+    if item["type"] == "extra_forbidden":
+        return f"{path} is unknown{_nearest(str(item['loc'][-1]), model.model_fields)}"
+    if item["type"] == "missing":
+        return f"{path} is missing"
+    message = item["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return f"{path} = {item['input']!r}: {message}"
+
+
+def _nearest(word: str, known: Mapping[str, object]) -> str:
+    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {found[0]}?)" if found else ""
