@@ -48,9 +48,10 @@ MAX_SIGMA = 0.04  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
-UNEXPLAINED = (
-    25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
-)
+# Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
+# profiles may lie apart, in units of the edges around the marker.
+UNEXPLAINED = 0.015
+MAX_APART = 0.1
 MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
@@ -201,7 +202,9 @@ class Refiner:
         stations = steps.profiles[1] if sharp else FEW_STATIONS
         fit, trusted = self._profile_step(view, fit, across, stations, judged=sharp)
         if sharp:
-            return self._refined(view, fit, *self._sure(fit, places), trusted)
+            xy, cov = self._sure(fit, places)
+            _doubt(xy, cov, ~trusted, places)
+            return self._refined(view, fit, xy, cov, trusted)
         start = fit
         fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
@@ -347,7 +350,8 @@ class Refiner:
             start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS, judged=True)
             profiled, wide = self._sure(start, places)
             use = lost & trusted
-            xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]
+            xy[use], cov[use] = profiled[use], wide[use]
+            _doubt(xy, cov, use, places)
         return self._refined(view, fit, xy, cov, ~lost)
 
     def _refined(
@@ -377,6 +381,19 @@ class Refiner:
         xy[lost] = np.nan
         cov[lost] = np.nan
         return xy, cov
+
+
+def _doubt(
+    xy: NDArray[np.float64], cov: NDArray[np.float64], which: NDArray[np.bool_], places: Places
+) -> None:
+    """Put markers on which something lies between what profiles and triangles say, in place; NaN where these differ."""
+    apart = np.linalg.norm(xy - places.xy_px, axis=1)
+    with np.errstate(invalid="ignore"):
+        lost = which & ~(apart < MAX_APART * places.edge_px)
+    xy[which] = 0.5 * (xy[which] + places.xy_px[which])
+    doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
+    cov[which] += doubt[which, None, None] * np.eye(2)
+    xy[lost], cov[lost] = np.nan, np.nan
 
 
 def _sharpened(sigma: float) -> float:
