@@ -65,7 +65,7 @@ class Steps(NamedTuple):
     """What a preset does.
 
     Attributes:
-        profiles: stations per gridline at most, in the first and the last round of profiles.
+        profiles: stations per gridline at most, in the first round of profiles and, where no synthesis follows, the second.
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.
@@ -83,10 +83,9 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 8.0),
+    "balanced": Steps((3, 64), 0.5, 0.085, 2, 4, 12.0),
     "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
 }
-FEW_STATIONS = 3  # in the last round of profiles, where synthesis follows
 JUDGING_STATIONS = 16  # where it failed
 
 
@@ -199,9 +198,8 @@ class Refiner:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
-        stations = steps.profiles[1] if sharp else FEW_STATIONS
-        fit, trusted = self._profile_step(view, fit, across, stations, judged=sharp)
         if sharp:
+            fit, trusted = self._profile_step(view, fit, across, steps.profiles[1], judged=True)
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted)
