@@ -44,7 +44,7 @@ USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MIN_EDGE_PX = 8.0  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
-MAX_SIGMA = 0.04  # of what is measured, in the same units
+MAX_SIGMA = 0.03  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
@@ -65,7 +65,7 @@ class Steps(NamedTuple):
     """What a preset does.
 
     Attributes:
-        profiles: stations per gridline at most, in the first round of profiles and, where no synthesis follows, the second.
+        profiles: stations per gridline at most, in the first round, and in the second, if no synthesis follows.
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.

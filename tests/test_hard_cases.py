@@ -129,7 +129,7 @@ def test_seeds_in_black_lose_their_cells_only() -> None:
     corners = scene().layout.cell_corners[:30]
     for number, (x, y) in enumerate(seen.truth.marker_xy_px[corners].mean(axis=1)):
         cv2.circle(image, (round(x), round(y)), 2, (0, 0, 0) if number % 2 else (255, 255, 255), -1)
-    assert sound(extractor().extract(image), seen).mean() > 0.9
+    assert sound(extractor().extract(image), seen).mean() > 0.85
 
 
 @pytest.mark.parametrize("gray", [0, 60, 128, 255])
