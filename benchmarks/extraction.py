@@ -1,9 +1,9 @@
-"""Cold extraction: how long, how precise, and how both grow.
+"""Cold extraction: how long, and how its time grows with the pixels and with the markers, stage by stage.
 
-    python -m benchmarks.extraction [--quick] [--json FILE]
+    python -m benchmarks.extraction [--quick] [--json FILE] [--publish]
 
-One core, warm code, every image new to the extractor (no previous frame is used). Errors are per axis, against the
-scene's truth; the bound is the Cramer-Rao bound of the same scene and the same markers.
+One core, warm code, every image new to the extractor (no previous frame is used). What it finds is counted too;
+``benchmarks.accuracy`` says how precise it is.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = (
-    "1"  # before numpy and numba: times are of one core
-)
+if __name__ == "__main__":  # before numpy and numba: times are of one core
+    os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2
@@ -29,18 +28,10 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.machine import sentence, write_json
+from benchmarks.published import publish
+from benchmarks.scenes import WRONG_SHARE, shortest_edges
 from cmpdesign.layout import Layout
-from cmpdesign.scene import (
-    Camera,
-    Press,
-    Rendered,
-    Scene,
-    composed,
-    cramer_rao,
-    render,
-    standard_layout,
-    standard_scene,
-)
+from cmpdesign.scene import Camera, Rendered, render, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.refine import PRESETS, Preset
@@ -48,35 +39,10 @@ from extractor.refine import PRESETS, Preset
 LAYERS = 10
 PITCH_PX = 20.0
 SIZE = (640, 480)
-WRONG_SHARE = 0.3
-PATTERNS = ("honeycomb", "round", "elliptical")
-# per state: tilt in degrees, and a press that moves the surface by a third of a pitch over three
-STATES: dict[str, tuple[float, Press | None]] = {
-    "flat": (0.0, None),
-    "tilted 35": (35.0, None),
-    "pressed": (0.0, Press(radius_mm=3.0, depth_mm=0.35)),
-}
-PIXELS_MP = (0.3, 0.6, 1.2, 2.4, 4.8, 8.0, 12.0)
-MARKER_LAYERS = (3, 5, 8, 12, 18, 27, 41)
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """Errors of one scene over several noises; rms in px per axis, the ratio over the bound of the same markers."""
-
-    pattern: str
-    state: str
-    visible: int
-    measured_share: float
-    wrong: int
-    rms_all_px: float
-    rms_inner_px: float
-    bound_all_px: float
-    bound_inner_px: float
-
-    @property
-    def ratio(self) -> float:
-        return self.rms_inner_px / self.bound_inner_px
+PIXELS_MP = (0.3, 0.6, 1.2, 2.4, 4.8, 8.0, 12.0, 20.0)
+MARKER_LAYERS = (3, 5, 8, 12, 18, 27, 41, 64, 99)  # 37 to 29,701 markers
+MARGIN = 1.02  # of a picture around its pattern, and
+BORDER_PX = 40
 
 
 @dataclass(frozen=True)
@@ -98,54 +64,12 @@ def extractor_of(layout: Layout, preset: Preset = "balanced") -> Extractor:
     return Extractor(parse_layout(layout_to_json(layout)), preset)
 
 
-def scene_of(pattern: str, state: str, seed: int) -> Scene:
-    tilt_deg, press = STATES[state]
-    scene = standard_scene(standard_layout(pattern, LAYERS), seed=seed)
-    camera = replace(scene.camera, tilt_deg=tilt_deg, tilt_axis_deg=30.0)
-    return replace(scene, camera=camera, surface=composed(press) if press else None)
-
-
-def inner_markers(layout: Layout) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """(M,) the markers within the last layer: six gridlines each."""
-    return np.asarray(layout.marker_layer < layout.marker_layer.max())
-
-
 def wrong_ids(layout: Layout, markers: Markers, rendered: Rendered) -> int:
     """Measured markers farther than 0.3 of their shortest edge from the truth."""
     true = rendered.truth.marker_xy_px
-    ends = true[layout.edges]
-    shortest = np.full(len(true), np.inf)
-    for side in (0, 1):
-        np.minimum.at(shortest, layout.edges[:, side], np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
     measured = markers.status == Status.MEASURED
     away = np.hypot(*(markers.xy_px - true).T)
-    return int((away[measured] > WRONG_SHARE * shortest[measured]).sum())
-
-
-def accuracy(pattern: str, state: str, seeds: int) -> Accuracy:
-    """Extract the same scene under several noises."""
-    scene = scene_of(pattern, state, 0)
-    layout, extractor = scene.layout, extractor_of(scene.layout)
-    bound = cramer_rao(scene, size=SIZE)[:, [0, 1], [0, 1]]
-    errors, wrong, measured = [], 0, 0
-    for seed in range(seeds):
-        rendered = render(replace(scene, seed=seed), size=SIZE)
-        markers = extractor.extract(rendered.image)
-        visible = rendered.truth.visible
-        found = (markers.status == Status.MEASURED) & visible
-        wrong += wrong_ids(layout, markers, rendered)
-        measured += int(found.sum())
-        errors.append(np.where(found[:, None], markers.xy_px - rendered.truth.marker_xy_px, np.nan))
-    inner = inner_markers(layout) & visible
-
-    def rms(squares: Any) -> float:
-        return float(np.sqrt(np.nanmean(squares)))
-
-    squares = np.square(errors)
-    return Accuracy(
-        pattern, state, int(visible.sum()), measured / (seeds * int(visible.sum())), wrong,
-        rms(squares), rms(squares[:, inner]), rms(bound), rms(bound[inner]),
-    )  # fmt: skip
+    return int((away[measured] > WRONG_SHARE * shortest_edges(layout, true)[measured]).sum())
 
 
 def speed(
@@ -190,12 +114,16 @@ def over_pixels(runs: int) -> list[Speed]:
 
 
 def over_markers(runs: int) -> list[Speed]:
-    """One picture of 4.8 MP, the pattern's layers growing at the same pitch in px as long as they fit."""
-    size = side_px(4.8)
-    pitch_px = 0.46 * size[1] / MARKER_LAYERS[-1]
+    """Patterns of ever more layers with edges of 20 px, the picture as large as the pattern."""
     return [
-        speed(f"{n} layers", standard_layout("honeycomb", n), pitch_px, size, runs) for n in MARKER_LAYERS
+        speed(f"{n} layers", standard_layout("honeycomb", n), PITCH_PX, picture_px(n), runs)
+        for n in MARKER_LAYERS
     ]
+
+
+def picture_px(layers: int) -> tuple[int, int]:
+    side = round(2 * layers * PITCH_PX * MARGIN) + BORDER_PX
+    return side, side
 
 
 def exponent(x: Sequence[float], y: Sequence[float]) -> float:
@@ -220,19 +148,6 @@ def table_of(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], 
     return table
 
 
-def accuracy_table(results: Sequence[Accuracy], seeds: int) -> Table:
-    rows = [
-        (
-            f"{r.pattern}, {r.state}", f"{r.measured_share:.2%}", str(r.wrong), f"{r.rms_inner_px:.4f}",
-            f"{r.bound_inner_px:.4f}", f"{r.ratio:.2f}", f"{r.rms_all_px:.4f}", f"{r.rms_all_px / r.bound_all_px:.2f}",
-        )
-        for r in results
-    ]  # fmt: skip
-    columns = ("RMS per axis, px", "measured", "wrong", "inner", "bound", "ratio", "all", "ratio")
-    caption = f"{SIZE[0]} x {SIZE[1]} px, {LAYERS} layers, pitch {PITCH_PX:g} px, blur 1, noise 2/255; {seeds} noises"
-    return table_of("Accuracy of a cold extraction", columns, rows, caption)
-
-
 def speed_table(title: str, results: Sequence[Speed], caption: str) -> Table:
     rows = [
         (
@@ -253,52 +168,89 @@ def stage_table(results: Sequence[Speed]) -> Table:
     return table_of("Stages, median ms", ("stage", *(result.name for result in results)), rows)
 
 
-def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str, float]:
-    """How the best times grow: the exponent, and milliseconds at zero and per unit."""
+def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str, Any]:
+    """How times grow: the exponent of the best ones, of all and of the larger half; by stage, of the larger half."""
     x, y = [unit(result) for result in results], [result.best_ms for result in results]
+    large = len(results) // 2
+    stages = {
+        stage: exponent(
+            x[large:], [max(result.stages_ms.get(stage, 0.0), 1e-3) for result in results[large:]]
+        )
+        for stage in results[-1].stages_ms
+    }
     intercept, slope = per_unit(x, y)
-    return {"exponent": exponent(x, y), "ms_at_zero": intercept, "ms_per_unit": slope}
+    return {
+        "exponent": exponent(x, y), "exponent_large": exponent(x[large:], y[large:]), "stages": stages,
+        "ms_at_zero": intercept, "ms_per_unit": slope,
+    }  # fmt: skip
+
+
+def growth_table(title: str, largest: Speed, grown: dict[str, Any]) -> Table:
+    """The stages at the largest size, the slowest first."""
+    rows = [
+        (stage, f"{ms:.1f}", f"{ms / largest.median_ms:.1%}", f"{grown['stages'][stage]:.2f}")
+        for stage, ms in sorted(largest.stages_ms.items(), key=lambda pair: -pair[1])
+    ]
+    return table_of(title, ("stage", "ms", "share", "exponent"), rows)
+
+
+def grown_words(unit: str, fit: dict[str, Any]) -> str:
+    return (
+        f"time ~ {unit}^{fit['exponent']:.2f}, ^{fit['exponent_large']:.2f} over the larger half; straight line "
+        f"through the best times: {fit['ms_at_zero']:.1f} ms + {fit['ms_per_unit']:.3g} ms per {unit}"
+    )
 
 
 def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
     """Everything, as data and as tables."""
-    runs, seeds = (7, 2) if quick else (61, 12)
+    runs = 7 if quick else 31
     usual = standard_layout("honeycomb", LAYERS)
-    fast, standard, accurate = (
-        speed(f"640x480, 331 markers, {preset}", usual, PITCH_PX, SIZE, 3 * runs, preset)
-        for preset in PRESETS
-    )
-    large = speed(
-        "12 MP, 20 layers", standard_layout("honeycomb", 20), 70.0, side_px(12.0), max(3, runs // 4)
-    )
-    precise = [accuracy(pattern, state, seeds) for pattern in PATTERNS for state in STATES]
+    presets = [speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
+    large = speed("12 MP", standard_layout("honeycomb", 20), 70.0, side_px(12.0), max(3, runs // 4))
     pixels, markers = over_pixels(max(3, runs // 6)), over_markers(max(3, runs // 6))
     by_pixels, by_markers = growth(pixels, lambda r: r.megapixels), growth(markers, lambda r: r.markers)
     results = {
-        "standard": asdict(standard), "fast": asdict(fast), "accurate": asdict(accurate),
-        "large": asdict(large), "accuracy": [asdict(r) for r in precise],
-        "over_pixels": [asdict(r) for r in pixels], "over_markers": [asdict(r) for r in markers],
+        "presets": {preset: asdict(result) for preset, result in zip(PRESETS, presets, strict=True)},
+        "large": asdict(large), "over_pixels": [asdict(r) for r in pixels],
+        "over_markers": [asdict(r) for r in markers],
         "growth": {"megapixels": by_pixels, "markers": by_markers},
     }  # fmt: skip
-
-    def grown(unit: str, fit: dict[str, float]) -> str:
-        return (
-            f"time ~ {unit}^{fit['exponent']:.2f} over this range; straight line through the best times: "
-            f"{fit['ms_at_zero']:.1f} ms + {fit['ms_per_unit']:.3g} ms per {unit}"
-        )
-
     tables = [
         speed_table(
-            "Cold extraction",
-            [fast, standard, accurate, large],
-            "one core, warm code, honeycomb, blur 1 px, noise 2/255",
+            "Cold extraction", [*presets, large], "presets at 640 x 480 px; one core, warm code, blur 1 px, noise 2/255"
         ),
-        stage_table([standard, large]),
-        accuracy_table(precise, seeds),
-        speed_table("Growth with the image: 331 markers that grow along", pixels, grown("MP", by_pixels)),
-        speed_table("Growth with the markers: 4.8 MP, constant pitch", markers, grown("marker", by_markers)),
-    ]
+        stage_table([*presets, large]),
+        speed_table(
+            "Growth with the image: 331 markers that grow along", pixels, grown_words("MP", by_pixels)
+        ),
+        growth_table(f"Stages at {pixels[-1].megapixels:.0f} MP", pixels[-1], by_pixels),
+        speed_table(
+            "Growth with the markers: edges of 20 px, the image grows along", markers,
+            grown_words("marker", by_markers),
+        ),
+        growth_table(f"Stages at {markers[-1].markers} markers", markers[-1], by_markers),
+    ]  # fmt: skip
     return results, tables
+
+
+def markdown(results: dict[str, Any]) -> dict[str, str]:
+    """The tables of docs/accuracy.md, by block."""
+    found = {}
+    for name, key, unit in (("pixels", "over_pixels", "megapixels"), ("markers", "over_markers", "markers")):
+        rows, fit = results[key], results["growth"][unit]
+        head = "MP" if unit == "megapixels" else "markers"
+        lines = [
+            f"| {head} | {' | '.join(f'{r[unit]:.0f}' if r[unit] > 30 else f'{r[unit]:.1f}' for r in rows)} |",
+            "|---" * (len(rows) + 1) + "|",
+        ]
+        lines.append(f"| ms | {' | '.join(format(r['best_ms'], '.1f') for r in rows)} |")
+        slowest = sorted(rows[-1]["stages_ms"].items(), key=lambda pair: -pair[1])[:4]
+        total = rows[-1]["median_ms"]
+        words = ", ".join(f"`{stage}` {ms / total:.0%}" for stage, ms in slowest)
+        lines += ["", f"Exponent {fit['exponent']:.2f}; over the larger half {fit['exponent_large']:.2f}. "
+                  f"At the largest: {words}."]  # fmt: skip
+        found[f"scaling-{name}"] = "\n".join(lines)
+    return found
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -308,6 +260,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--quick", action="store_true", help="few runs: a look, no figures to quote")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
+    parser.add_argument(
+        "--publish", action="store_true", help="write docs/measured and the pages that show it"
+    )
     options = parser.parse_args(arguments)
     cv2.setNumThreads(1)
     results, tables = run(options.quick)
@@ -318,6 +273,9 @@ def main(arguments: list[str] | None = None) -> int:
     console.print(sentence(), style="dim", soft_wrap=True)
     if options.json:
         write_json(options.json, results)
+    if options.publish:
+        for path in publish("extraction", results, markdown(results)):
+            console.print(f"wrote {path}")
     return 0
 
 

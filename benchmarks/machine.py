@@ -35,9 +35,9 @@ def conditions() -> dict[str, str]:
     return found | {name: version(name) for name in PACKAGES}
 
 
-def sentence() -> str:
-    """The conditions on one line, for a table's caption."""
-    found = conditions()
+def sentence(found: Mapping[str, str] | None = None) -> str:
+    """The conditions, these or the present ones, on one line, for a table's caption."""
+    found = found or conditions()
     packages = ", ".join(f"{name.partition('-')[0]} {found[name]}" for name in PACKAGES)
     return f"{found['cpu']}; {found['system']}; Python {found['python']}, {packages}"
 

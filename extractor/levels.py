@@ -161,6 +161,9 @@ def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, sca
     terms = np.empty(TERMS)
     for i in range(own.shape[0]):
         x, y = place[i]
+        if not np.isfinite(x):
+            # a corner is unknown; its cell may be drawn in the next step, when it has been put
+            x, y = 0.0, 0.0
         monomials(x, y, terms)
         c = color[i]
         known = own[i, 3] > 0.0

@@ -36,6 +36,10 @@ MAX_PARTS = 4
 # A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
 MIN_EVIDENCE = 0.06
 MIN_CELLS = 9  # or all, in a layout that has fewer
+# Where the surface is seen nearly from the side the mesh falls to pieces that fit together by chance. So a part is also
+# this share of what looks like a pattern at all, or this large.
+MIN_SHARE = 0.4
+SURE_CELLS = 30
 MAX_OUTSIDE = 0.02
 MAX_ROUNDS = 8
 WITNESSES = 80  # faces that say which turn is that of the markers
@@ -208,10 +212,11 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     """
     found: list[tuple[int, Numbering]] = []
     parts = _largest_parts(mesh)
+    least = _least_cells(mesh, lattice)
     for front in _fronts(image, cells, mesh):
         for part in parts:
             at, conflicts = _number_part(cells, mesh, part, front, 2 * lattice.layers + 2)
-            found += _with_white(image, cells, lattice, at, front, conflicts)
+            found += _with_white(image, cells, lattice, at, front, conflicts, least)
             if not found:
                 found += _with_outline(cells, lattice, at, front, conflicts)
     if not found:
@@ -221,6 +226,13 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     reach = 0.5 * cells.edge_px
     rivals = [other for other, way in found if np.hypot(*(way.white_px - best.white_px)) > reach]
     return replace(best, ambiguous=bool(rivals) and score - max(rivals) < MIN_LEAD)
+
+
+def _least_cells(mesh: Mesh, lattice: Lattice) -> float:
+    """How many cells a part must explain to be believed."""
+    meshed = np.count_nonzero(np.bincount(mesh.faces[mesh.turn != 0].reshape(-1)))
+    of_layout = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
+    return max(of_layout, min(MIN_SHARE * meshed, SURE_CELLS))
 
 
 def _with_outline(
@@ -310,8 +322,9 @@ def _with_white(
     at: NDArray[np.int32],
     front: int,
     conflicts: int,
+    least: float,
 ) -> list[tuple[int, Numbering]]:
-    """Every way to put the origin at a bright cell, with the number of cells that it explains."""
+    """Every way to put the origin at a bright cell that explains the least number of cells; and how many it does."""
     known = np.flatnonzero(at[:, 0] != UNKNOWN)
     basis = _bases(cells.center_px, at, 2 * lattice.layers + 2)[known]
     known = known[np.isfinite(basis[:, 0, 0])]
@@ -328,7 +341,6 @@ def _with_white(
         bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
         if len(bright):
             break
-    least = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
     found = []
     for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
         moved = np.full_like(at, UNKNOWN)

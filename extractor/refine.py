@@ -44,13 +44,14 @@ USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MIN_EDGE_PX = 8.0  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
-MAX_SIGMA = 0.04  # of what is measured, in the same units
+MAX_SIGMA = 0.03  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
 BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
-UNEXPLAINED = (
-    25.0  # by which the profiles' covariances are widened where the drawing does not explain the image
-)
+# Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
+# profiles may lie apart, in units of the edges around the marker.
+UNEXPLAINED = 0.015
+MAX_APART = 0.1
 MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
@@ -64,7 +65,7 @@ class Steps(NamedTuple):
     """What a preset does.
 
     Attributes:
-        profiles: stations per gridline at most, in the first and the last round of profiles.
+        profiles: stations per gridline at most, in the first round, and in the second, if no synthesis follows.
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.
@@ -82,10 +83,9 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((2, 64), 0.5, 0.085, 2, 4, 8.0),
+    "balanced": Steps((3, 64), 0.5, 0.085, 2, 4, 12.0),
     "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
 }
-FEW_STATIONS = 3  # in the last round of profiles, where synthesis follows
 JUDGING_STATIONS = 16  # where it failed
 
 
@@ -198,10 +198,11 @@ class Refiner:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
         sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
-        stations = steps.profiles[1] if sharp else FEW_STATIONS
-        fit, trusted = self._profile_step(view, fit, across, stations, judged=sharp)
         if sharp:
-            return self._refined(view, fit, *self._sure(fit, places), trusted)
+            fit, trusted = self._profile_step(view, fit, across, steps.profiles[1], judged=True)
+            xy, cov = self._sure(fit, places)
+            _doubt(xy, cov, ~trusted, places)
+            return self._refined(view, fit, xy, cov, trusted)
         start = fit
         fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
@@ -347,7 +348,8 @@ class Refiner:
             start, trusted = self._profile_step(view, start, across, JUDGING_STATIONS, judged=True)
             profiled, wide = self._sure(start, places)
             use = lost & trusted
-            xy[use], cov[use] = profiled[use], UNEXPLAINED * wide[use]
+            xy[use], cov[use] = profiled[use], wide[use]
+            _doubt(xy, cov, use, places)
         return self._refined(view, fit, xy, cov, ~lost)
 
     def _refined(
@@ -377,6 +379,19 @@ class Refiner:
         xy[lost] = np.nan
         cov[lost] = np.nan
         return xy, cov
+
+
+def _doubt(
+    xy: NDArray[np.float64], cov: NDArray[np.float64], which: NDArray[np.bool_], places: Places
+) -> None:
+    """Put markers on which something lies between what profiles and triangles say, in place; NaN where these differ."""
+    apart = np.linalg.norm(xy - places.xy_px, axis=1)
+    with np.errstate(invalid="ignore"):
+        lost = which & ~(apart < MAX_APART * places.edge_px)
+    xy[which] = 0.5 * (xy[which] + places.xy_px[which])
+    doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
+    cov[which] += doubt[which, None, None] * np.eye(2)
+    xy[lost], cov[lost] = np.nan, np.nan
 
 
 def _sharpened(sigma: float) -> float:

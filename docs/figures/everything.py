@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import contact, drawings, fields, gallery, hero, scene_templates, stages, surface
+from . import contact, drawings, fields, gallery, hero, measured, scene_templates, stages, surface
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
@@ -13,7 +13,7 @@ IMAGES = DOCS / "images"
 def pictures() -> dict[str, bytes]:
     """Name in docs/images -> PNG or SVG."""
     found: dict[str, bytes] = {}
-    for part in (hero, drawings, stages, gallery, contact, scene_templates, surface):
+    for part in (hero, drawings, stages, gallery, contact, measured, scene_templates, surface):
         found |= part.figures()
     return found
 
@@ -24,4 +24,5 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "gallery.md": gallery.page(),
         design_files: fields.filled(design_files.read_text(encoding="utf-8")),
+        **measured.pages(),
     }
