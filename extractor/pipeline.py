@@ -156,7 +156,7 @@ class Extractor:
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
         refined = stages.done("refine", self._refine(sights, places))
-        repaired = stages.done("repair", repair(refined, places.edge_px, self._lattice, sights.size))
+        repaired = stages.done("repair", repair(refined, places, self._lattice, sights.size))
         virtual = stages.done("virtual", place_virtual(self._mesh, repaired, refined.points))
         return Markers(
             xy_px=repaired.xy_px,

@@ -13,8 +13,9 @@ from .gradients import gradients
 from .numbering import Numbering
 from .tables import Lattice
 
-MAX_CORNER_MISFIT = 0.2  # between a triangle's corner and where the cell's neighbours put it, in edges
+MAX_CORNER_MISFIT = 0.28  # between a triangle's corner and where the cell's neighbours put it, in edges
 MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
+AGREED_SPREAD = 0.2  # the same for those that agree
 # Where most cells are sharp enough for triangles, one without is damaged and its edges are not the pattern's, unless
 # it is only cut off by the image's border.
 SHARP_SHARE = 0.6
@@ -31,11 +32,13 @@ class Places:
         xy_px: (M, 2) float64, the mean of the corners, NaN where there is none or they disagree.
         edge_px: (M,) float64, the mean length of the edges at each marker, NaN where there is none.
         cells: (C, 3) int32, marker ids of the numbered cells' corners.
+        agreed: (M,) bool, all triangles that the pattern has there were found, and they meet.
     """
 
     xy_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     cells: NDArray[np.int32]
+    agreed: NDArray[np.bool_]
 
 
 def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int, int]) -> Places:
@@ -54,8 +57,8 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     seen = cells.center_px, cells.corner_px, slope, here
     corner, edge, fitted, inside = _corners(*seen, cell, lattice.arms_mm, numbering.mirrored, *size)
     sharp = bool(fitted.mean() > SHARP_SHARE) if len(fitted) else False
-    xy, around, whole = _merged(ids, corner, edge, fitted, fitted | ~inside, sharp, len(lattice.marker_mm))
-    return Places(xy_px=xy, edge_px=around, cells=ids[whole])
+    xy, around, agreed, whole = _merged(ids, corner, edge, fitted, fitted | ~inside, sharp, lattice.meeting)
+    return Places(xy_px=xy, edge_px=around, cells=ids[whole], agreed=agreed)
 
 
 @compiled
@@ -97,10 +100,12 @@ def _corners(center, triangle, slope, here, cell, arms_mm, mirrored, width, heig
 
 
 @compiled
-def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
-    """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (N,) the cells
-    whose corners are all known, where most are sharp only those ``kept``."""
-    sums = np.zeros((count, 4))
+def _merged(ids, corner, edge, fitted, kept, sharp, meeting):  # type: ignore[no-untyped-def]
+    """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) where all
+    triangles ``meeting`` there agree; (N,) the cells whose corners are all known, where most are sharp only those
+    ``kept``."""
+    count = meeting.shape[0]
+    sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
         for k in range(3):
@@ -121,9 +126,10 @@ def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-u
             apart = np.hypot(corner[n, k, 0] - mean[m, 0], corner[n, k, 1] - mean[m, 1])
             if fitted[n] and apart > MAX_SPREAD * around[m]:
                 xy[m] = np.nan
+            there[m] += fitted[n] and apart < AGREED_SPREAD * around[m]
     whole = np.ones(ids.shape[0], np.bool_)
     for n in range(ids.shape[0]):
         whole[n] = kept[n] or not sharp
         for k in range(3):
             whole[n] = whole[n] and np.isfinite(xy[ids[n, k], 0])
-    return xy, around, whole
+    return xy, around, there == meeting, whole

@@ -52,6 +52,7 @@ MARGIN_SIGMA = 4.0
 # profiles may lie apart, in units of the edges around the marker.
 UNEXPLAINED = 0.015
 MAX_APART = 0.1
+AGREED = 0.04  # standard deviation of triangles' corners where gridlines bend too much for anything else
 MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
@@ -167,7 +168,7 @@ class Refiner:
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
-            fit, across = self._begin(view, Places(xy, places.edge_px, places.cells))
+            fit, across = self._begin(view, Places(xy, places.edge_px, places.cells, places.agreed))
         return self._finish(view, fit, across, _in(view, places), edge / view.scale)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
@@ -202,7 +203,7 @@ class Refiner:
             fit, trusted = self._profile_step(view, fit, across, steps.profiles[1], judged=True)
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
-            return self._refined(view, fit, xy, cov, trusted)
+            return self._refined(view, fit, xy, cov, trusted, places)
         start = fit
         fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
@@ -350,7 +351,7 @@ class Refiner:
             use = lost & trusted
             xy[use], cov[use] = profiled[use], wide[use]
             _doubt(xy, cov, use, places)
-        return self._refined(view, fit, xy, cov, ~lost)
+        return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(
         self,
@@ -359,8 +360,12 @@ class Refiner:
         xy: NDArray[np.float64],
         cov: NDArray[np.float64],
         explained: NDArray[np.bool_],
+        places: Places,
     ) -> Refined:
-        """The markers at the image's full scale."""
+        """The markers at the image's full scale; what was lost though all triangles agree on it is where these say."""
+        left = np.isnan(xy[:, 0]) & places.agreed & np.isfinite(places.xy_px[:, 0])
+        xy[left] = places.xy_px[left]
+        cov[left] = ((AGREED * places.edge_px[left]) ** 2)[:, None, None] * np.eye(2)
         scale, reading = view.scale, fit.reading
         assert reading is not None
         points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual)
@@ -401,4 +406,4 @@ def _sharpened(sigma: float) -> float:
 
 def _in(view: Sight, places: Places) -> Places:
     """Places of the full image in a reduced one."""
-    return Places(view.reduced(places.xy_px), places.edge_px / view.scale, places.cells)
+    return Places(view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed)

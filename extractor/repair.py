@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
+from .placing import Places
 from .refine import Refined
 from .tables import Lattice
 from .types import Status
@@ -22,6 +23,7 @@ MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
 BENT_SIGMAS = 10.0  # standard deviations in between
+MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
@@ -46,20 +48,19 @@ class Repaired:
     status: NDArray[np.uint8]
 
 
-def repair(
-    refined: Refined, edge_px: NDArray[np.float64], lattice: Lattice, size: tuple[int, int]
-) -> Repaired:
+def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, int]) -> Repaired:
     """Drop what contradicts its neighbours and repair what they imply.
 
     Args:
         refined: the markers as measured.
-        edge_px: (M,) the edges at each marker, NaN where unknown.
+        places: the markers before refinement.
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
-    _drop_outliers(xy, cov, edge_px, refined.explained, lattice)
+    edge_px = places.edge_px
+    _drop_outliers(xy, cov, edge_px, refined.explained, places.agreed, lattice)
     _drop_frayed(xy, cov, edge_px, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
@@ -87,27 +88,31 @@ def _drop_outliers(
     cov: NDArray[np.float64],
     edge: NDArray[np.float64],
     explained: NDArray[np.bool_],
+    agreed: NDArray[np.bool_],
     lattice: Lattice,
 ) -> None:
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
 
-    What the drawing does not explain must lie nearer, and have neighbours that say so.
+    What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
+    lie farther off.
     """
     table = lattice.neighbours
     for _ in range(ROUNDS):
         known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
-        doubtful = deviant(xy, MAX_DEVIATION * edge * explained, lattice.ring_weights, table)
+        doubtful = deviant(xy, MAX_DEVIATION * edge * (explained | agreed), lattice.ring_weights, table)
         place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
         sigma = np.sqrt(variance * (1 + leverage))
         apart = xy - place
         deviation = np.hypot(apart[:, 0], apart[:, 1])
         with np.errstate(invalid="ignore"):
             allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
-            allowed = np.where(explained, np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE), MAX_UNEXPLAINED)
+            usual = np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE)
+            allowed = np.where(explained | agreed, usual, MAX_UNEXPLAINED)
+            allowed = np.where(agreed & (lattice.meeting > 1), MAX_AGREED, allowed)
             excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
-        excess[known & ~explained & ~np.isfinite(place[:, 0])] = np.inf
+        excess[known & ~explained & ~agreed & ~np.isfinite(place[:, 0])] = np.inf
         if not (excess > 1.0).any():
             break
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)

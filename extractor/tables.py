@@ -52,6 +52,11 @@ class Lattice:
         return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
 
     @cached_property
+    def meeting(self) -> NDArray[np.int64]:
+        """(M,) how many colored cells meet at each marker."""
+        return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
+
+    @cached_property
     def arms_mm(self) -> NDArray[np.float64]:
         """(U, 3, 2) from the centers of the colored cells to their corners."""
         return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])

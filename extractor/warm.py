@@ -442,7 +442,10 @@ def prove(
     kept = np.full_like(xy, np.nan)
     kept[cells] = xy[cells]
     now = np.where(proved[:, None], proof.look, look)
-    return WarmStart(Places(xy_px=kept, edge_px=edge_px, cells=cells), now, by_rim)
+    count = len(xy)
+    meeting = (tables.cells_of_marker >= 0).sum(axis=1)
+    agreed = np.bincount(cells.ravel(), minlength=count) == meeting
+    return WarmStart(Places(xy_px=kept, edge_px=edge_px, cells=cells, agreed=agreed), now, by_rim)
 
 
 def _aligned(
