@@ -42,7 +42,9 @@ lint: $(READY)
 	@$(BIN)/mypy
 
 bench: $(READY)
-	@set -e; for name in startup extraction accuracy numbering tracking laser molds stress; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+	@set -e; for name in extraction accuracy comparison; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
+	@$(BIN)/python -m docs.figures
+	@set -e; for name in startup numbering tracking rendering contact reconstruction laser molds stress; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
 figures: $(READY)
 	@$(BIN)/python -m docs.figures

@@ -42,7 +42,7 @@ PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
-MIN_EDGE_PX = 8.0  # edges at a reduced scale
+MIN_EDGE_PX = 6.5  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing

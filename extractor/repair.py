@@ -22,6 +22,7 @@ ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
+MAX_MOVED = 0.12  # in edges, of such a marker by refinement
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
@@ -61,7 +62,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     xy[outside], cov[outside] = np.nan, np.nan
     edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
-    _drop_frayed(xy, cov, edge_px, lattice)
+    _drop_frayed(xy, cov, places, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
@@ -120,20 +121,20 @@ def _drop_outliers(
         cov[bad] = np.nan
 
 
-def _drop_frayed(
-    xy: NDArray[np.float64], cov: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
-) -> None:
-    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
+def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
+    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them, or that
+    refinement took far from their triangles.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
     outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
     place, variance, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
-    apart = xy - place
+    apart, moved, edge = xy - place, xy - places.xy_px, places.edge_px
     with np.errstate(invalid="ignore"):
         # the worse a quadratic fits the layers inside, the less it tells beyond them
         allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
         bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
+        bad |= outer & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
     xy[bad], cov[bad] = np.nan, np.nan
 
 

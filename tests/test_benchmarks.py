@@ -91,7 +91,9 @@ def test_a_block_of_a_page_is_written_anew() -> None:
 
 
 def rendered_at(true: np.ndarray) -> Rendered:
-    truth = Truth(true, np.ones(len(true), bool), np.empty((0, 0, 2)), np.ones(0, bool), False, None)
+    flat = np.pad(true, ((0, 0), (0, 1)))
+    nothing = np.empty((0, 0, 2))
+    truth = Truth(true, np.ones(len(true), bool), nothing, np.ones(0, bool), False, None, flat, nothing)
     return Rendered(np.zeros((1, 1, 3), np.uint8), truth)
 
 

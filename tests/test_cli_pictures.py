@@ -178,7 +178,8 @@ def test_bad_layouts(made: Path, tmp_path: Path) -> None:
 
 def test_square_patterns_are_refused_in_one_line(tmp_path: Path) -> None:
     assert run("build", "square", "-o", tmp_path, "--only", "layout").exit_code == 0
-    assert "square" in refused("verify", tmp_path / "layout.json", "image.png")
+    assert run("render", tmp_path / "layout.json", "-o", tmp_path / "image.png").exit_code == 0
+    assert "square" in refused("verify", tmp_path / "layout.json", tmp_path / "image.png")
 
 
 def test_output_that_cannot_be_written(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
