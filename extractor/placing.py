@@ -32,13 +32,15 @@ class Places:
         xy_px: (M, 2) float64, the mean of the corners, NaN where there is none or they disagree.
         edge_px: (M,) float64, the mean length of the edges at each marker, NaN where there is none.
         cells: (C, 3) int32, marker ids of the numbered cells' corners.
-        agreed: (M,) bool, all triangles that the pattern has there were found, and they meet.
+        agreed: (M,) bool, triangles that the pattern has there were found and meet: all, or at least two.
+        whole: (M,) bool, it were all, and at least two.
     """
 
     xy_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     cells: NDArray[np.int32]
     agreed: NDArray[np.bool_]
+    whole: NDArray[np.bool_]
 
 
 def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int, int]) -> Places:
@@ -57,8 +59,17 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     seen = cells.center_px, cells.corner_px, slope, here
     corner, edge, fitted, inside = _corners(*seen, cell, lattice.arms_mm, numbering.mirrored, *size)
     sharp = bool(fitted.mean() > SHARP_SHARE) if len(fitted) else False
-    xy, around, agreed, whole = _merged(ids, corner, edge, fitted, fitted | ~inside, sharp, lattice.meeting)
-    return Places(xy_px=xy, edge_px=around, cells=ids[whole], agreed=agreed)
+    xy, around, there, kept = _merged(
+        ids, corner, edge, fitted, fitted | ~inside, sharp, len(lattice.marker_mm)
+    )
+    return Places(xy, around, ids[kept], *agreement(there, lattice.meeting))
+
+
+def agreement(
+    there: NDArray[np.int64], meeting: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """``agreed`` and ``whole`` of ``Places``, by how many cells agree at each marker and how many meet there."""
+    return (there == meeting) | (there >= 2), (there == meeting) & (there >= 2)
 
 
 @compiled
@@ -100,11 +111,9 @@ def _corners(center, triangle, slope, here, cell, arms_mm, mirrored, width, heig
 
 
 @compiled
-def _merged(ids, corner, edge, fitted, kept, sharp, meeting):  # type: ignore[no-untyped-def]
-    """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) where all
-    triangles ``meeting`` there agree; (N,) the cells whose corners are all known, where most are sharp only those
-    ``kept``."""
-    count = meeting.shape[0]
+def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
+    """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
+    triangles agree there; (N,) the cells whose corners are all known, where most are sharp only those ``kept``."""
     sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
@@ -132,4 +141,4 @@ def _merged(ids, corner, edge, fitted, kept, sharp, meeting):  # type: ignore[no
         whole[n] = kept[n] or not sharp
         for k in range(3):
             whole[n] = whole[n] and np.isfinite(xy[ids[n, k], 0])
-    return xy, around, there == meeting, whole
+    return xy, around, there, whole

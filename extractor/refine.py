@@ -8,7 +8,7 @@ nearly all that can be had.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -168,7 +168,7 @@ class Refiner:
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
-            fit, across = self._begin(view, Places(xy, places.edge_px, places.cells, places.agreed))
+            fit, across = self._begin(view, replace(places, xy_px=xy))
         return self._finish(view, fit, across, _in(view, places), edge / view.scale)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
@@ -406,4 +406,4 @@ def _sharpened(sigma: float) -> float:
 
 def _in(view: Sight, places: Places) -> Places:
     """Places of the full image in a reduced one."""
-    return Places(view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed)
+    return replace(places, xy_px=view.reduced(places.xy_px), edge_px=places.edge_px / view.scale)

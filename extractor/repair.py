@@ -60,7 +60,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
     edge_px = places.edge_px
-    _drop_outliers(xy, cov, edge_px, refined.explained, places.agreed, lattice)
+    _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, edge_px, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
@@ -86,9 +86,8 @@ def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]
 def _drop_outliers(
     xy: NDArray[np.float64],
     cov: NDArray[np.float64],
-    edge: NDArray[np.float64],
+    places: Places,
     explained: NDArray[np.bool_],
-    agreed: NDArray[np.bool_],
     lattice: Lattice,
 ) -> None:
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
@@ -96,11 +95,11 @@ def _drop_outliers(
     What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
     lie farther off.
     """
-    table = lattice.neighbours
+    table, edge, believed = lattice.neighbours, places.edge_px, explained | places.agreed
     for _ in range(ROUNDS):
         known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
-        doubtful = deviant(xy, MAX_DEVIATION * edge * (explained | agreed), lattice.ring_weights, table)
+        doubtful = deviant(xy, MAX_DEVIATION * edge * believed, lattice.ring_weights, table)
         place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
         sigma = np.sqrt(variance * (1 + leverage))
         apart = xy - place
@@ -108,11 +107,11 @@ def _drop_outliers(
         with np.errstate(invalid="ignore"):
             allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
             usual = np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE)
-            allowed = np.where(explained | agreed, usual, MAX_UNEXPLAINED)
-            allowed = np.where(agreed & (lattice.meeting > 1), MAX_AGREED, allowed)
+            allowed = np.where(believed, usual, MAX_UNEXPLAINED)
+            allowed = np.where(places.whole, MAX_AGREED, allowed)
             excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
-        excess[known & ~explained & ~agreed & ~np.isfinite(place[:, 0])] = np.inf
+        excess[known & ~believed & ~np.isfinite(place[:, 0])] = np.inf
         if not (excess > 1.0).any():
             break
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
-from .placing import Places
+from .placing import Places, agreement
 from .reference import BLACK, WHITE, Reference
 from .sampling import sample_dot, sample_patch
 
@@ -442,10 +442,9 @@ def prove(
     kept = np.full_like(xy, np.nan)
     kept[cells] = xy[cells]
     now = np.where(proved[:, None], proof.look, look)
-    count = len(xy)
+    there = np.bincount(cells.ravel(), minlength=len(xy))
     meeting = (tables.cells_of_marker >= 0).sum(axis=1)
-    agreed = np.bincount(cells.ravel(), minlength=count) == meeting
-    return WarmStart(Places(xy_px=kept, edge_px=edge_px, cells=cells, agreed=agreed), now, by_rim)
+    return WarmStart(Places(kept, edge_px, cells, *agreement(there, meeting)), now, by_rim)
 
 
 def _aligned(
