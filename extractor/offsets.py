@@ -106,11 +106,12 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
                     votes[j, 1] += g * g
                 at += stride
         for j in range(count):
-            near = length * min(
-                (j + 0.5) / (count + 1) * room[e, 1], (count - j - 0.5) / (count + 1) * room[e, 2]
-            )
-            if votes[j, 1] < MIN_VOTES or (not drawn and near < CLEAR_SIGMA * sigma):
+            if votes[j, 1] < MIN_VOTES:
                 continue
+            if not drawn:
+                start, end = (j + 0.5) / (count + 1), (count - j - 0.5) / (count + 1)
+                if length * min(start * room[e, 1], end * room[e, 2]) < CLEAR_SIGMA * sigma:
+                    continue
             out[e, j, OFFSET] = sigma * votes[j, 0] / votes[j, 1]
             out[e, j, VARIANCE] = noise**2 * sigma**2 / (strength * votes[j, 1])
     return out

@@ -378,7 +378,8 @@ class Refiner:
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         with np.errstate(invalid="ignore"):
-            near = np.linalg.norm(xy - places.xy_px, axis=1) < MAX_SHIFT * places.edge_px
+            limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
+            near = np.linalg.norm(xy - places.xy_px, axis=1) < limit
             sure = np.einsum("mii->m", cov) < (MAX_SIGMA * places.edge_px) ** 2
         lost = ~(near & sure)
         xy[lost] = np.nan
