@@ -22,7 +22,8 @@ ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
-MAX_MOVED = 0.12  # in edges, of such a marker by refinement
+MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
+VAGUE = 0.02  # its standard deviation is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
@@ -123,7 +124,7 @@ def _drop_outliers(
 
 def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
     """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them, or that
-    refinement took far from their triangles.
+    refinement took far from their triangles and is not sure of.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
@@ -134,7 +135,8 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
         # the worse a quadratic fits the layers inside, the less it tells beyond them
         allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
         bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
-        bad |= outer & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
+        vague = np.trace(cov, axis1=1, axis2=2) > (VAGUE * edge) ** 2
+        bad |= outer & vague & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
     xy[bad], cov[bad] = np.nan, np.nan
 
 
