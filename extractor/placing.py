@@ -15,7 +15,7 @@ from .tables import Lattice
 
 MAX_CORNER_MISFIT = 0.28  # between a triangle's corner and where the cell's neighbours put it, in edges
 MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
-AGREED_SPREAD = 0.2  # the same for those that agree
+AGREED_SPREAD = 0.2  # of those that agree, in the triangle's shortest edge
 # Where most cells are sharp enough for triangles, one without is damaged and its edges are not the pattern's, unless
 # it is only cut off by the image's border.
 SHARP_SHARE = 0.6
@@ -111,6 +111,16 @@ def _corners(center, triangle, slope, here, cell, arms_mm, mirrored, width, heig
 
 
 @compiled
+def _shortest(corner):  # type: ignore[no-untyped-def]
+    """The shortest edge of a triangle."""
+    shortest = np.inf
+    for k in range(3):
+        j = (k + 1) % 3
+        shortest = min(shortest, np.hypot(corner[k, 0] - corner[j, 0], corner[k, 1] - corner[j, 1]))
+    return shortest
+
+
+@compiled
 def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
     """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
     triangles agree there; (N,) the cells whose corners are all known, where most are sharp only those ``kept``."""
@@ -135,7 +145,7 @@ def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-u
             apart = np.hypot(corner[n, k, 0] - mean[m, 0], corner[n, k, 1] - mean[m, 1])
             if fitted[n] and apart > MAX_SPREAD * around[m]:
                 xy[m] = np.nan
-            there[m] += fitted[n] and apart < AGREED_SPREAD * around[m]
+            there[m] += fitted[n] and apart < AGREED_SPREAD * _shortest(corner[n])
     whole = np.ones(ids.shape[0], np.bool_)
     for n in range(ids.shape[0]):
         whole[n] = kept[n] or not sharp

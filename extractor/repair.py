@@ -26,10 +26,13 @@ MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
+MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
+IMPLIED_SIGMA = 0.03  # in edges
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
+RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
 MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
@@ -71,6 +74,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     measured = xy.copy()
     for place, variance, kind in (
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
+        (*_by_cells(measured, places, edge, lattice), Status.REPAIRED),
         (*_by_layer(measured, edge, lattice), Status.FITTED),
     ):
         use = (status == Status.LOST) & _inside(place, size) & lattice.present
@@ -161,6 +165,21 @@ def _by_neighbours(
         at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
         safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
     return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance
+
+
+def _by_cells(
+    xy: NDArray[np.float64], places: Places, edge: NDArray[np.float64], lattice: Lattice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(M, 2) the corners that the cells around each lost marker imply, averaged (the article's eq. 6), and their (M,)
+    variance; NaN where the markers around say something else: where gridlines bend sharply, these tell little more."""
+    lost = np.isnan(xy[:, 0])
+    expected, _, _, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
+    apart = places.xy_px - expected
+    squares = (apart**2).sum(axis=1)
+    with np.errstate(invalid="ignore"):
+        use = lost & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
+    variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
+    return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
 
 
 def _by_layer(
