@@ -33,7 +33,7 @@ from benchmarks.published import publish
 from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bounds_px, extractor_of, inner_markers, shortest_edges
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
-from extractor.refine import PRESETS, Preset
+from extractor.presets import PRESETS, Preset
 
 SEEDS, QUICK_SEEDS = 5, 2
 # layers that fit the image at the larger edges

@@ -34,7 +34,7 @@ from cmpdesign.layout import Layout
 from cmpdesign.scene import Camera, Rendered, render, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
-from extractor.refine import PRESETS, Preset
+from extractor.presets import PRESETS, Preset
 
 LAYERS = 10
 PITCH_PX = 20.0

@@ -17,7 +17,7 @@ from cmpdesign.scene.exact_bound import exact_bound
 from cmpdesign.scene.standard import INKS, STANDARD_LAYERS, STANDARD_SIZE
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Reference, parse_layout
-from extractor.refine import Preset
+from extractor.presets import Preset
 
 WRONG_SHARE = 0.3  # of the shortest edge: farther from the truth a marker is wrong, not imprecise
 TILT_DEG = 35.0

@@ -18,8 +18,9 @@ from .mesh import build_mesh
 from .missed import missed
 from .numbering import Numbering, number
 from .placing import Places, place
+from .presets import PRESETS, Preset
 from .reference import Reference
-from .refine import PRESETS, Preset, Refiner
+from .refine import Refiner
 from .regions import find_seeds, grow, large_enough
 from .repair import repair
 from .sight import Sights

@@ -8,18 +8,20 @@ nearly all that can be had.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Levels, black_at, cell_means, smooth_levels
 from .offsets import Reading, foot_of, measure
 from .placing import Places
+from .presets import STEPS, Preset
 from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
 from .sight import Sight, Sights
 from .stepping import (
@@ -36,9 +38,6 @@ from .stepping import (
 )
 from .synthesis import AA, A, B, clear, draw_cells, edge_contrasts, read_gridlines
 from .topology import Topology
-
-Preset = Literal["fast", "balanced", "accurate"]
-PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 USUAL_SIGMA_PX = 1.5  # before it is known
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
@@ -57,90 +56,10 @@ MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0
 JUDGED_BY_SAMPLES = 1, 4, 1.0
+JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
 PARDON = 0.1  # of the contrast: what glare and uneven light do to a profile
 NO_ROOM = np.empty((0, 4))
 NO_MODEL = np.empty((0, 0, 3), np.float32)
-
-
-class Steps(NamedTuple):
-    """What a preset does.
-
-    Attributes:
-        profiles: stations per gridline at most, in the first round, and in the second, if no synthesis follows.
-        finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
-        sharp: blur, as a share of the edges, below which an image needs no synthesis,
-        reduced: unless it could be reduced by so much, which makes synthesis cheap.
-        synthesis: steps of synthesis at most.
-        enough: no more steps once no marker moves by more than so many of its standard deviations.
-    """
-
-    profiles: tuple[int, int]
-    finest: float
-    sharp: float
-    reduced: float
-    synthesis: int
-    enough: float
-
-
-STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((3, 64), 0.5, 0.085, 2, 4, 12.0),
-    "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
-}
-JUDGING_STATIONS = 16  # where it failed
-
-
-@dataclass(frozen=True, eq=False)
-class Refined:
-    """Markers after refinement.
-
-    Attributes:
-        xy_px: (M, 2) float64, NaN where nothing was measured.
-        cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
-        explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
-            after synthesis, its place is from profiles alone).
-        blur_px: the blur found in the image, pixel included (sigma).
-        noise: the noise found, grey levels, one channel.
-        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    explained: NDArray[np.bool_]
-    blur_px: float
-    noise: float
-    points: NDArray[np.float64]
-
-
-class Fit(NamedTuple):
-    """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
-    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
-    ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
-    step saw."""
-
-    xy: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    beyond: NDArray[np.bool_]
-    maps: NDArray[np.float64]
-    sigma: float
-    noise: float
-    levels: Levels
-    information: Information
-    moved: float
-    reading: Reading | None
-
-
-class Across(NamedTuple):
-    """What changes across the gridlines; moves of a pixel do not change it.
-
-    Attributes:
-        contrasts: (E, 3) differences of level.
-        weights, room: as ``unmixing`` gives them.
-    """
-
-    contrasts: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    room: NDArray[np.float64]
 
 
 class Refiner:

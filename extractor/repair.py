@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .fit import Refined
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
 from .placing import Places
-from .refine import Refined
 from .tables import Lattice
 from .types import Status
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from .camera import View
 from .errors import ImageError
 from .pipeline import Extractor
+from .presets import Preset
 from .reference import Reference
-from .refine import Preset
 from .rig import Rig
 from .stereo import Reconstructor, Shape, shifted
 from .tracking import FrameStatus, Tracked, Tracker

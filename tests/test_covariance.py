@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from benchmarks.scenes import KINDS, Case, extractor_of, inner_markers
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus
-from extractor.refine import PRESETS
+from extractor.presets import PRESETS
 
 LAYERS = 8
 SIZE = (400, 360)

@@ -36,11 +36,12 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
 from extractor.color import Segmentation
+from extractor.fit import Refined
 from extractor.information import covariances, overlap, solve
 from extractor.mesh import build_mesh
 from extractor.neighbourhood import predict
 from extractor.placing import Places
-from extractor.refine import PRESETS, Refined
+from extractor.presets import PRESETS
 from extractor.regions import find_seeds, grow
 from extractor.repair import repair
 from extractor.tables import lattice_of

@@ -18,7 +18,7 @@ from benchmarks.article.numbering import lattice_of, number
 from benchmarks.scenes import BOARD_LAYERS, Case, extractor_of, reference_of
 from extractor import Extractor
 from extractor.color import find_target, nominal_hues_deg, segment, to_colors
-from extractor.refine import Preset
+from extractor.presets import Preset
 from extractor.regions import find_seeds, grow
 
 Image = NDArray[np.uint8]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cmpdesign.scene import Rendered
     from extractor import Markers, Reference
     from extractor.camera import View
-    from extractor.refine import Preset
+    from extractor.presets import Preset
     from extractor.stereo import Reconstructor
 
 Points = NDArray[np.float64]

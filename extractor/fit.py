@@ -1,0 +1,66 @@
+"""What refinement passes from step to step, and what it gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .information import Information
+from .levels import Levels
+from .offsets import Reading
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Markers after refinement.
+
+    Attributes:
+        xy_px: (M, 2) float64, NaN where nothing was measured.
+        cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
+        explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
+            after synthesis, its place is from profiles alone).
+        blur_px: the blur found in the image, pixel included (sigma).
+        noise: the noise found, grey levels, one channel.
+        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    explained: NDArray[np.bool_]
+    blur_px: float
+    noise: float
+    points: NDArray[np.float64]
+
+
+class Fit(NamedTuple):
+    """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
+    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
+    ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
+    step saw."""
+
+    xy: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    beyond: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+    sigma: float
+    noise: float
+    levels: Levels
+    information: Information
+    moved: float
+    reading: Reading | None
+
+
+class Across(NamedTuple):
+    """What changes across the gridlines; moves of a pixel do not change it.
+
+    Attributes:
+        contrasts: (E, 3) differences of level.
+        weights, room: as ``unmixing`` gives them.
+    """
+
+    contrasts: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    room: NDArray[np.float64]

@@ -1,0 +1,37 @@
+"""The presets: points on the curve of time against error."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+Preset = Literal["fast", "balanced", "accurate"]
+PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
+
+
+class Steps(NamedTuple):
+    """What a preset does.
+
+    Attributes:
+        profiles: stations per gridline at most, in the first round, and in the second, if no synthesis follows.
+        finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
+        sharp: blur, as a share of the edges, below which an image needs no synthesis,
+        reduced: unless it could be reduced by so much, which makes synthesis cheap.
+        synthesis: steps of synthesis at most.
+        enough: no more steps once no marker moves by more than so many of its standard deviations.
+    """
+
+    profiles: tuple[int, int]
+    finest: float
+    sharp: float
+    reduced: float
+    synthesis: int
+    enough: float
+
+
+STEPS: dict[Preset, Steps] = {
+    "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
+    "balanced": Steps((3, 64), 0.5, 0.085, 2, 4, 12.0),
+    "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
+}
