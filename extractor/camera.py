@@ -214,7 +214,7 @@ def undistorted(bent: Array, distortion: tuple[float, ...], fold_radius: float =
     if not any(distortion):
         return bent.copy()
     radius = np.hypot(*bent.T)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         plain = bent * np.minimum(1.0, 0.9 * fold_radius / radius)[:, None]
     plain[radius == 0] = 0.0
     error = np.full(len(bent), np.inf)
@@ -246,7 +246,7 @@ def _step(
 ) -> Array:
     """A Newton step, halved until it stays inside the model and the error gets smaller; else none."""
     (a, b), (c, d) = by_plain.transpose(1, 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = np.column_stack([d * away[:, 0] - b * away[:, 1], a * away[:, 1] - c * away[:, 0]])
         step /= (a * d - b * c)[:, None]
     out, error = plain.copy(), np.hypot(*away.T)

@@ -27,7 +27,8 @@ VAGUE = 0.02  # its standard deviation is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
-IMPLIED_SIGMA = 0.03  # in edges
+IMPLIED_SIGMA = 0.02  # in edges
+BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
@@ -41,7 +42,7 @@ MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadrat
 # surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
 # to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
 MILD_ERROR = 2.0
-HEAVY_ERROR = 2.3
+HEAVY_ERROR = 1.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     measured = xy.copy()
     for place, variance, kind in (
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
-        (*_by_cells(measured, places, edge, lattice), Status.REPAIRED),
+        (*_by_cells(measured, places, edge, lattice, size), Status.REPAIRED),
         (*_by_layer(measured, edge, lattice), Status.FITTED),
     ):
         use = (status == Status.LOST) & _inside(place, size) & lattice.present
@@ -168,16 +169,24 @@ def _by_neighbours(
 
 
 def _by_cells(
-    xy: NDArray[np.float64], places: Places, edge: NDArray[np.float64], lattice: Lattice
+    xy: NDArray[np.float64],
+    places: Places,
+    edge: NDArray[np.float64],
+    lattice: Lattice,
+    size: tuple[int, int],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(M, 2) the corners that the cells around each lost marker imply, averaged (the article's eq. 6), and their (M,)
-    variance; NaN where the markers around say something else: where gridlines bend sharply, these tell little more."""
+    variance; NaN where the markers around say something else, and at the image's border, which cuts cells.
+
+    Where gridlines bend sharply, the markers around tell little more than that.
+    """
     lost = np.isnan(xy[:, 0])
     expected, _, _, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
     apart = places.xy_px - expected
     squares = (apart**2).sum(axis=1)
     with np.errstate(invalid="ignore"):
-        use = lost & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
+        deep = np.minimum(places.xy_px, np.array(size) - 1 - places.xy_px).min(axis=1) > BORDER * edge
+        use = lost & deep & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
     variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
     return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
 
