@@ -136,15 +136,20 @@ def precision(document: Document) -> list[Section]:
     ]
 
 
-def _edge_section(edges: Document) -> Section:
-    rows = []
-    for mode, one in edges.items():
-        label = mode.replace("_", " + ")
+def _change_rows(cases: Document) -> list[Sequence[str]]:
+    """Both patterns and the change from one to the other by label, the article's beside, variants below."""
+    rows: list[Sequence[str]] = []
+    for label, one in cases.items():
         cells = [text(one["square"]), text(one["multicolor"]), percent(one["change_percent"])]
         rows.append([label, *cells, percent(one["article_change_percent"])])
         for name, other in one["variants"].items():
             cells = [text(other["square"]), text(other["multicolor"]), percent(other["change_percent"])]
             rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
+    return rows
+
+
+def _edge_section(edges: Document) -> Section:
+    rows = _change_rows({mode.replace("_", " + "): one for mode, one in edges.items()})
     table = Table(
         "Edge fitting error, mm: by how much the fitted square's side misses 15 mm, mean over the places.",
         ("mode", "square", "multicolor", "change", "the article"),
@@ -227,14 +232,7 @@ def _whole(share: float | None) -> str:
 
 
 def response(document: Document) -> list[Section]:
-    rows: list[Sequence[str]] = []
-    for case, one in document["response"].items():
-        label = case.replace("_", " ")
-        cells = [text(one["square"]), text(one["multicolor"]), percent(one["change_percent"])]
-        rows.append([label, *cells, percent(one["article_change_percent"])])
-        for name, other in one["variants"].items():
-            cells = [text(other["square"]), text(other["multicolor"]), percent(other["change_percent"])]
-            rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
+    rows = _change_rows({case.replace("_", " "): one for case, one in document["response"].items()})
     table = Table(
         "Mean displacement of the edge points over the shear of 1 mm.",
         ("direction", "square", "multicolor", "change", "the article"),
