@@ -13,7 +13,7 @@ from .engine import compiled
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
 from .levels import monomials
 from .sampling import clamp, sample_dot
-from .synthesis import AA, AB, BB, MISFIT, PIXELS, A, B
+from .synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, PIXELS, SUMS, A, B, C, D
 
 SAMPLES = 7  # at most, on each side of a gridline
 REACH_SIGMA = 2.0  # how far a profile reaches, in units of the blur
@@ -94,12 +94,12 @@ def profile_blurs(image, lines, weights, room, every):  # type: ignore[no-untype
 
 @compiled
 def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-untyped-def]
-    """(E, 11) sums as ``read_gridlines`` gives them, from at most ``most`` stations a gridline.
+    """(E, 22) sums as ``read_gridlines`` gives them, from at most ``most`` stations a gridline.
 
     At each station the matched filter of a blurred step tells how far the gridline lies from where it is thought to
     be; it weighs as much as the station's length carries information.
     """
-    out = np.zeros((lines.shape[0], 11))
+    out = np.zeros((lines.shape[0], SUMS))
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     kernel, step_profile = np.zeros(2 * SAMPLES + 1), np.zeros(2 * SAMPLES + 1)
     kept_reach = -1.0
@@ -144,6 +144,17 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
             out[e, BB] += information * t * t
             out[e, A] += information * (1 - t) * offset
             out[e, B] += information * t * offset
+            c = t * (1 - t)
+            d = c * (1 - 2 * t)
+            out[e, AC] += information * (1 - t) * c
+            out[e, AD] += information * (1 - t) * d
+            out[e, BC] += information * t * c
+            out[e, BD] += information * t * d
+            out[e, CC] += information * c * c
+            out[e, CD] += information * c * d
+            out[e, DD] += information * d * d
+            out[e, C] += information * c * offset
+            out[e, D] += information * d * offset
             out[e, MISFIT] += information * squares / norm
             out[e, PIXELS] += 2.0 * samples + 1.0
     return out

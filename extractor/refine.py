@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .bending import HIDDEN, bend_gridlines, bent, eliminate, hidden_misfit, roughness
 from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
@@ -108,7 +109,8 @@ class Refiner:
             view.frame,
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
-        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0, None)
+        smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
+        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, smooth, straight, 0.0, None)
         across = self._across(view, fit)
         fit = fit._replace(sigma=self._blur(view, fit, across))
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
@@ -140,10 +142,16 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
+    def _lines(self, fit: Fit) -> NDArray[np.float64]:
+        mesh = self._mesh
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        bend_gridlines(lines, fit.bend)
+        return lines
+
     def _across(self, view: Sight, fit: Fit) -> Across:
         """The colors beside the gridlines."""
         mesh, levels = self._mesh, fit.levels
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        lines = self._lines(fit)
         sides = mesh.cells, mesh.edge_cells, levels.cell
         contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
         return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
@@ -156,14 +164,16 @@ class Refiner:
         Gridlines are ``judged`` only where they are already close: farther off, the best of them look wrong.
         """
         mesh = self._mesh
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        lines = self._lines(fit)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
+        to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
+        kept = eliminate(sums, to_a, to_b, off, fit.bend, fit.rough, mesh.edges, fit.noise**2)
         use = (sums[:, AA] > 0).astype(np.float64)
         if judged:
             pardon = PARDON**2 * across.room[:, 3]
-            use, _ = trust(sums, sums[:, A], sums[:, B], pardon, *JUDGED_BY_SAMPLES)
-        given = sums, sums[:, A], sums[:, B], use
-        shift, information = self._solve(*given, lines, across.contrasts, False, fit)
+            use, _ = trust(sums, to_a, to_b, pardon, *JUDGED_BY_SAMPLES)
+        shift, information = self._solve(sums, to_a, to_b, use, lines, across.contrasts, False, fit)
+        fit = fit._replace(bend=bent(fit.bend, kept, shift, lines, mesh.edges))
         foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
@@ -172,7 +182,7 @@ class Refiner:
     def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
         """The blur that some of the gridlines show."""
         mesh = self._mesh
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        lines = self._lines(fit)
         every = max(1, len(lines) // BLUR_EDGES)
         blurs = profile_blurs(view.image, lines, across.weights, across.room, every)
         seen = blurs[np.isfinite(blurs)]
@@ -182,22 +192,25 @@ class Refiner:
         image, frame = view.image, view.frame
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
         box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        lines = self._lines(fit)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         model = self._drawn(fit, lines, box, image.shape)
         bettered = self._level_step(view, model, fit)
         middle = middles(lines)
         black = black_at(levels.black, middle, *frame)
-        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box)
+        loose = (fit.rough[mesh.edges] > 0.0).any(axis=1) | (fit.bend != 0.0).any(axis=1)
+        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, loose)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        use, noise = trust(sums, to_a, to_b, np.zeros(len(sums)), *JUDGED_BY_PIXELS)
+        kept = eliminate(sums, to_a, to_b, off, fit.bend, fit.rough, mesh.edges, fit.noise**2)
+        use, noise = trust(sums, to_a, to_b, hidden_misfit(fit.rough, mesh.edges, contrasts, sigma), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
             np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
         )
         fit = fit._replace(noise=float(noise) if np.isfinite(noise) else fit.noise, levels=bettered)
         shift, information = self._solve(sums, to_a, to_b, use, lines, contrasts, True, fit)
+        fit = fit._replace(bend=bent(fit.bend, kept, shift, lines, mesh.edges))
         foot = foot_of(contrasts, black, off)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
         fit = fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX), reading=reading)
@@ -217,10 +230,13 @@ class Refiner:
     def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
         """The fit after a step."""
         measured, guiding, steps = moved(fit.xy, shift, information.diagonal, fit.beyond)
-        xy_px, beyond, maps = self._completed(guiding)
-        return fit._replace(
-            xy=xy_px, measured=measured, beyond=beyond, maps=maps, information=information, moved=float(steps)
+        xy, beyond, maps = self._completed(guiding)
+        mesh = self._mesh
+        rough = roughness(
+            guiding, maps, information.diagonal, mesh.edges, mesh.ahead, mesh.third, mesh.near
         )
+        fit = fit._replace(xy=xy, measured=measured, beyond=beyond, maps=maps, moved=float(steps))
+        return fit._replace(information=information, rough=rough)
 
     def _level_step(self, view: Sight, model: NDArray[np.float32], fit: Fit) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
@@ -296,6 +312,7 @@ class Refiner:
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
+        cov += HIDDEN**2 * fit.rough[:, None, None] * np.eye(2)
         with np.errstate(invalid="ignore"):
             limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
             near = np.linalg.norm(xy - places.xy_px, axis=1) < limit

@@ -35,6 +35,7 @@ MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a q
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
+UNSEEN = 3.0  # variances more, where the inner ring alone says nothing
 MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
@@ -63,16 +64,15 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    outside = ~_inside(xy, size)
-    xy[outside], cov[outside] = np.nan, np.nan
     edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
-    status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
+    measured, edge = xy.copy(), _filled(edge_px, lattice)
+    outside = ~_inside(xy, size)
+    xy[outside], cov[outside] = np.nan, np.nan
+    status = np.where(outside, Status.LOST, Status.MEASURED).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
-    edge = _filled(edge_px, lattice)
-    measured = xy.copy()
     for place, variance, kind in (
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
         (*_by_cells(measured, places, edge, lattice, size), Status.REPAIRED),
@@ -86,8 +86,8 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
 
 
 def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Places within the image, NaN not."""
-    return np.asarray((xy >= 0).all(axis=1) & (xy <= np.array(size) - 1).all(axis=1))
+    """Places within the image, out to the edges of its pixels; NaN not."""
+    return np.asarray((xy >= -0.5).all(axis=1) & (xy <= np.array(size) - 0.5).all(axis=1))
 
 
 def _drop_outliers(
@@ -162,8 +162,9 @@ def _by_neighbours(
     nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
     with np.errstate(invalid="ignore"):
         # where the inner ring alone says something else, the surface is too bent for either to be believed
+        usual = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2
         doubt = ((place - nearer) ** 2).sum(axis=1) / 4
-        at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
+        at_most = usual + np.where(np.isfinite(doubt), doubt, UNSEEN * usual)
         safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
     return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance
 
@@ -181,12 +182,13 @@ def _by_cells(
     Where gridlines bend sharply, the markers around tell little more than that.
     """
     lost = np.isnan(xy[:, 0])
-    expected, _, _, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
+    expected, spread, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
     apart = places.xy_px - expected
     squares = (apart**2).sum(axis=1)
     with np.errstate(invalid="ignore"):
         deep = np.minimum(places.xy_px, np.array(size) - 1 - places.xy_px).min(axis=1) > BORDER * edge
         use = lost & deep & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
+        use &= spread * (1 + leverage) < (MAX_IMPLIED * edge) ** 2
     variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
     return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
 

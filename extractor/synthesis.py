@@ -23,6 +23,8 @@ CHUNK = 1024  # pixels that vote at once, at most
 
 # columns of what is read along a gridline: sums over its pixels
 AA, AB, BB, A, B, SHARE_A, SHARE_B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(11)
+AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
+SUMS = 22
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -222,35 +224,42 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
 
 
 @vectorized
+def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
+    """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
+    gridline's place by those of its start and end."""
+    one, half = np.float32(1.0), np.float32(0.5)
+    zero = np.float32(0.0)
+    t = along * short
+    inside = min(max(t, zero), one)
+    off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)
+    off += leave * min(t, zero) + arrive * max(t - one, zero)
+    z = (aside - length * off) * inverse
+    zz = z * z
+    g = max(C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))), zero)
+    at_start = along * (inverse * END)
+    start = min(max(at_start, -one), one)
+    end = min(max(at_start - (length * inverse) * END, -one), one)
+    ss, ee = start * start, end * end
+    bell_s, bell_e = (one - ss) * (one - ss), (one - ee) * (one - ee)
+    rise = half + start * (P1 + ss * (P3 + ss * P5))
+    fall = half + end * (P1 + ee * (P3 + ee * P5))
+    whole = rise - fall
+    to_b = t * whole + slack * (bell_s - bell_e)
+    return z, g, whole - to_b, to_b
+
+
+@vectorized
 def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums: their places along and aside of its chord, their residuals.
 
     The votes' weights are polynomials close to the derivative of the drawing, the normal density by its distance and
     the blurred ends of 1 - t and t: any weights give unbiased votes, and loops without branches and tables are fast.
     """
-    one, half = np.float32(1.0), np.float32(0.5)
     zero = np.float32(0.0)
     aa, ab, bb, sa, sb, wa, wb, blur, curvature = zero, zero, zero, zero, zero, zero, zero, zero, zero
-    a_inverse = inverse * END
-    far = (length * inverse) * END
     for k in range(count):
-        t = along[k] * short
-        inside = min(max(t, zero), one)
-        off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)
-        off += leave * min(t, zero) + arrive * max(t - one, zero)
-        z = (aside[k] - length * off) * inverse
-        zz = z * z
-        g = C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5))))
-        g = max(g, zero)
-        start = min(max(along[k] * a_inverse, -one), one)
-        end = min(max(along[k] * a_inverse - far, -one), one)
-        ss, ee = start * start, end * end
-        bell_s, bell_e = (one - ss) * (one - ss), (one - ee) * (one - ee)
-        rise = half + start * (P1 + ss * (P3 + ss * P5))
-        fall = half + end * (P1 + ee * (P3 + ee * P5))
-        whole = rise - fall
-        to_b = t * whole + slack * (bell_s - bell_e)
-        ga, gb = g * (whole - to_b), g * to_b
+        z, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
+        ga, gb = g * to_a, g * to_b
         aa += ga * ga
         ab += ga * gb
         bb += gb * gb
@@ -272,15 +281,53 @@ def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arriv
     sums[BLUR_CURVATURE] += curvature
 
 
+@vectorized
+def _vote_bending(  # type: ignore[no-untyped-def]
+    along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums
+):
+    """The same for a gridline's bending, with weights t (1 - t) and t (1 - t) (1 - 2 t)."""
+    zero = np.float32(0.0)
+    ac, ad, bc, bd, cc, cd = zero, zero, zero, zero, zero, zero
+    dd, sc, sd, wc, wd = zero, zero, zero, zero, zero
+    for k in range(count):
+        _, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
+        ga, gb = g * to_a, g * to_b
+        gc = ga * to_b
+        gd = gc * (to_a - to_b)
+        ac += ga * gc
+        ad += ga * gd
+        bc += gb * gc
+        bd += gb * gd
+        cc += gc * gc
+        cd += gc * gd
+        dd += gd * gd
+        sc += gc * rest[k]
+        sd += gd * rest[k]
+        wc += gc
+        wd += gd
+    sums[AC] += ac
+    sums[AD] += ad
+    sums[BC] += bc
+    sums[BD] += bd
+    sums[CC] += cc
+    sums[CD] += cd
+    sums[DD] += dd
+    sums[C] += sc
+    sums[D] += sd
+    sums[SHARE_C] += wc
+    sums[SHARE_D] += wd
+
+
 @compiled
-def read_gridlines(image, model, lines, contrasts, black, sigma, box):  # type: ignore[no-untyped-def]
-    """(E, 11) sums over the pixels near each gridline; the columns are named above.
+def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  # type: ignore[no-untyped-def]
+    """(E, 22) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
     residual (image - model - black, the last at the gridline's middle); SHARE: derivative times the share of a side,
-    per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma.
+    per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
+    likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere.
     """
-    out = np.zeros((lines.shape[0], 11))
+    out = np.zeros((lines.shape[0], SUMS))
     inverse, reach = 1.0 / sigma, BAND * sigma
     seen, drawn, width = image.reshape(-1), model.reshape(-1), image.shape[1]
     one, two = np.uint64(1), np.uint64(2)
@@ -313,6 +360,8 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box):  # type: 
             end = min(int(np.floor(middle + half)), side_high)
             if filled + end - start + 1 > CHUNK:
                 _vote(alongs, asides, rests, filled, *small, *shape, sums)
+                if loose[e]:
+                    _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
                 filled = 0
             at = np.uint64((start * width + p if flat else p * width + start) * 3)
             along = (p - p0) * up + (start - q0) * uq
@@ -331,11 +380,13 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box):  # type: 
                 along += uq
                 aside += sense * up
         _vote(alongs, asides, rests, filled, *small, *shape, sums)
+        if loose[e]:
+            _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
         sums[MISFIT], sums[PIXELS] = misfit, pixels
-        for k in (AA, AB, BB, BLUR_CURVATURE):
+        for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
             sums[k] *= strength * inverse * inverse
-        for k in (A, B, BLUR):
+        for k in (A, B, BLUR, C, D):
             sums[k] *= inverse
-        for k in (SHARE_A, SHARE_B):
+        for k in (SHARE_A, SHARE_B, SHARE_C, SHARE_D):
             sums[k] *= 0.5 * inverse
     return out

@@ -11,6 +11,7 @@ from .reference import BLACK, Reference
 
 NEIGHBOURS = 6  # around a marker at most
 NEAR = 18  # in its two rings at most
+MAX_TURN = np.cos(np.radians(150.0))  # of a gridline that goes on beyond a marker
 
 
 class Topology(NamedTuple):
@@ -28,6 +29,8 @@ class Topology(NamedTuple):
         offset: (M, 18, 2) float64, their places relative to it in the layout, in units of the mean edge, y up.
         stencil: (M, 2, 18) float64: weights that give the map's derivatives from the differences to these markers
             (a cubic's least squares), where all 18 are there; else 0.
+        ahead: (E, 2) int32, the marker next on the same gridline before an edge's start, and the one after its end.
+        third: (E, 2) float64, the layout's third difference along these four, in the unit of ``offset``.
     """
 
     edges: NDArray[np.int32]
@@ -40,6 +43,8 @@ class Topology(NamedTuple):
     near: NDArray[np.int32]
     offset: NDArray[np.float64]
     stencil: NDArray[np.float64]
+    ahead: NDArray[np.int32]
+    third: NDArray[np.float64]
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -57,6 +62,8 @@ def topology_of(layout: Reference) -> Topology:
     near = _two_rings(ring)
     xy = layout.xy_mm
     length = np.linalg.norm(xy[edges[:, 1]] - xy[edges[:, 0]], axis=1)
+    ahead = np.stack([_ahead(ring, xy, edges[:, ::-1]), _ahead(ring, xy, edges)], axis=1)
+    third = xy[ahead[:, 0]] - xy[ahead[:, 1]] + 3 * (xy[edges[:, 1]] - xy[edges[:, 0]])
     offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
     return Topology(
         edges=layout.edges.astype(np.int32),
@@ -69,6 +76,8 @@ def topology_of(layout: Reference) -> Topology:
         near=near,
         offset=offset,
         stencil=_stencil(near, offset),
+        ahead=ahead,
+        third=np.where((ahead >= 0).all(axis=1)[:, None], third / length.mean(), 0.0),
     )
 
 
@@ -80,6 +89,18 @@ def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most
     out = np.full((count, most), -1, np.int32)
     out[owner, place] = item
     return out
+
+
+def _ahead(ring: NDArray[np.int32], xy: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int32]:
+    """(E,) int32: the neighbour of each edge's end that goes on in its direction, -1 where none does."""
+    start, end = edges[:, 0], edges[:, 1]
+    back, on = xy[start] - xy[end], xy[ring[end]] - xy[end][:, None]
+    lengths = np.linalg.norm(back, axis=1)[:, None] * np.linalg.norm(on, axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cosine = np.where(ring[end] >= 0, np.einsum("ek,enk->en", back, on) / lengths, 1.0)
+    best = cosine.argmin(axis=1)
+    rows = np.arange(len(edges))
+    return np.where(cosine[rows, best] < MAX_TURN, ring[end][rows, best], -1).astype(np.int32)
 
 
 def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,0 +1,147 @@
+"""How gridlines bend beyond what the smooth map says: two more unknowns for each, free where the markers are rough.
+
+The map that the markers define is smooth over two rings of them. Where an object's rim lies between markers, or slips,
+gridlines bend more sharply than that. How sharply they may can be seen: the third differences of the markers along
+their gridlines are 0 where the map is quadratic. A gridline then deviates from the map's cubic by
+
+    t (1 - t) (b + s (1 - 2 t)),
+
+t along its chord, b and s of zero mean and a deviation of ``FREE`` times these differences; less where they are small, as
+what is smooth hides little. Both are eliminated from the gridline's sums before the markers are solved, and follow
+afterwards.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .engine import compiled
+from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
+from .synthesis import AA, AB, AC, AD, BAND, BB, BC, BD, CC, CD, DD, MISFIT, SHARE_C, SHARE_D, C, D
+
+# From the surfaces under balls that press, shear and twist: b and s over the differences around are 0.03 to 0.3 (RMS),
+# the more the rougher; what is left to move a gridline's ends is a tenth of that.
+FREE = 0.25
+SMALL = 0.02  # of an edge, differences that count half
+HIDDEN = 0.02
+# The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
+OF_NOISE = 2 * 20 * 2.0
+PARDON = 25.0
+MAX_BEND = 0.3  # b and s, in units of the gridline's length
+
+
+@compiled
+def roughness(xy, maps, diagonal, edges, ahead, third, near):  # type: ignore[no-untyped-def]
+    """(M,) px^2: how rough the markers are around each, from the mean square of the third differences along its
+    gridlines, less what their noise and the layout itself explain; the mean of the neighbours' where its own are not
+    known."""
+    count = xy.shape[0]
+    total, known, length = np.zeros(count), np.zeros(count), np.zeros(count)
+    for e in range(edges.shape[0]):
+        a, b = edges[e]
+        p, q = ahead[e]
+        if p < 0 or q < 0:
+            continue
+        x = xy[p, 0] - xy[q, 0] + 3.0 * (xy[b, 0] - xy[a, 0])
+        y = xy[p, 1] - xy[q, 1] + 3.0 * (xy[b, 1] - xy[a, 1])
+        u, v = 0.5 * third[e, 0], 0.5 * third[e, 1]
+        x -= u * (maps[a, 0, 0] + maps[b, 0, 0]) + v * (maps[a, 0, 1] + maps[b, 0, 1])
+        y -= u * (maps[a, 1, 0] + maps[b, 1, 0]) + v * (maps[a, 1, 1] + maps[b, 1, 1])
+        square = x * x + y * y
+        if np.isfinite(square):
+            for m in (a, b):
+                total[m] += square
+                known[m] += 1.0
+                length[m] += np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
+    # what is hardly trusted where it bends must not be taken for noise
+    noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
+    for m in range(count):
+        if known[m] > 0.0:
+            square = max(total[m] / known[m] - noise, 0.0)
+            small = SMALL * length[m] / known[m]
+            total[m] = square * square / (np.sqrt(square) + small) ** 2
+    for m in range(count):
+        if known[m] == 0.0:
+            seen = 0
+            for k in range(FIRST_RING):
+                n = near[m, k]
+                if n >= 0 and known[n] > 0.0:
+                    total[m] += total[n]
+                    seen += 1
+            total[m] /= max(seen, 1)
+    return total
+
+
+@compiled
+def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
+    """Add b and s (E, 2), px, to the gridlines' slopes, in place."""
+    for e in range(lines.shape[0]):
+        if lines[e, KNOWN] != 0.0:
+            lines[e, LEAVE] += (bend[e, 1] + bend[e, 0]) / lines[e, LENGTH]
+            lines[e, ARRIVE] += (bend[e, 1] - bend[e, 0]) / lines[e, LENGTH]
+
+
+@compiled
+def eliminate(sums, to_a, to_b, off, bend, rough, edges, variance):  # type: ignore[no-untyped-def]
+    """Take what bending explains out of the gridlines' sums and votes, in place; (E, 6) what their bending is: by
+    itself, and against a shift of the start and of the end towards the normal.
+
+    ``off`` (E,) is as ``votes`` gives it, 0 where levels do not change.
+    """
+    kept = np.zeros((sums.shape[0], 6))
+    k = np.empty((2, 2))
+    for e in range(sums.shape[0]):
+        if sums[e, AA] == 0.0:
+            continue
+        loose = 0.5 * FREE * FREE * (rough[edges[e, 0]] + rough[edges[e, 1]])
+        c = sums[e, C] - off[e] * sums[e, SHARE_C]
+        d = sums[e, D] - off[e] * sums[e, SHARE_D]
+        k[0, 0], k[0, 1], k[1, 0], k[1, 1] = sums[e, AC], sums[e, AD], sums[e, BC], sums[e, BD]
+        x, y = -bend[e, 0], -bend[e, 1]
+        if loose > 0.0:
+            stiff = variance / loose
+            cc, cd, dd = sums[e, CC] + stiff, sums[e, CD], sums[e, DD] + stiff
+            inverse = 1.0 / (cc * dd - cd * cd)
+            pull_c, pull_d = c + stiff * x, d + stiff * y
+            x, y = (dd * pull_c - cd * pull_d) * inverse, (cc * pull_d - cd * pull_c) * inverse
+            for end in range(2):
+                kept[e, 2 + 2 * end] = (dd * k[end, 0] - cd * k[end, 1]) * inverse
+                kept[e, 3 + 2 * end] = (cc * k[end, 1] - cd * k[end, 0]) * inverse
+        kept[e, 0], kept[e, 1] = x, y
+        sums[e, MISFIT] -= 2.0 * (x * c + y * d)
+        sums[e, MISFIT] += x * x * sums[e, CC] + 2.0 * x * y * sums[e, CD] + y * y * sums[e, DD]
+        to_a[e] -= k[0, 0] * x + k[0, 1] * y
+        to_b[e] -= k[1, 0] * x + k[1, 1] * y
+        sums[e, AA] -= k[0, 0] * kept[e, 2] + k[0, 1] * kept[e, 3]
+        sums[e, AB] -= k[1, 0] * kept[e, 2] + k[1, 1] * kept[e, 3]
+        sums[e, BB] -= k[1, 0] * kept[e, 4] + k[1, 1] * kept[e, 5]
+    return kept
+
+
+@compiled
+def bent(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
+    """(E, 2) b and s after the markers were shifted (M, 2)."""
+    out = np.zeros_like(bend)
+    for e in range(bend.shape[0]):
+        if lines[e, KNOWN] == 0.0:
+            continue
+        a, b = edges[e]
+        by_a = shift[a, 1] * lines[e, UX] - shift[a, 0] * lines[e, UY]
+        by_b = shift[b, 1] * lines[e, UX] - shift[b, 0] * lines[e, UY]
+        limit = MAX_BEND * lines[e, LENGTH]
+        for k in range(2):
+            change = kept[e, k] - kept[e, 2 + k] * by_a - kept[e, 4 + k] * by_b
+            out[e, k] = min(max(bend[e, k] + change, -limit), limit)
+    return out
+
+
+@compiled
+def hidden_misfit(rough, edges, contrasts, sigma):  # type: ignore[no-untyped-def]
+    """(E,) the mean squared residual, one channel, that the gridlines' places off the fitted curve make."""
+    out = np.empty(edges.shape[0])
+    for e in range(edges.shape[0]):
+        strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
+        off = HIDDEN**2 * 0.5 * (rough[edges[e, 0]] + rough[edges[e, 1]])
+        # of the squared normal density, over BAND to both sides
+        out[e] = PARDON * off * strength / (3.0 * sigma * sigma) / (4.0 * BAND * np.sqrt(np.pi))
+    return out
