@@ -6,9 +6,9 @@ their gridlines are 0 where the map is quadratic. A gridline then deviates from 
 
     t (1 - t) (b + s (1 - 2 t)),
 
-t along its chord, b and s of zero mean and a deviation of ``FREE`` times these differences; less where they are small, as
-what is smooth hides little. Both are eliminated from the gridline's sums before the markers are solved, and follow
-afterwards.
+t along its chord, b and s of zero mean and a deviation that is a share of these differences. How large a share, from
+``SMOOTH`` to ``FREE``, the gridlines around say: by how much more they are bent than noise explains. Both unknowns are
+eliminated from a gridline's sums before the markers are solved, and follow afterwards.
 """
 
 from __future__ import annotations
@@ -17,16 +17,17 @@ import numpy as np
 
 from .engine import compiled
 from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
-from .synthesis import AA, AB, AC, AD, BAND, BB, BC, BD, CC, CD, DD, MISFIT, SHARE_C, SHARE_D, C, D
+from .synthesis import AA, AB, AC, AD, BAND, BB, BC, BD, CC, CD, DD, MISFIT, SEEN_A, SEEN_B, SHARE_C, SHARE_D, C, D
 
-# From the surfaces under balls that press, shear and twist: b and s over the differences around are 0.03 to 0.3 (RMS),
-# the more the rougher; what is left to move a gridline's ends is a tenth of that.
-FREE = 0.25
-SMALL = 0.02  # of an edge, differences that count half
-HIDDEN = 0.02
+# From the surfaces under balls that press, shear and twist: b and s over the differences around them (RMS) where these
+# are smooth, and at most; and what is left to move a gridline's ends, in deviations of b and s.
+SMOOTH, FREE = 0.015, 0.25
+HIDDEN = 0.08
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
 OF_NOISE = 2 * 20 * 2.0
-PARDON = 25.0
+PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
+MAX_PARDON = 0.25
+SURE = 2.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
@@ -36,7 +37,7 @@ def roughness(xy, maps, diagonal, edges, ahead, third, near):  # type: ignore[no
     gridlines, less what their noise and the layout itself explain; the mean of the neighbours' where its own are not
     known."""
     count = xy.shape[0]
-    total, known, length = np.zeros(count), np.zeros(count), np.zeros(count)
+    total, known = np.zeros(count), np.zeros(count)
     for e in range(edges.shape[0]):
         a, b = edges[e]
         p, q = ahead[e]
@@ -52,14 +53,11 @@ def roughness(xy, maps, diagonal, edges, ahead, third, near):  # type: ignore[no
             for m in (a, b):
                 total[m] += square
                 known[m] += 1.0
-                length[m] += np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
     # what is hardly trusted where it bends must not be taken for noise
     noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
     for m in range(count):
         if known[m] > 0.0:
-            square = max(total[m] / known[m] - noise, 0.0)
-            small = SMALL * length[m] / known[m]
-            total[m] = square * square / (np.sqrt(square) + small) ** 2
+            total[m] = max(total[m] / known[m] - noise, 0.0)
     for m in range(count):
         if known[m] == 0.0:
             seen = 0
@@ -82,24 +80,56 @@ def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def eliminate(sums, to_a, to_b, off, bend, rough, edges, variance):  # type: ignore[no-untyped-def]
+def freedom(sums, to_a, to_b, off, bend, rough, use, edges, variance):  # type: ignore[no-untyped-def]
+    """(E,) px^2, the variance of b and s, by what the gridlines around show, as far as they are in use (E,), and by how
+    rough (M,) their ends are."""
+    count = rough.shape[0]
+    total, of_noise, known = np.zeros(count), np.zeros(count), np.zeros(count)
+    for e in range(edges.shape[0]):
+        aa, ab, bb, ac, bc = sums[e, AA], sums[e, AB], sums[e, BB], sums[e, AC], sums[e, BC]
+        determinant = aa * bb - ab * ab
+        if not determinant > 1e-6 * aa * bb:
+            continue
+        by_a, by_b = (bb * ac - ab * bc) / determinant, (aa * bc - ab * ac) / determinant
+        left = sums[e, CC] - by_a * ac - by_b * bc
+        if not left > 1e-3 * sums[e, CC]:
+            continue
+        b = bend[e, 0] + (sums[e, C] - off[e] * sums[e, SHARE_C] - by_a * to_a[e] - by_b * to_b[e]) / left
+        for m in edges[e]:
+            total[m] += use[e] * b * b
+            of_noise[m] += use[e] * variance / left
+            known[m] += use[e]
+    out = np.zeros(edges.shape[0])
+    for e in range(edges.shape[0]):
+        i, j = edges[e]
+        square = 0.5 * (rough[i] + rough[j])
+        seen = known[i] + known[j]
+        if square > 0.0 and seen > 0.0:
+            noise = (of_noise[i] + of_noise[j]) / seen
+            shown = (total[i] + total[j]) / seen - noise * (1.0 + SURE * np.sqrt(2.0 / seen))
+            out[e] = min(max(shown, SMOOTH**2 * square), FREE**2 * square)
+    return out
+
+
+@compiled
+def eliminate(sums, to_a, to_b, off, bend, loose, variance):  # type: ignore[no-untyped-def]
     """Take what bending explains out of the gridlines' sums and votes, in place; (E, 6) what their bending is: by
     itself, and against a shift of the start and of the end towards the normal.
 
-    ``off`` (E,) is as ``votes`` gives it, 0 where levels do not change.
+    ``off`` (E,) is as ``votes`` gives it, 0 where levels do not change; ``loose`` as ``freedom`` does.
     """
     kept = np.zeros((sums.shape[0], 6))
     k = np.empty((2, 2))
     for e in range(sums.shape[0]):
+        sums[e, SEEN_A], sums[e, SEEN_B] = sums[e, AA], sums[e, BB]
         if sums[e, AA] == 0.0:
             continue
-        loose = 0.5 * FREE * FREE * (rough[edges[e, 0]] + rough[edges[e, 1]])
         c = sums[e, C] - off[e] * sums[e, SHARE_C]
         d = sums[e, D] - off[e] * sums[e, SHARE_D]
         k[0, 0], k[0, 1], k[1, 0], k[1, 1] = sums[e, AC], sums[e, AD], sums[e, BC], sums[e, BD]
         x, y = -bend[e, 0], -bend[e, 1]
-        if loose > 0.0:
-            stiff = variance / loose
+        if loose[e] > 0.0:
+            stiff = variance / loose[e]
             cc, cd, dd = sums[e, CC] + stiff, sums[e, CD], sums[e, DD] + stiff
             inverse = 1.0 / (cc * dd - cd * cd)
             pull_c, pull_d = c + stiff * x, d + stiff * y
@@ -136,12 +166,26 @@ def bent(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hidden_misfit(rough, edges, contrasts, sigma):  # type: ignore[no-untyped-def]
-    """(E,) the mean squared residual, one channel, that the gridlines' places off the fitted curve make."""
-    out = np.empty(edges.shape[0])
-    for e in range(edges.shape[0]):
+def hidden_misfit(loose, contrasts, sigma):  # type: ignore[no-untyped-def]
+    """(E,) the mean squared residual, one channel, that the gridlines' places off the fitted curve may make."""
+    out = np.empty(loose.shape[0])
+    for e in range(loose.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
-        off = HIDDEN**2 * 0.5 * (rough[edges[e, 0]] + rough[edges[e, 1]])
         # of the squared normal density, over BAND to both sides
-        out[e] = PARDON * off * strength / (3.0 * sigma * sigma) / (4.0 * BAND * np.sqrt(np.pi))
+        share = strength / (3.0 * sigma * sigma) / (4.0 * BAND * np.sqrt(np.pi))
+        out[e] = min(PARDON * HIDDEN**2 * loose[e], MAX_PARDON * sigma * sigma) * share
+    return out
+
+
+@compiled
+def hidden(loose, spokes):  # type: ignore[no-untyped-def]
+    """(M,) px^2, the variance per axis that no bending explains."""
+    out = np.zeros(spokes.shape[0])
+    for m in range(spokes.shape[0]):
+        known = 0
+        for e in spokes[m]:
+            if e >= 0:
+                out[m] += HIDDEN**2 * loose[e]
+                known += 1
+        out[m] /= max(known, 1)
     return out

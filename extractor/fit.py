@@ -38,8 +38,9 @@ class Refined:
 class Fit(NamedTuple):
     """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
     (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
-    ``rough`` (M,) px^2 is by what
-    gridlines may bend beyond that around each marker, and ``bend`` (E, 2) px by how much they do; ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
+    ``rough`` (M,) px^2 is how
+    rough they are around each, ``loose`` (E,) px^2 how freely gridlines bend there beyond the map, and ``bend`` (E, 2) px
+    by how much they do; ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
     step saw."""
 
     xy: NDArray[np.float64]
@@ -51,6 +52,7 @@ class Fit(NamedTuple):
     levels: Levels
     information: Information
     rough: NDArray[np.float64]
+    loose: NDArray[np.float64]
     bend: NDArray[np.float64]
     moved: float
     reading: Reading | None

@@ -94,7 +94,7 @@ def profile_blurs(image, lines, weights, room, every):  # type: ignore[no-untype
 
 @compiled
 def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-untyped-def]
-    """(E, 22) sums as ``read_gridlines`` gives them, from at most ``most`` stations a gridline.
+    """(E, 24) sums as ``read_gridlines`` gives them, from at most ``most`` stations a gridline.
 
     At each station the matched filter of a blurred step tells how far the gridline lies from where it is thought to
     be; it weighs as much as the station's length carries information.

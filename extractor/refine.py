@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bending import HIDDEN, bend_gridlines, bent, eliminate, hidden_misfit, roughness
+from .bending import bend_gridlines, bent, eliminate, freedom, hidden, hidden_misfit, roughness
 from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
@@ -32,6 +32,7 @@ from .stepping import (
     middles,
     moved,
     short_edge,
+    shown,
     trust,
     trusted_markers,
     votes,
@@ -110,7 +111,8 @@ class Refiner:
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
-        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, smooth, straight, 0.0, None)
+        stiff = np.zeros(len(mesh.edges))
+        fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, smooth, stiff, straight, 0.0, None)
         across = self._across(view, fit)
         fit = fit._replace(sigma=self._blur(view, fit, across))
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
@@ -167,7 +169,7 @@ class Refiner:
         lines = self._lines(fit)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
         to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
-        kept = eliminate(sums, to_a, to_b, off, fit.bend, fit.rough, mesh.edges, fit.noise**2)
+        fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
         use = (sums[:, AA] > 0).astype(np.float64)
         if judged:
             pardon = PARDON**2 * across.room[:, 3]
@@ -177,7 +179,7 @@ class Refiner:
         foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
-        return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
+        return self._moved(fit, sums, lines, shift, information), trusted_markers(use, mesh.spokes)
 
     def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
         """The blur that some of the gridlines show."""
@@ -202,8 +204,8 @@ class Refiner:
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, loose)
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        kept = eliminate(sums, to_a, to_b, off, fit.bend, fit.rough, mesh.edges, fit.noise**2)
-        use, noise = trust(sums, to_a, to_b, hidden_misfit(fit.rough, mesh.edges, contrasts, sigma), *JUDGED_BY_PIXELS)
+        fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
+        use, noise = trust(sums, to_a, to_b, hidden_misfit(fit.loose, contrasts, sigma), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
             np.clip(widening(sums, use, contrasts, now, sigma), -MAX_WIDEN * sigma, MAX_WIDEN * sigma)
@@ -214,7 +216,7 @@ class Refiner:
         foot = foot_of(contrasts, black, off)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
         fit = fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX), reading=reading)
-        return self._moved(fit, shift, information)
+        return self._moved(fit, sums, lines, shift, information)
 
     def _drawn(
         self, fit: Fit, lines: NDArray[np.float64], box: NDArray[np.int64], shape: tuple[int, ...]
@@ -227,9 +229,32 @@ class Refiner:
         draw_cells(fit.xy, *sides, levels.cell, levels.slope, fit.sigma, box, model)
         return model
 
-    def _moved(self, fit: Fit, shift: NDArray[np.float64], information: Information) -> Fit:
+    def _eliminated(
+        self,
+        fit: Fit,
+        sums: NDArray[np.float64],
+        to_a: NDArray[np.float64],
+        to_b: NDArray[np.float64],
+        off: NDArray[np.float64],
+    ) -> tuple[Fit, NDArray[np.float64]]:
+        """How freely gridlines bend, and what their bending is, taken out of their sums and votes."""
+        variance = fit.noise**2
+        use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
+        loose = freedom(sums, to_a, to_b, off, fit.bend, fit.rough, use, self._mesh.edges, variance)
+        return fit._replace(loose=loose), eliminate(sums, to_a, to_b, off, fit.bend, loose, variance)
+
+    def _moved(
+        self,
+        fit: Fit,
+        sums: NDArray[np.float64],
+        lines: NDArray[np.float64],
+        shift: NDArray[np.float64],
+        information: Information,
+    ) -> Fit:
         """The fit after a step."""
-        measured, guiding, steps = moved(fit.xy, shift, information.diagonal, fit.beyond)
+        assert fit.reading is not None
+        least = shown(sums, fit.reading.use, lines, self._mesh.edges, fit.noise**2, len(fit.xy))
+        measured, guiding, steps = moved(fit.xy, shift, information.diagonal, least, fit.beyond)
         xy, beyond, maps = self._completed(guiding)
         mesh = self._mesh
         rough = roughness(
@@ -312,7 +337,7 @@ class Refiner:
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
-        cov += HIDDEN**2 * fit.rough[:, None, None] * np.eye(2)
+        cov += hidden(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
         with np.errstate(invalid="ignore"):
             limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
             near = np.linalg.norm(xy - places.xy_px, axis=1) < limit

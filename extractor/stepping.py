@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled
-from .gridlines import LENGTH, UX, UY, X, Y
+from .gridlines import KNOWN, LENGTH, UX, UY, X, Y
 from .levels import monomials
-from .synthesis import AA, AB, BB, BLUR, BLUR_CURVATURE, MISFIT, PIXELS, SHARE_A, SHARE_B, A, B
+from .synthesis import AA, AB, BB, BLUR, BLUR_CURVATURE, MISFIT, PIXELS, SEEN_A, SEEN_B, SHARE_A, SHARE_B, A, B
 
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
-WEAK = 0.03  # of the usual information, below which a marker does not guide its neighbours' gridlines
+WEAK = 0.15  # of the usual information, below which a marker does not guide its neighbours' gridlines
 TRUSTED = 0.4  # of a gridline, for its places to be measured
 BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
@@ -130,21 +130,35 @@ def widening(sums, use, before, now, sigma):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def moved(xy, shift, diagonal, beyond):  # type: ignore[no-untyped-def]
-    """(M, 2) the markers after a step, the same with NaN where the image hardly shows them, and the largest step of
-    those that are not ``beyond`` in standard deviations with all other markers known."""
+def shown(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-def]
+    """(M,) 1/px^2, the least information about a marker in any direction, were its gridlines' bending known."""
+    xx, cross, yy = np.zeros(count), np.zeros(count), np.zeros(count)
+    for e in range(edges.shape[0]):
+        nx, ny, weight = -lines[e, UY], lines[e, UX], use[e] * lines[e, KNOWN] / variance
+        for side in range(2):
+            m, value = edges[e, side], weight * (sums[e, SEEN_A] if side == 0 else sums[e, SEEN_B])
+            xx[m] += value * nx * nx
+            cross[m] += value * nx * ny
+            yy[m] += value * ny * ny
+    return 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + cross**2)
+
+
+@compiled
+def moved(xy, shift, diagonal, least, beyond):  # type: ignore[no-untyped-def]
+    """(M, 2) the markers after a step, the same with NaN where the image hardly shows them (``least``, as ``shown``
+    gives it), and the largest step of those that are not ``beyond`` in standard deviations with all other markers
+    known."""
     count = xy.shape[0]
-    measured, guiding, least = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+    measured, guiding = np.empty((count, 2)), np.empty((count, 2))
     largest = 0.0
     for m in range(count):
         xx, cross, yy = diagonal[m]
-        least[m] = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + cross**2)
         dx, dy = shift[m]
         measured[m, 0], measured[m, 1] = xy[m, 0] + dx, xy[m, 1] + dy
         if not beyond[m]:
             largest = max(largest, dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy)
-    shown = least[least > 4 * PRIOR_BEYOND_PX**-2]
-    limit = WEAK * np.median(shown) if shown.shape[0] > 0 else np.inf
+    seen = least[least > 3 * PRIOR_BEYOND_PX**-2]
+    limit = WEAK * np.median(seen) if seen.shape[0] > 0 else np.inf
     for m in range(count):
         weak = least[m] < limit
         guiding[m, 0] = np.nan if weak else measured[m, 0]

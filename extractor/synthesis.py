@@ -24,7 +24,8 @@ CHUNK = 1024  # pixels that vote at once, at most
 # columns of what is read along a gridline: sums over its pixels
 AA, AB, BB, A, B, SHARE_A, SHARE_B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(11)
 AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
-SUMS = 22
+SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
+SUMS = 24
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -320,7 +321,7 @@ def _vote_bending(  # type: ignore[no-untyped-def]
 
 @compiled
 def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  # type: ignore[no-untyped-def]
-    """(E, 22) sums over the pixels near each gridline; the columns are named above.
+    """(E, 24) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
     residual (image - model - black, the last at the gridline's middle); SHARE: derivative times the share of a side,
