@@ -26,7 +26,7 @@ HIDDEN = 0.08
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
 OF_NOISE = 2 * 20 * 2.0
 PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
-MAX_PARDON = 0.25
+MAX_PARDON = 0.05
 SURE = 2.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
@@ -102,7 +102,7 @@ def freedom(sums, to_a, to_b, off, bend, rough, use, edges, variance):  # type: 
     out = np.zeros(edges.shape[0])
     for e in range(edges.shape[0]):
         i, j = edges[e]
-        square = 0.5 * (rough[i] + rough[j])
+        square = min(rough[i], rough[j])
         seen = known[i] + known[j]
         if square > 0.0 and seen > 0.0:
             noise = (of_noise[i] + of_noise[j]) / seen
