@@ -17,7 +17,26 @@ import numpy as np
 
 from .engine import compiled
 from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
-from .synthesis import AA, AB, AC, AD, BAND, BB, BC, BD, CC, CD, DD, MISFIT, SEEN_A, SEEN_B, SHARE_C, SHARE_D, C, D
+from .synthesis import (
+    AA,
+    AB,
+    AC,
+    AD,
+    BAND,
+    BB,
+    BC,
+    BD,
+    CC,
+    CD,
+    DD,
+    MISFIT,
+    SEEN_A,
+    SEEN_B,
+    SHARE_C,
+    SHARE_D,
+    C,
+    D,
+)
 
 # From the surfaces under balls that press, shear and twist: b and s over the differences around them (RMS) where these
 # are smooth, and at most; and what is left to move a gridline's ends, in deviations of b and s.
@@ -25,19 +44,43 @@ SMOOTH, FREE = 0.015, 0.25
 HIDDEN = 0.08
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
 OF_NOISE = 2 * 20 * 2.0
+OF_MEDIAN = 2.0  # a mean of squares against their median
 PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
-MAX_PARDON = 0.05
+MAX_PARDON = 0.1
 SURE = 2.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
 @compiled
-def roughness(xy, maps, diagonal, edges, ahead, third, near):  # type: ignore[no-untyped-def]
-    """(M,) px^2: how rough the markers are around each, from the mean square of the third differences along its
-    gridlines, less what their noise and the layout itself explain; the mean of the neighbours' where its own are not
-    known."""
-    count = xy.shape[0]
-    total, known = np.zeros(count), np.zeros(count)
+def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near):  # type: ignore[no-untyped-def]
+    """(M,) px^2: how rough the markers are around each, from the squared third differences along the gridlines at it
+    and at its neighbours, less what their noise and the layout itself explain.
+
+    Their median: one marker that dirt has moved does not make its gridlines free to follow it.
+    """
+    square = _third_differences(xy, maps, edges, ahead, third)
+    # what is hardly trusted where it bends must not be taken for noise
+    noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
+    out, seen = np.zeros(xy.shape[0]), np.empty(spokes.shape[1] * (1 + FIRST_RING))
+    for m in range(xy.shape[0]):
+        count = 0
+        for k in range(-1, FIRST_RING):
+            n = m if k < 0 else near[m, k]
+            if n < 0:
+                continue
+            for e in spokes[n]:
+                if e >= 0 and np.isfinite(square[e]):
+                    seen[count] = square[e]
+                    count += 1
+        if count > 0:
+            out[m] = max(OF_MEDIAN * np.median(seen[:count]) - noise, 0.0)
+    return out
+
+
+@compiled
+def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untyped-def]
+    """(E,) squared, px^2, of the four markers along each edge, less the layout's own; NaN where one is not known."""
+    out = np.full(edges.shape[0], np.nan)
     for e in range(edges.shape[0]):
         a, b = edges[e]
         p, q = ahead[e]
@@ -48,26 +91,8 @@ def roughness(xy, maps, diagonal, edges, ahead, third, near):  # type: ignore[no
         u, v = 0.5 * third[e, 0], 0.5 * third[e, 1]
         x -= u * (maps[a, 0, 0] + maps[b, 0, 0]) + v * (maps[a, 0, 1] + maps[b, 0, 1])
         y -= u * (maps[a, 1, 0] + maps[b, 1, 0]) + v * (maps[a, 1, 1] + maps[b, 1, 1])
-        square = x * x + y * y
-        if np.isfinite(square):
-            for m in (a, b):
-                total[m] += square
-                known[m] += 1.0
-    # what is hardly trusted where it bends must not be taken for noise
-    noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
-    for m in range(count):
-        if known[m] > 0.0:
-            total[m] = max(total[m] / known[m] - noise, 0.0)
-    for m in range(count):
-        if known[m] == 0.0:
-            seen = 0
-            for k in range(FIRST_RING):
-                n = near[m, k]
-                if n >= 0 and known[n] > 0.0:
-                    total[m] += total[n]
-                    seen += 1
-            total[m] /= max(seen, 1)
-    return total
+        out[e] = x * x + y * y
+    return out
 
 
 @compiled
@@ -178,14 +203,14 @@ def hidden_misfit(loose, contrasts, sigma):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hidden(loose, spokes):  # type: ignore[no-untyped-def]
-    """(M,) px^2, the variance per axis that no bending explains."""
+def around(loose, spokes):  # type: ignore[no-untyped-def]
+    """(M,) px^2, the mean of ``loose`` (E,) over the gridlines at each marker."""
     out = np.zeros(spokes.shape[0])
     for m in range(spokes.shape[0]):
         known = 0
         for e in spokes[m]:
             if e >= 0:
-                out[m] += HIDDEN**2 * loose[e]
+                out[m] += loose[e]
                 known += 1
         out[m] /= max(known, 1)
     return out

@@ -22,6 +22,7 @@ class Refined:
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
         explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
             after synthesis, its place is from profiles alone).
+        free_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
@@ -30,6 +31,7 @@ class Refined:
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     explained: NDArray[np.bool_]
+    free_px: NDArray[np.float64]
     blur_px: float
     noise: float
     points: NDArray[np.float64]

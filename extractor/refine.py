@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bending import bend_gridlines, bent, eliminate, freedom, hidden, hidden_misfit, roughness
+from .bending import HIDDEN, around, bend_gridlines, bent, eliminate, freedom, hidden_misfit, roughness
 from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
@@ -258,7 +258,7 @@ class Refiner:
         xy, beyond, maps = self._completed(guiding)
         mesh = self._mesh
         rough = roughness(
-            guiding, maps, information.diagonal, mesh.edges, mesh.ahead, mesh.third, mesh.near
+            guiding, maps, information.diagonal, mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near
         )
         fit = fit._replace(xy=xy, measured=measured, beyond=beyond, maps=maps, moved=float(steps))
         return fit._replace(information=information, rough=rough)
@@ -330,14 +330,16 @@ class Refiner:
         assert reading is not None
         points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual)
         points[..., :2], points[..., 2] = view.full(points[..., :2]), scale**2 * points[..., 2]
-        return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise, points)
+        free = scale * np.sqrt(around(fit.loose, self._mesh.spokes))
+        blur, noise = scale * fit.sigma, scale * fit.noise
+        return Refined(view.full(xy), scale**2 * cov, explained, free, blur, noise, points)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
-        cov += hidden(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
+        cov += HIDDEN**2 * around(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
         with np.errstate(invalid="ignore"):
             limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
             near = np.linalg.norm(xy - places.xy_px, axis=1) < limit

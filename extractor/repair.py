@@ -23,7 +23,7 @@ MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
-VAGUE = 0.02  # its standard deviation is larger than that
+VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
@@ -67,6 +67,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
+    _drop_slid(xy, cov, refined.free_px, places, lattice)
     measured, edge = xy.copy(), _filled(edge_px, lattice)
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
@@ -128,20 +129,38 @@ def _drop_outliers(
 
 
 def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
-    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them, or that
-    refinement took far from their triangles and is not sure of.
+    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
     outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
     place, variance, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
-    apart, moved, edge = xy - place, xy - places.xy_px, places.edge_px
+    apart, edge = xy - place, places.edge_px
     with np.errstate(invalid="ignore"):
         # the worse a quadratic fits the layers inside, the less it tells beyond them
         allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
         bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
+    xy[bad], cov[bad] = np.nan, np.nan
+
+
+def _drop_slid(
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    free_px: NDArray[np.float64],
+    places: Places,
+    lattice: Lattice,
+) -> None:
+    """Set to NaN the markers of the pattern's rim that refinement took far from their triangles and is not sure of.
+
+    Where two gridlines end that may bend, the corner between them slides along both.
+    """
+    around = lattice.neighbours[:, INNER]
+    rim = ~(lattice.present[around] & (around >= 0)).all(axis=1)
+    moved, edge = xy - places.xy_px, places.edge_px
+    with np.errstate(invalid="ignore"):
         vague = np.trace(cov, axis1=1, axis2=2) > (VAGUE * edge) ** 2
-        bad |= outer & vague & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
+        vague |= free_px > VAGUE * edge
+        bad = rim & vague & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
     xy[bad], cov[bad] = np.nan, np.nan
 
 

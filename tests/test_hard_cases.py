@@ -216,7 +216,9 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 
 
 def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
-    return Refined(xy_px, cov_px2, np.ones(len(xy_px), np.bool_), 1.0, 2.0, np.empty((0, 0, 3)))
+    return Refined(
+        xy_px, cov_px2, np.ones(len(xy_px), np.bool_), np.zeros(len(xy_px)), 1.0, 2.0, np.empty((0, 0, 3))
+    )
 
 
 @pytest.mark.parametrize("shift_px", [(0.0, 0.0), (-0.49, -0.49), (0.5, 0.5), (-1.0, 3.0), (7.3, -4.1)])
@@ -226,8 +228,8 @@ def test_markers_at_the_images_border(shift_px: tuple[float, float]) -> None:
     seen = render(replace(scene(), camera=Camera(20.0, centre_px=at)), size=(SIZE[0] // 2, SIZE[1] // 2))
     markers = extractor().extract(seen.image)
     found = sound(markers, seen)
-    limit = np.array([SIZE[0] // 2, SIZE[1] // 2]) - 1
-    assert ((markers.xy_px[found] >= 0) & (markers.xy_px[found] <= limit)).all()
+    limit = np.array([SIZE[0] // 2, SIZE[1] // 2]) - 0.5
+    assert ((markers.xy_px[found] >= -0.5) & (markers.xy_px[found] <= limit)).all()
     deep = ((seen.truth.marker_xy_px > 20) & (seen.truth.marker_xy_px < limit - 20)).all(axis=1)
     assert deep.sum() > 10 and found[deep].all()
 
