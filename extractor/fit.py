@@ -38,12 +38,22 @@ class Refined:
 
 
 class Fit(NamedTuple):
-    """The current estimate. ``xy`` is where the pattern is drawn: markers that the image hardly shows, or not at all
-    (``beyond``), lie where their neighbours' maps put them; ``measured`` are they as the last step left them;
-    ``rough`` (M,) px^2 is how
-    rough they are around each, ``loose`` (E,) px^2 how freely gridlines bend there beyond the map, and ``bend`` (E, 2) px
-    by how much they do; ``moved`` is by how many of its standard deviations the last step moved a marker at most; ``reading`` is what that
-    step saw."""
+    """The current estimate.
+
+    Attributes:
+        xy: (M, 2) where the pattern is drawn: markers that the image hardly shows, or not at all (``beyond``), lie
+            where their neighbours' maps put them.
+        measured: (M, 2), the same as the last step left them.
+        beyond: (M,) bool.
+        maps: (M, 2, 5), as ``local_maps`` gives them.
+        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks.
+        information: about the markers.
+        rough: (M,) px^2, how rough the markers are around each.
+        loose: (E,) px^2, how freely gridlines may bend beyond the map there.
+        bend: (E, 2) px, by how much they do.
+        moved: by how many of its standard deviations the last step moved a marker at most.
+        reading: what that step saw.
+    """
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]

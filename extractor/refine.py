@@ -146,7 +146,7 @@ class Refiner:
 
     def _lines(self, fit: Fit) -> NDArray[np.float64]:
         mesh = self._mesh
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        lines: NDArray[np.float64] = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         bend_gridlines(lines, fit.bend)
         return lines
 
@@ -183,7 +183,6 @@ class Refiner:
 
     def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
         """The blur that some of the gridlines show."""
-        mesh = self._mesh
         lines = self._lines(fit)
         every = max(1, len(lines) // BLUR_EDGES)
         blurs = profile_blurs(view.image, lines, across.weights, across.room, every)

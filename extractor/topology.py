@@ -77,7 +77,7 @@ def topology_of(layout: Reference) -> Topology:
         offset=offset,
         stencil=_stencil(near, offset),
         ahead=ahead,
-        third=np.where((ahead >= 0).all(axis=1)[:, None], third / length.mean(), 0.0),
+        third=np.where(np.all(ahead >= 0, axis=1)[:, None], third / length.mean(), 0.0),
     )
 
 
