@@ -51,7 +51,7 @@ def test_what_is_flat_or_noisy_is_not_rough(pattern: str) -> None:
     assert rough_at(xy, pattern).max() == 0.0
     noise = np.random.default_rng(0).normal(0, 0.01, xy.shape)
     noisy = rough_at(xy + noise, pattern)
-    assert (noisy > 0).mean() < 0.2 and FREE * np.sqrt(noisy.max()) < 0.01  # a hundredth of a pixel hides nothing
+    assert (noisy > 0).mean() < 0.2 and FREE * np.sqrt(noisy.max()) < 0.03
 
 
 def test_a_kink_is_rough_and_one_moved_marker_is_not() -> None:
