@@ -22,7 +22,7 @@ from .levels import Levels, black_at, cell_means, smooth_levels
 from .offsets import Reading, foot_of, measure
 from .placing import Places
 from .presets import STEPS, Preset
-from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
+from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .stepping import (
     MIN_NOISE,
@@ -45,7 +45,8 @@ MIN_EDGE_PX = 6.5  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
-BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
+BLIND_SIGMA_PX = 0.9  # where no gridline shows it
+BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
 # Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
 # profiles may lie apart, in units of the edges around the marker.
@@ -83,7 +84,7 @@ class Refiner:
         edge = short_edge(places.xy_px, self._mesh.edges)
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
-        scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
+        scale = self._scale(view.scale * fit.sigma, edge)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
@@ -96,8 +97,9 @@ class Refiner:
 
     def _begin(self, view: Sight, places: Places) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
-        mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
+        mesh = self._mesh
         xy, beyond, maps = self._completed(view.reduced(places.xy_px))
+        noise = max(estimate_noise(view.image, xy, mesh.cells), MIN_NOISE)
         usual = USUAL_SIGMA_PX / view.scale
         levels = smooth_levels(
             cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
@@ -109,22 +111,22 @@ class Refiner:
         )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, 0.0, None)
-        across = self._across(view, fit)
-        fit = fit._replace(sigma=self._blur(view, fit, across))
+        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+        across = self._across(view, fit, lines)
+        fit = fit._replace(sigma=self._blur(view, lines, across))
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
         return fit, across
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
-        sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
+        sharp = fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced
         if sharp:
             fit, trusted = self._profile_step(view, fit, across, steps.profiles[1], judged=True)
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted, places)
         start = fit
-        fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
             fit = self._synthesis_step(view, fit)
             if fit.moved < steps.enough:
@@ -140,10 +142,9 @@ class Refiner:
         xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
         return xy, beyond, maps
 
-    def _across(self, view: Sight, fit: Fit) -> Across:
+    def _across(self, view: Sight, fit: Fit, lines: NDArray[np.float64]) -> Across:
         """The colors beside the gridlines."""
         mesh, levels = self._mesh, fit.levels
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
         sides = mesh.cells, mesh.edge_cells, levels.cell
         contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
         return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
@@ -164,19 +165,16 @@ class Refiner:
             use, _ = trust(sums, sums[:, A], sums[:, B], pardon, *JUDGED_BY_SAMPLES)
         given = sums, sums[:, A], sums[:, B], use
         shift, information = self._solve(*given, lines, across.contrasts, False, fit)
-        foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
+        foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
         return self._moved(fit, shift, information), trusted_markers(use, mesh.spokes)
 
-    def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
-        """The blur that some of the gridlines show."""
-        mesh = self._mesh
-        lines = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
+    def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
+        """The blur that some of the gridlines show, px."""
         every = max(1, len(lines) // BLUR_EDGES)
-        blurs = profile_blurs(view.image, lines, across.weights, across.room, every)
-        seen = blurs[np.isfinite(blurs)]
-        return max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
+        sigma = profile_blur(view.image, lines, across.weights, across.room, every)
+        return max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else BLIND_SIGMA_PX
 
     def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
         image, frame = view.image, view.frame
@@ -317,11 +315,6 @@ def _doubt(
     doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
     cov[which] += doubt[which, None, None] * np.eye(2)
     xy[lost], cov[lost] = np.nan, np.nan
-
-
-def _sharpened(sigma: float) -> float:
-    """The blur without that which the profiles' bilinear samples added."""
-    return float(max(np.sqrt(max(sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
 
 
 def _in(view: Sight, places: Places) -> Places:
