@@ -14,10 +14,12 @@ from .displacement import Rest, rest_at
 from .errors import ImageError
 from .image import prepare
 from .pipeline import Extractor, Stages
+from .proof import examine
 from .reference import Reference
 from .sight import Sights
 from .types import Markers, Origin, Reason, Status
-from .warm import Tables, WarmStart, completed, examine, predict, prove, tables_of
+from .warm import WarmStart, predict, prove
+from .warm_tables import Tables, completed, tables_of
 
 MIN_KEPT = 0.97  # of the markers of the last cold start; below it, a cold start may find more
 COLD_EVERY = 200  # frames; a cold start at least this often
@@ -126,7 +128,7 @@ class Tracker:
             time_s: its time stamp.
         """
         started = time.perf_counter()
-        markers, status, start = self._nothing(), FrameStatus.UNREADABLE, None
+        markers, status, start = None, FrameStatus.UNREADABLE, None
         try:
             if image is None:
                 reason = reason or "no image"
@@ -139,6 +141,7 @@ class Tracker:
                 status = FrameStatus.LOST if markers.reason else FrameStatus.TRACKED
         except ImageError as error:
             reason = str(error)
+        markers = markers or self._extractor._nothing(Reason.NO_PATTERN, Stages())
         elapsed_ms = 1e3 * (time.perf_counter() - started)
         if status == FrameStatus.TRACKED and self.rest is None:
             self.rest = rest_at(markers.xy_px, self.layout, self._mm_per_px)
@@ -226,9 +229,6 @@ class Tracker:
         )
         self._count += 1
         return frame
-
-    def _nothing(self) -> Markers:
-        return self._extractor._nothing(Reason.NO_PATTERN, Stages())
 
     def _other_size(self, image: NDArray[Any]) -> str:
         height, width = np.shape(image)[:2]
