@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
 from .fit import Refined
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
 from .placing import Places
@@ -63,15 +64,13 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    outside = ~_inside(xy, size)
-    xy[outside], cov[outside] = np.nan, np.nan
-    edge_px = places.edge_px
+    _drop_outside(xy, cov, *size)
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
-    edge = _filled(edge_px, lattice)
+    edge = _filled(places.edge_px, lattice)
     measured = xy.copy()
     for place, variance, kind in (
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
@@ -88,6 +87,15 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
 def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Places within the image, NaN not."""
     return np.asarray((xy >= 0).all(axis=1) & (xy <= np.array(size) - 1).all(axis=1))
+
+
+@compiled
+def _drop_outside(xy, cov, width, height):  # type: ignore[no-untyped-def]
+    """Set to NaN what lies outside the image, in place."""
+    for m in range(xy.shape[0]):
+        x, y = xy[m]
+        if not (x >= 0 and y >= 0 and x <= width - 1 and y <= height - 1):
+            xy[m], cov[m] = np.nan, np.nan
 
 
 def _drop_outliers(
@@ -107,6 +115,8 @@ def _drop_outliers(
         known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
         doubtful = deviant(xy, MAX_DEVIATION * edge * believed, lattice.ring_weights, table)
+        if not doubtful.any():
+            break
         place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
         sigma = np.sqrt(variance * (1 + leverage))
         apart = xy - place
@@ -133,16 +143,28 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
-    outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
-    place, variance, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
-    apart, moved, edge = xy - place, xy - places.xy_px, places.edge_px
-    with np.errstate(invalid="ignore"):
-        # the worse a quadratic fits the layers inside, the less it tells beyond them
-        allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
-        bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
-        vague = np.trace(cov, axis1=1, axis2=2) > (VAGUE * edge) ** 2
-        bad |= outer & vague & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
-    xy[bad], cov[bad] = np.nan, np.nan
+    edge, inner = places.edge_px, lattice.inner
+    # only what may be too far is looked at closely
+    doubtful = deviant(xy, FRAYED[0] * edge, lattice.inner_weights, inner) & (inner[:, 0] >= 0)
+    if doubtful.any():
+        place, variance, _, support = predict(xy, doubtful, lattice.marker_mm, inner)
+        with np.errstate(invalid="ignore"):
+            # the worse a quadratic fits the layers inside, the less it tells beyond them
+            allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
+            apart = np.hypot(*(xy - place).T)
+            bad = (apart > allowed * edge) & (support >= MIN_QUADRATIC)
+        xy[bad], cov[bad] = np.nan, np.nan
+    _drop_vague(xy, cov, places.xy_px, edge, inner[:, 0] >= 0)
+
+
+@compiled
+def _drop_vague(xy, cov, start, edge, outer):  # type: ignore[no-untyped-def]
+    """Set to NaN the ``outer`` markers that lie far from their ``start`` and are not sure, in place."""
+    for m in range(xy.shape[0]):
+        if outer[m] and cov[m, 0, 0] + cov[m, 1, 1] > (VAGUE * edge[m]) ** 2:
+            dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+            if dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2:
+                xy[m], cov[m] = np.nan, np.nan
 
 
 def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
