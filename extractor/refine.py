@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
 from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
@@ -285,8 +286,7 @@ class Refiner:
         cov[left] = ((AGREED * places.edge_px[left]) ** 2)[:, None, None] * np.eye(2)
         scale, reading = view.scale, fit.reading
         assert reading is not None
-        points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual)
-        points[..., :2], points[..., 2] = view.full(points[..., :2]), scale**2 * points[..., 2]
+        points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual, scale)
         return Refined(view.full(xy), scale**2 * cov, explained, scale * fit.sigma, scale * fit.noise, points)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -294,14 +294,19 @@ class Refiner:
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
-        with np.errstate(invalid="ignore"):
-            limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
-            near = np.linalg.norm(xy - places.xy_px, axis=1) < limit
-            sure = np.einsum("mii->m", cov) < (MAX_SIGMA * places.edge_px) ** 2
-        lost = ~(near & sure)
-        xy[lost] = np.nan
-        cov[lost] = np.nan
+        _drop_unsure(xy, cov, places.xy_px, places.edge_px, places.whole)
         return xy, cov
+
+
+@compiled
+def _drop_unsure(xy, cov, start, edge, whole):  # type: ignore[no-untyped-def]
+    """Set to NaN what lies far from its ``start`` or is not sure, in place."""
+    for m in range(xy.shape[0]):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
+        spread = cov[m, 0, 0] + cov[m, 1, 1]
+        if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
+            xy[m], cov[m] = np.nan, np.nan
 
 
 def _doubt(
