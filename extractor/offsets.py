@@ -110,9 +110,9 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
                         rest -= u0 * shown[at] + u1 * shown[at + one] + u2 * shown[at + two]
                     else:
                         rest -= HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
-                    j = np.uint64(place)
-                    votes[j, 0] += g * rest
-                    votes[j, 1] += g * g
+                    at_place = np.uint64(place)
+                    votes[at_place, 0] += g * rest
+                    votes[at_place, 1] += g * g
                 at += stride
                 t += step
                 aside += sense * up

@@ -313,6 +313,8 @@ def _doubt(
     xy: NDArray[np.float64], cov: NDArray[np.float64], which: NDArray[np.bool_], places: Places
 ) -> None:
     """Put markers on which something lies between what profiles and triangles say, in place; NaN where these differ."""
+    if not which.any():
+        return
     apart = np.linalg.norm(xy - places.xy_px, axis=1)
     with np.errstate(invalid="ignore"):
         lost = which & ~(apart < MAX_APART * places.edge_px)

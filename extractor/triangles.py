@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .regions import Regions
-from .sampling import clamp, sample_dot, sample_patch
+from .sampling import clamp, sample_inside, sample_patch
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
 # radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
@@ -121,18 +121,24 @@ def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # 
     u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
     zero = u0 * beyond[0] + u1 * beyond[1] + u2 * beyond[2]
     step = share / HALF_PROFILE
-    sx, sy = step * ux, step * uy
+    x0, y0 = a[0] + FIRST * dx, a[1] + FIRST * dy
+    x1, y1 = b[0] - FIRST * dx, b[1] - FIRST * dy
+    wide, high = share * abs(ux), share * abs(uy)
+    if not (
+        min(x0, x1) >= wide
+        and min(y0, y1) >= high
+        and max(x0, x1) + wide < width - 1.0
+        and max(y0, y1) + high < height - 1.0
+    ):
+        return False  # a profile leaves the image
     first, second = 0.0, 0.0
     for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
-        x, y = a[0] + FIRST * dx + m * sx, a[1] + FIRST * dy + m * sy
-        f = sample_dot(flat, height, width, x, y, u0, u1, u2) - zero
-        x, y = x + (1.0 - 2 * FIRST) * dx, y + (1.0 - 2 * FIRST) * dy
-        g = sample_dot(flat, height, width, x, y, u0, u1, u2) - zero
+        sx, sy = m * step * ux, m * step * uy
         weight = 0.5 if abs(m) == HALF_PROFILE else 1.0
+        f = sample_inside(flat, width, x0 + sx, y0 + sy, u0, u1, u2) - zero
         first += weight * clamp(f, -0.2, 1.2)
-        second += weight * clamp(g, -0.2, 1.2)
-    if not np.isfinite(first + second):  # a profile that leaves the image is NaN
-        return False
+        f = sample_inside(flat, width, x1 + sx, y1 + sy, u0, u1, u2) - zero
+        second += weight * clamp(f, -0.2, 1.2)
     first, second = depth * (first * step - share), depth * (second * step - share)
     slope = (second - first) / (1.0 - 2 * FIRST)
     off_a, off_b = first - FIRST * slope, second + FIRST * slope

@@ -125,18 +125,19 @@ def _shifts(image, xy, corners, ink, nearest, look, window):  # type: ignore[no-
         zero = dot(row, look[1, i])
         total, sx, sy = 0.0, 0.0, 0.0
         bx, by, dx, dy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+        x0, y0 = a[0] + 0.5, a[1] + 0.5
         for k in range(window.shape[0]):
-            x = int(np.floor(a[0] + window[k, 1] * bx + window[k, 2] * dx + 0.5))
-            y = int(np.floor(a[1] + window[k, 1] * by + window[k, 2] * dy + 0.5))
-            if x < 0 or y < 0 or x >= width or y >= height:
+            x = x0 + window[k, 1] * bx + window[k, 2] * dx
+            y = y0 + window[k, 1] * by + window[k, 2] * dy
+            if not (x >= 0.0 and y >= 0.0 and x < width and y < height):
                 continue
-            at = np.uint64((y * width + x) * 3)
+            column, line = int(x), int(y)
+            at = np.uint64((line * width + column) * 3)
             f = row[0] * flat[at] + row[1] * flat[at + one] + row[2] * flat[at + two] - zero
-            if f > 0.2:
-                f = min(f, 1.0)
-                total += f
-                sx += f * x
-                sy += f * y
+            f = min(f, 1.0) * (f > 0.2)
+            total += f
+            sx += f * column
+            sy += f * line
         if total > MIN_INK * CELL_SHARE * window.shape[0]:
             shift[i, 0] = sx / total - (a[0] + b[0] + c[0]) / 3
             shift[i, 1] = sy / total - (a[1] + b[1] + c[1]) / 3
