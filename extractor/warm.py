@@ -16,16 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import dot
-from .engine import compiled
+from .engine import compiled, vectorized
 from .placing import Places, agreement
 from .proof import RIGHT, UNSEEN, examine
 from .sampling import sample_patch
+from .sight import Sight
 from .warm_tables import Tables
 
 MIN_SHARE = 0.95  # of the cells in view that must agree with the image
 MIN_PREDICTED = 0.8  # of the cells in view whose middles must still show their ink before anything is fitted
 MIN_MIDDLE = 0.3  # of its ink a frame ago that a middle must show for that
 WINDOW = 0.9  # of an edge, the radius around a cell's middle in which its ink is looked for
+MIN_SHOWN = 0.2  # of an ink, for a pixel to count as it
 MIN_INK = 0.4  # of a cell's area that must be found there
 MAX_SHIFT = 0.35  # of an edge, how far a cell may lie from where it was predicted
 LARGE_SHIFT = 0.2  # of an edge; after larger ones the window is moved and the ink looked for again
@@ -34,23 +36,7 @@ MIN_WHITE = 2  # of the three edges of a cell that must see it white, for it to 
 MIN_VOLUME = (
     0.05  # sine of an ink's direction to the plane of the two others, below which it cannot be unmixed
 )
-CELL_SHARE = (3**0.5 / 4) / (np.pi * WINDOW**2)  # of the window's area, a cell's
-
-
-def _window(count: int = 89) -> NDArray[np.float64]:
-    """(K, 3) weights of a cell's corners that spread points evenly, in no rows, over the window around its middle.
-
-    A sunflower's seeds in an equilateral cell: rows would meet an edge all at once.
-    """
-    k = np.arange(count) + 0.5
-    radius, angle = WINDOW * np.sqrt(k / count), np.pi * (3 - 5**0.5) * k
-    x, y = radius * np.cos(angle), radius * np.sin(angle)
-    r = y / 0.75**0.5
-    q = x - r / 2
-    return np.column_stack([1 / 3 - q - r, 1 / 3 + q, 1 / 3 + r])
-
-
-WINDOW_WEIGHTS = _window()
+CELL_SHARE = 3**0.5 / 4  # of a square on its edge, an equilateral cell's area
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,41 +93,58 @@ def _unmixed(own, first, second, row):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _shifts(image, xy, corners, ink, nearest, look, window):  # type: ignore[no-untyped-def]
+def _shifts(image, xy, corners, ink, nearest, look):  # type: ignore[no-untyped-def]
     """(C, 2) from each cell's predicted middle to the middle of its ink nearby, NaN where there is too little.
 
     The ink is unmixed from the two others, whose cells touch this one's corners, and from white, which shows all three.
+    The window is what a disc in an equilateral cell becomes as the cell is sheared to its corners.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     shift = np.full((corners.shape[0], 2), np.nan)
-    row, one, two = np.zeros(3), np.uint64(1), np.uint64(2)
+    row, sums = np.zeros(3), np.zeros(3)
     for i in range(corners.shape[0]):
         a, b, c = xy[corners[i, 0]], xy[corners[i, 1]], xy[corners[i, 2]]
-        own = look[0, i]
         first = look[0, nearest[i, (ink[i] + 0) % 3]]
         second = look[0, nearest[i, (ink[i] + 1) % 3]]
-        if not _unmixed(own, first, second, row):
+        if not _unmixed(look[0, i], first, second, row):
             continue
         zero = dot(row, look[1, i])
-        total, sx, sy = 0.0, 0.0, 0.0
-        bx, by, dx, dy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-        x0, y0 = a[0] + 0.5, a[1] + 0.5
-        for k in range(window.shape[0]):
-            x = x0 + window[k, 1] * bx + window[k, 2] * dx
-            y = y0 + window[k, 1] * by + window[k, 2] * dy
-            if not (x >= 0.0 and y >= 0.0 and x < width and y < height):
-                continue
-            column, line = int(x), int(y)
-            at = np.uint64((line * width + column) * 3)
-            f = row[0] * flat[at] + row[1] * flat[at + one] + row[2] * flat[at + two] - zero
-            f = min(f, 1.0) * (f > 0.2)
-            total += f
-            sx += f * column
-            sy += f * line
-        if total > MIN_INK * CELL_SHARE * window.shape[0]:
-            shift[i, 0] = sx / total - (a[0] + b[0] + c[0]) / 3
-            shift[i, 1] = sy / total - (a[1] + b[1] + c[1]) / 3
+        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
+        # axes of the ellipse: a unit along and across the edge a-b of the equilateral cell
+        ux, uy = b[0] - a[0], b[1] - a[1]
+        vx, vy = (c[0] - a[0] - 0.5 * ux) / 0.75**0.5, (c[1] - a[1] - 0.5 * uy) / 0.75**0.5
+        area = ux * vy - uy * vx
+        if not abs(area) > 1.0:
+            continue
+        high, lean = uy * uy + vy * vy, ux * uy + vx * vy
+        top = WINDOW * np.sqrt(high)
+        sums[:] = 0.0
+        for y in range(max(int(np.ceil(cy - top)), 0), min(int(np.floor(cy + top)), height - 1) + 1):
+            off = (y - cy) / high
+            half = abs(area) * np.sqrt(max(WINDOW * WINDOW / high - off * off, 0.0))
+            start = max(int(np.ceil(cx + lean * off - half)), 0)
+            end = min(int(np.floor(cx + lean * off + half)), width - 1)
+            if start <= end:
+                line = flat[3 * (y * width + start) : 3 * (y * width + end + 1)]
+                _add_ink(line, start - cx, y - cy, row[0], row[1], row[2], zero, sums)
+        if sums[0] > MIN_INK * CELL_SHARE * abs(area):
+            shift[i, 0], shift[i, 1] = sums[1] / sums[0], sums[2] / sums[0]
     return shift
+
+
+@vectorized
+def _add_ink(line, x, y, red, green, blue, zero, sums):  # type: ignore[no-untyped-def]
+    """Add the ink of a row of pixels, the first at (x, y), and its moments."""
+    total, moment = 0.0, 0.0
+    for k in range(np.uint64(line.shape[0] // 3)):
+        at = np.uint64(3) * k
+        f = red * line[at] + green * line[at + np.uint64(1)] + blue * line[at + np.uint64(2)] - zero
+        f = min(f, 1.0) * (f > MIN_SHOWN)
+        total += f
+        moment += f * k
+    sums[0] += total
+    sums[1] += moment + total * x
+    sums[2] += total * y
 
 
 @compiled
@@ -242,7 +245,7 @@ def predict(
 
 
 def prove(
-    image: NDArray[np.uint8],
+    view: Sight,
     predicted_px: NDArray[np.float64],
     known: NDArray[np.bool_],
     tables: Tables,
@@ -251,13 +254,13 @@ def prove(
     """Move the predicted cells onto the image; None unless enough of them are proved to be what they should.
 
     Args:
-        image: (H, W, 3) uint8 BGR.
-        predicted_px: (M, 2), NaN where nothing is predicted.
+        view: the image at the scale at which it is looked at.
+        predicted_px: (M, 2) in the view, NaN where nothing is predicted.
         known: (M,) markers that the frame before had; cells of these in view are what must be found again.
         look: (2, C, 3) each cell's ink minus black and black in the frame before.
     """
-    xy, edge_px = _aligned(image, predicted_px, tables, look)
-    proof = examine(image, xy[tables.corners], tables, look)
+    xy, edge_px = _aligned(view.image, predicted_px, tables, look)
+    proof = examine(view.image, xy[tables.corners], tables, look)
     by_rim = proof.white == 0
     if proof.other_white >= MIN_WHITE:
         return None
@@ -272,7 +275,8 @@ def prove(
         return None
     kept, there, meeting = _kept(xy, proved, tables.corners)
     now = np.where(proved[:, None], proof.look, look)
-    return WarmStart(Places(kept, edge_px, tables.corners[proved], *agreement(there, meeting)), now, by_rim)
+    size = view.full(kept), edge_px * view.scale
+    return WarmStart(Places(*size, tables.corners[proved], *agreement(there, meeting)), now, by_rim)
 
 
 def _aligned(
@@ -280,7 +284,7 @@ def _aligned(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The markers (M, 2) where their cells' inks are, and the edges (M,) around them."""
     for _ in range(2):
-        shift = _shifts(image, predicted_px, tables.corners, tables.ink, tables.nearest, look, WINDOW_WEIGHTS)
+        shift = _shifts(image, predicted_px, tables.corners, tables.ink, tables.nearest, look)
         predicted_px, largest, edge_px = _moved(predicted_px, shift, tables.corners)
         if largest < LARGE_SHIFT:
             break
