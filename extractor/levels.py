@@ -68,8 +68,10 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
             continue
         area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-        around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
-        around += np.hypot(a[0] - c[0], a[1] - c[1])
+        around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) + np.sqrt(
+            (c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2
+        )
+        around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
         inscribed = area / max(around, 1e-9)
         radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
         count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
