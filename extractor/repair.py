@@ -22,7 +22,7 @@ from .types import Status
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
+FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
@@ -64,13 +64,15 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    _drop_outside(xy, cov, *size)
+    outside = ~_inside(xy, size)
+    xy[outside], cov[outside] = np.nan, np.nan
+    edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
     status = np.where(np.isfinite(xy[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
     if status[lattice.present].all():
         return Repaired(xy, cov, status)
-    edge = _filled(places.edge_px, lattice)
+    edge = _filled(edge_px, lattice)
     measured = xy.copy()
     for place, variance, kind in (
         (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
@@ -87,15 +89,6 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
 def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Places within the image, NaN not."""
     return np.asarray((xy >= 0).all(axis=1) & (xy <= np.array(size) - 1).all(axis=1))
-
-
-@compiled
-def _drop_outside(xy, cov, width, height):  # type: ignore[no-untyped-def]
-    """Set to NaN what lies outside the image, in place."""
-    for m in range(xy.shape[0]):
-        x, y = xy[m]
-        if not (x >= 0 and y >= 0 and x <= width - 1 and y <= height - 1):
-            xy[m], cov[m] = np.nan, np.nan
 
 
 def _drop_outliers(
