@@ -30,7 +30,7 @@ def sample_inside(flat, width, x, y, red, green, blue):  # type: ignore[no-untyp
     weighted and summed. Whole numbers are faster: places count in 1/256 px.
     """
     ix, iy = int(x), int(y)
-    fx, fy = int((x - ix) * STEPS + 0.5), int((y - iy) * STEPS + 0.5)
+    fx, fy = np.int64((x - ix) * STEPS + 0.5), np.int64((y - iy) * STEPS + 0.5)
     a = np.uint64((iy * width + ix) * 3)
     b = np.uint64(a + np.uint64(width * 3))
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
@@ -65,7 +65,7 @@ def sample_patch(flat, height, width, x, y, radius, out):  # type: ignore[no-unt
             min(y + radius * HEXAGON[k, 1], height - SHORT),
         )
         ix, iy = int(px), int(py)
-        fx, fy = int((px - ix) * STEPS + 0.5), int((py - iy) * STEPS + 0.5)
+        fx, fy = np.int64((px - ix) * STEPS + 0.5), np.int64((py - iy) * STEPS + 0.5)
         a = np.uint64((iy * width + ix) * 3)
         b = np.uint64(a + np.uint64(width * 3))
         both = fx * fy
