@@ -12,7 +12,7 @@ from .engine import compiled
 from .errors import ImageError
 
 MIN_SIDE_PX = 16
-NOISE_PLACES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
+NOISE_PLACES = 300  # that the noise is estimated from; with fewer cells, several are taken in each
 BESIDE = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
@@ -58,7 +58,7 @@ def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
     NaN where no cell is seen.
     """
     counts, total = np.zeros(8 * 255 + 1, np.int64), 0
-    around = min(1 + NOISE_PLACES // max(cells.shape[0], 1), len(BESIDE))
+    around = min(max(NOISE_PLACES // max(cells.shape[0], 1), 1), len(BESIDE))
     for i in range(cells.shape[0]):
         a, b, c = cells[i]
         cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3

@@ -147,26 +147,14 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
     one, two = np.uint64(1), np.uint64(2)
     alongs, asides = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.float32)
     seen = np.empty(CHUNK, np.float32)
-    inverse = 1.0 / sigma
+    inverse, small_weights = 1.0 / sigma, weights.astype(np.float32)
     for e in range(lines.shape[0]):
         strength = room[e, 3]
         if strength == 0.0:
             continue
-        u0, u1, u2, zero = (
-            np.float32(weights[e, 0]),
-            np.float32(weights[e, 1]),
-            np.float32(weights[e, 2]),
-            np.float32(weights[e, 3]),
-        )
-        x0, y0, ux, uy, length, leave, arrive = (
-            lines[e, X],
-            lines[e, Y],
-            lines[e, UX],
-            lines[e, UY],
-            lines[e, LENGTH],
-            lines[e, LEAVE],
-            lines[e, ARRIVE],
-        )
+        u0, u1, u2, zero = small_weights[e]
+        x0, y0, ux, uy, length = lines[e, X], lines[e, Y], lines[e, UX], lines[e, UY], lines[e, LENGTH]
+        leave, arrive = lines[e, LEAVE], lines[e, ARRIVE]
         # the sharper a corner, the longer the gridline runs close to its neighbour
         start = min(max(CLEAR_SIGMA * sigma / (length * room[e, 1]), 0.1), 0.4)
         end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * room[e, 2]), 0.1), 0.4)
@@ -194,30 +182,16 @@ def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-
             along = (p - p0) * up + (low - q0) * uq
             aside = sense * ((low - q0) * up - (p - p0) * uq)
             for _ in range(high - low + 1):
-                seen[filled] = (
-                    u0 * np.float32(flat[at])
-                    + u1 * np.float32(flat[at + one])
-                    + u2 * np.float32(flat[at + two])
-                    - zero
-                )
+                seen[filled] = u0 * flat[at] + u1 * flat[at + one] + u2 * flat[at + two] - zero
                 alongs[filled], asides[filled] = along, aside
                 filled += 1
                 at += stride
                 along += uq
                 aside += sense * up
         sums = out[e]
-        _vote(
-            alongs,
-            asides,
-            seen,
-            filled,
-            np.float32(inverse),
-            np.float32(1.0 / length),
-            np.float32(length),
-            np.float32(leave),
-            np.float32(arrive),
-            sums,
-        )
+        small = np.float32(inverse), np.float32(1.0 / length)
+        shape = np.float32(length), np.float32(leave), np.float32(arrive)
+        _vote(alongs, asides, seen, filled, *small, *shape, sums)
         # a gridline that would have to move too far is none
         votes, weight = sums[A] + sums[B], sums[AA] + 2 * sums[AB] + sums[BB]
         if not abs(votes) * sigma < max(1.0, 0.15 * length) * weight:
