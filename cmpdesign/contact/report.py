@@ -58,7 +58,10 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
     step, thickness = problem.grid.step_mm, problem.elastomer.thickness_mm
     if not state.in_contact.any():
         if state.motion.press_mm > 0:
-            yield "the object touches nothing in the solved area; move centre_mm or take a larger size_mm"
+            yield (
+                "the object touches nothing in the solved area; move centre_mm, take a larger size_mm or a finer grid, "
+                "or press more"
+            )
         return
     if strain > LINEAR_UP_TO:
         yield (
