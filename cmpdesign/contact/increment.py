@@ -29,9 +29,10 @@ Mask = NDArray[np.bool_]
 Box = tuple[slice, slice]
 # The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
 TOLERANCE = 1e-4
-# With friction, whose limits have to be found as well, three tenths; and where the height is looked up again after.
+# With friction, whose limits have to be found as well, three tenths; more where that is but a start, or where the height
+# is looked up again after.
 TOLERANCE_RUBBING = 3e-4
-TOLERANCE_BEFORE = 3e-3
+TOLERANCE_BEFORE, TOLERANCE_START = 3e-3, 1e-2
 # The change of friction's limits, as a share of them, over the tolerance.
 STEADY = 1.7
 # Cells around what is near enough to touch.
@@ -184,7 +185,8 @@ def _pressed(
         target[None],
         Pressure(touchable[None]),
         start[None],
-        tolerance_mm=(TOLERANCE_BEFORE if problem.friction > 0 else TOLERANCE) * motion.press_mm,
+        tolerance_mm=(TOLERANCE_START if problem.friction > 0 else TOLERANCE) * motion.press_mm,
+        checked=problem.friction == 0,
     )
     found = np.zeros_like(traction)
     found[inside] = held
@@ -212,6 +214,7 @@ def _rubbed(
         traction[inside],
         tolerance_mm=tolerance * motion.press_mm,
         steady=STEADY * tolerance,
+        checked=tolerance <= TOLERANCE_RUBBING,
     )
     found = np.zeros_like(traction)
     found[inside] = t.traction_mpa
