@@ -29,8 +29,8 @@ Mask = NDArray[np.bool_]
 Box = tuple[slice, slice]
 # The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
 TOLERANCE = 1e-4
-# With friction, whose limits have to be found as well, three tenths; more where that is but a start, or where the height
-# is looked up again after.
+# With friction, whose limits have to be found as well, three tenths; more where that is but a start, or where the
+# height is looked up again after.
 TOLERANCE_RUBBING = 3e-4
 TOLERANCE_BEFORE, TOLERANCE_START = 3e-3, 1e-2
 # The change of friction's limits, as a share of them, over the tolerance.
