@@ -114,6 +114,14 @@ def test_solids_that_were_moved_or_mirrored_are_read_back(change: str) -> None:
     assert centre(again) == pytest.approx(centre(solid), abs=1e-7)
 
 
+@pytest.mark.parametrize("change", ["as it is", "mirrored"])
+def test_faces_know_which_side_of_their_surface_is_outside(change: str) -> None:
+    """A file's spheres and cones have their normal outward: that is the ball's outside and the bore's inside."""
+    file = entities(solid_to_step(Solid("ball", "#808080", ball_with(change))))
+    senses = {file[refers(rest)[-1]][0]: rest[-3:] for rest in of_kind(file, "ADVANCED_FACE").values()}
+    assert senses == {"SPHERICAL_SURFACE": ".T.", "CONICAL_SURFACE": ".F."}
+
+
 def test_what_cannot_be_written_is_refused() -> None:
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere, BRepPrimAPI_MakeTorus
