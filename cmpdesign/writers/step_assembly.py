@@ -1,6 +1,6 @@
 """STEP AP242 assemblies of parts' files: every part's entities are taken over as they were written, renumbered.
 
-Nothing is translated again, so an assembly costs a copy of its parts' text.
+Nothing is built again, so an assembly costs a copy of its parts' text.
 """
 
 from __future__ import annotations
