@@ -110,7 +110,7 @@ def _slopes(corners: Floats) -> Floats:
 
 
 def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats, slopes: Floats) -> NDArray[np.bool_]:
-    """Pixels where depth or shade jumps to the right or lower neighbour, by more than a face's own slope."""
+    """Pixels where depth or shade jumps to the right or lower neighbour, by more than the face goes on by."""
     shade = np.where(number >= 0, shades[number], 2.0)
     far = np.where(np.isfinite(depth), depth, -1e6)
     step = DEPTH_STEP * depth.shape[0]
@@ -119,7 +119,7 @@ def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats, slopes: 
         slope = np.where(number >= 0, slopes[number, axis], 0.0)
         index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
         after = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
-        jump = np.abs(np.diff(far, axis=axis)) > step + np.maximum(slope[index], slope[after])
+        jump = np.abs(np.diff(far, axis=axis)) > step + np.minimum(slope[index], slope[after])
         jump |= np.abs(np.diff(shade, axis=axis)) > SHADE_STEP
         lines[index] |= jump
     return lines
