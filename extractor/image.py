@@ -12,7 +12,7 @@ from .engine import compiled
 from .errors import ImageError
 
 MIN_SIDE_PX = 16
-NOISE_PLACES = 300  # that the noise is estimated from; with fewer cells, several are taken in each
+NOISE_PLACES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
 BESIDE = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
