@@ -81,40 +81,81 @@ def _survey(hsv, chroma, step):  # type: ignore[no-untyped-def]
 
 @compiled
 def _tile_levels(hsv, chroma, ink_of_hue, tile, step):  # type: ignore[no-untyped-def]
-    """(3, rows, columns) the largest chroma of each ink in every tile."""
+    """(3, rows, columns) the largest chroma of each ink in every tile; 0 where it is below ``MIN_CHROMA``."""
     rows = (hsv.shape[0] + tile - 1) // tile
     columns = (hsv.shape[1] + tile - 1) // tile
     level = np.zeros((3, rows, columns), np.float32)
-    for y in range(0, hsv.shape[0], step):
+    strongest = np.zeros((columns, 4), np.uint8)
+    for row in range(rows):
+        strongest[:] = 0
+        for y in range(row * tile, min((row + 1) * tile, hsv.shape[0]), step):
+            line, colors = chroma[y], hsv[y]
+            for column in range(columns):
+                largest = strongest[column]
+                for x in range(column * tile, min((column + 1) * tile, hsv.shape[1]), step):
+                    ink = ink_of_hue[colors[x, 0]]
+                    largest[ink] = max(largest[ink], line[x])
         for column in range(columns):
-            strongest = np.zeros(4, np.uint8)
-            for x in range(column * tile, min((column + 1) * tile, hsv.shape[1]), step):
-                if chroma[y, x] >= MIN_CHROMA:
-                    ink = ink_of_hue[hsv[y, x, 0]]
-                    strongest[ink] = max(strongest[ink], chroma[y, x])
             for ink in range(3):
-                level[ink, y // tile, column] = max(
-                    level[ink, y // tile, column], np.float32(strongest[ink + 1])
-                )
+                if strongest[column, ink + 1] >= MIN_CHROMA:
+                    level[ink, row, column] = strongest[column, ink + 1]
     return level
+
+
+@compiled
+def _thresholds(level):  # type: ignore[no-untyped-def]
+    """(3, rows, columns) uint8: the chroma that shows an ink in each tile; (3,) the upper quartile of its levels.
+
+    A tile's level is the mean, over it and its neighbours, of the largest level among each one's neighbours.
+    """
+    _, rows, columns = level.shape
+    threshold, typical = np.empty(level.shape, np.uint8), np.zeros(3)
+    wide = np.empty((rows, columns), np.float32)
+    for ink in range(3):
+        seen = np.sort(level[ink].ravel()[level[ink].ravel() > 0.0])
+        if seen.shape[0] > 0:
+            typical[ink] = seen[3 * seen.shape[0] // 4]
+        for row in range(rows):
+            for column in range(columns):
+                largest = np.float32(0.0)
+                for y in range(max(row - 1, 0), min(row + 2, rows)):
+                    for x in range(max(column - 1, 0), min(column + 2, columns)):
+                        largest = max(largest, level[ink, y, x])
+                wide[row, column] = largest
+        for row in range(rows):
+            for column in range(columns):
+                total, count = 0.0, 0
+                for y in range(max(row - 1, 0), min(row + 2, rows)):
+                    for x in range(max(column - 1, 0), min(column + 2, columns)):
+                        total += wide[y, x]
+                        count += 1
+                local = LEVEL_SHARE * max(total / count, 0.15 * typical[ink])
+                threshold[ink, row, column] = np.uint8(min(max(local, MIN_CHROMA), 255))
+    return threshold, typical
 
 
 @compiled
 def _label(hsv, chroma, ink_of_hue, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
     """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
     height, width = chroma.shape
+    columns = threshold.shape[2]
     label = np.zeros((height, width), np.uint8)
+    # what a hue must exceed in each tile of a row of tiles; without an ink it cannot
+    limit = np.empty((columns, HUES), np.uint8)
     for y in range(height):
+        if y % tile == 0:
+            for column in range(columns):
+                for hue in range(HUES):
+                    ink = ink_of_hue[hue]
+                    limit[column, hue] = threshold[ink - 1, y // tile, column] if ink > 0 else 255
         row, colors, out = chroma[y], hsv[y], label[y]
         for start in range(0, width, shrink):
             if target[y // shrink, start // shrink] == 0:
                 continue
-            limit = threshold[:, y // tile, start // tile]
+            least = limit[start // tile]
             for x in range(start, min(start + shrink, width)):
-                if row[x] >= MIN_CHROMA:
-                    ink = ink_of_hue[colors[x, 0]]
-                    if ink > 0 and row[x] > limit[ink - 1]:
-                        out[x] = ink
+                hue = colors[x, 0]
+                out[x] = ink_of_hue[hue] * (row[x] > least[hue])
     return label
 
 
@@ -128,10 +169,10 @@ def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
     for row in range(rows):
         strongest[:] = 0
         for y in range(row * shrink, min((row + 1) * shrink, height)):
-            for x in range(width):
-                strongest[x] = max(strongest[x], chroma[y, x])
-        for x in range(width):
-            largest[row, x // shrink] = max(largest[row, x // shrink], strongest[x])
+            np.maximum(strongest, chroma[y], strongest)
+        for column in range(columns):
+            for x in range(column * shrink, min((column + 1) * shrink, width)):
+                largest[row, column] = max(largest[row, column], strongest[x])
     return largest
 
 
@@ -161,7 +202,8 @@ def find_target(colors: Colors) -> Target:
     pattern's rim while its black cells stay dry.
     """
     chroma = _tile_chroma(colors.chroma, SHRINK)
-    strong = np.sort(chroma, axis=None)[int(0.95 * (chroma.size - 1))]
+    strong_at = int(0.95 * (chroma.size - 1))
+    strong = np.partition(chroma, strong_at, axis=None)[strong_at]
     threshold = max(MIN_CHROMA, 0.15 * float(strong))
     dry = cv2.morphologyEx((chroma > threshold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     water = cv2.copyMakeBorder(dry, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
@@ -176,9 +218,12 @@ def _centers(weight, nominal_deg):  # type: ignore[no-untyped-def]
     for _ in range(ROUNDS):
         total, moment = np.zeros(3), np.zeros(3)
         for hue in range(HUES):
+            if weight[hue] == 0.0:
+                continue
             best, nearest = 360.0, 0
             for ink in range(3):
-                away = (hue * OPENCV_HUE_DEG - nominal_deg[ink] - shift[ink] + 180.0) % 360.0 - 180.0
+                away = hue * OPENCV_HUE_DEG - nominal_deg[ink] - shift[ink]
+                away -= 360.0 * np.floor(away / 360.0 + 0.5)
                 if abs(away) < abs(best):
                     best, nearest = away, ink
             if abs(best) < HUE_WIDTH_DEG:
@@ -197,16 +242,18 @@ def _hue_weights(histogram):  # type: ignore[no-untyped-def]
     """(180,) the chroma of the pixels of each hue, summed over those that are not pale; zeros without any."""
     of_chroma = np.zeros(256, np.int64)
     for hue in range(HUES):
-        for chroma in range(MIN_CHROMA, 256):
-            of_chroma[chroma] += histogram[hue, chroma]
+        of_chroma += histogram[hue]
+    of_chroma[:MIN_CHROMA] = 0
     limit, below, strong = STRONG_SHARE * of_chroma.sum(), 0, 0
     while strong < 255 and below + of_chroma[strong] < limit:
         below += of_chroma[strong]
         strong += 1
     weight = np.zeros(HUES)
     for hue in range(HUES):
+        total, row = np.int64(0), histogram[hue]
         for chroma in range(max(MIN_CHROMA, strong // 8), 256):
-            weight[hue] += chroma * histogram[hue, chroma]
+            total += np.int64(chroma) * row[chroma]
+        weight[hue] = total
     return weight
 
 
@@ -223,9 +270,19 @@ def find_hues(histogram: NDArray[np.int32], nominal_deg: NDArray[np.float64]) ->
     return (nominal_deg + shift) % 360 if found else None
 
 
-def _upper_quartile(values: NDArray[np.float32]) -> float:
-    """The value that a quarter of them exceeds; 0 of none."""
-    return float(np.sort(values)[3 * len(values) // 4]) if len(values) else 0.0
+@compiled
+def _ink_of_hue(hues_deg):  # type: ignore[no-untyped-def]
+    """(180,) uint8: the ink (1, 2, 3) whose hue is the nearest, 0 where all are far."""
+    ink_of_hue = np.zeros(HUES, np.uint8)
+    for hue in range(HUES):
+        nearest = 60.0
+        for ink in range(3):
+            away = hue * OPENCV_HUE_DEG - hues_deg[ink]
+            away = abs(away - 360.0 * np.floor(away / 360.0 + 0.5))
+            if away < nearest:
+                nearest = away
+                ink_of_hue[hue] = ink + 1
+    return ink_of_hue
 
 
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
@@ -235,15 +292,8 @@ def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) ->
     hues = find_hues(_survey(hsv, chroma, step), nominal_deg)
     if hues is None:
         return None
-    away = np.abs((np.arange(HUES)[:, None] * OPENCV_HUE_DEG - hues + 180) % 360 - 180)
-    ink_of_hue = np.where(away.min(axis=1) < 60, away.argmin(axis=1) + 1, 0).astype(np.uint8)
+    ink_of_hue = _ink_of_hue(hues)
     tile = max(TILE_PX, min(chroma.shape) // 12 // SHRINK * SHRINK)
-    level = _tile_levels(hsv, chroma, ink_of_hue, tile, step)
-    typical = np.array([_upper_quartile(v[v > 0]) for v in level])
-    threshold = np.empty(level.shape, np.uint8)
-    for ink in range(3):
-        spread = cv2.blur(cv2.dilate(level[ink], np.ones((3, 3), np.uint8)), (3, 3))
-        local = LEVEL_SHARE * np.maximum(spread, 0.15 * typical[ink])
-        threshold[ink] = np.clip(local, MIN_CHROMA, 255)
+    threshold, typical = _thresholds(_tile_levels(hsv, chroma, ink_of_hue, tile, step))
     label = _label(hsv, chroma, ink_of_hue, threshold, tile, target.mask, target.shrink)
     return Segmentation(hsv=hsv, label=label, hues_deg=hues, chroma=typical)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
-from .engine import compiled
+from .engine import compiled, vectorized
 from .sight import Frame
 from .topology import Topology
 
@@ -68,8 +68,10 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
             continue
         area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-        around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
-        around += np.hypot(a[0] - c[0], a[1] - c[1])
+        around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) + np.sqrt(
+            (c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2
+        )
+        around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
         inscribed = area / max(around, 1e-9)
         radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
         count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
@@ -92,66 +94,79 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
     return out
 
 
+@vectorized
+def _normal_equations(terms, values, weight, gram, right):  # type: ignore[no-untyped-def]
+    """Fill in the sums over all cells of weight times term times term (its lower triangle), and times value."""
+    weighted = np.empty(weight.shape[0])
+    for j in range(TERMS):
+        for i in range(weight.shape[0]):
+            weighted[i] = weight[i] * terms[j, i]
+        for k in range(j, TERMS):
+            other, total = terms[k], 0.0
+            for i in range(weight.shape[0]):
+                total += weighted[i] * other[i]
+            gram[k, j] = total
+        for channel in range(3):
+            other, total = values[channel], 0.0
+            for i in range(weight.shape[0]):
+                total += weighted[i] * other[i]
+            right[channel, j] = total
+
+
 @compiled
-def _fit(terms, values, weight, count):  # type: ignore[no-untyped-def]
-    """(3, 10): the weighted least squares polynomial with the first ``count`` terms, a little held towards 0."""
-    gram, right = np.zeros((count, count)), np.zeros((3, TERMS))
-    for i in range(terms.shape[0]):
-        w = weight[i]
-        if w == 0.0:
-            continue
-        for j in range(count):
-            v = w * terms[i, j]
-            for k in range(j + 1):
-                gram[j, k] += v * terms[i, k]
-            for channel in range(3):
-                right[channel, j] += v * values[i, channel]
+def _fit(terms, values, weight, count, gram, right):  # type: ignore[no-untyped-def]
+    """Write the weighted least squares polynomial with the first ``count`` terms, a little held towards 0, into
+    ``right`` (3, 10)."""
+    _normal_equations(terms, values, weight, gram, right)
+    right[:, count:] = 0.0
     if not gram[0, 0] > 0.0:
-        return np.zeros((3, TERMS))
+        right[:] = 0.0
+        return
     for j in range(1, count):
         gram[j, j] += 1e-6 * gram[0, 0]
     cholesky_solve(gram, right, count)
-    return right
 
 
-@compiled
+@vectorized
 def _misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
     """Mean squared distance of each cell's level from the polynomial."""
-    for i in range(terms.shape[0]):
-        out[i] = 0.0
-        for channel in range(3):
-            rest = values[i, channel]
-            for k in range(TERMS):
-                rest -= terms[i, k] * field[channel, k]
-            out[i] += rest * rest / 3.0
+    rest = np.empty(out.shape[0])
+    out[:] = 0.0
+    for channel in range(3):
+        rest[:] = values[channel]
+        for k in range(TERMS):
+            factor, row = field[channel, k], terms[k]
+            for i in range(out.shape[0]):
+                rest[i] -= factor * row[i]
+        for i in range(out.shape[0]):
+            out[i] += rest[i] * rest[i] / 3.0
 
 
 @compiled
 def _field(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
     """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange.
 
-    The fourth column of ``values`` is the number of pixels.
+    ``terms`` (10, n) and ``values`` (4, n) are columns a cell; the fourth value is the number of pixels.
     """
-    n = terms.shape[0]
+    n = terms.shape[1]
     weight, misfit = np.empty(n), np.zeros(n)
     for i in range(n):
-        weight[i] = values[i, 3] / (1.0 + 0.1 * values[i, 3])
-    start = weight.copy()
-    field = _fit(terms, values, weight, count)
-    spread = 0.0
+        weight[i] = values[3, i] / (1.0 + 0.1 * values[3, i])
+    start, gram, field = weight.copy(), np.empty((TERMS, TERMS)), np.empty((3, TERMS))
+    _fit(terms, values, weight, count, gram, field)
     for _ in range(rounds):
         _misfits(terms, values, field, misfit)
         # 0.79 is the median of a chi-square of 3 degrees over 3
         spread = np.median(misfit) / 0.79
         for i in range(n):
             weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * spread + 1e-9)) ** 2
-        field = _fit(terms, values, weight, count)
+        _fit(terms, values, weight, count, gram, field)
     _misfits(terms, values, field, misfit)
     spread = np.median(misfit) / 0.79
-    expected = noise * noise / np.median(values[:, 3])
+    expected = noise * noise / np.median(values[3])
     strange = np.zeros(n, np.bool_)
     for i in range(n):
-        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / values[i, 3]) + 4.0
+        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / values[3, i]) + 4.0
     return field, max(spread * n / max(n - count, 1) - 1.15 * expected, 0.0), strange
 
 
@@ -194,17 +209,17 @@ def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, sca
 
 @compiled
 def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
-    """Terms (n, 10), values (n, 4) and numbers (n,) of an ink's cells that can be seen."""
+    """Terms (10, n), values (4, n) and numbers (n,) of an ink's cells that can be seen."""
     n = 0
     for i in range(values.shape[0]):
         if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
             n += 1
-    terms, own, number = np.empty((n, TERMS)), np.empty((n, 4)), np.empty(n, np.int64)
+    terms, own, number = np.empty((TERMS, n)), np.empty((4, n)), np.empty(n, np.int64)
     n = 0
     for i in range(values.shape[0]):
         if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
-            monomials(place[i, 0], place[i, 1], terms[n])
-            own[n], number[n] = values[i], i
+            monomials(place[i, 0], place[i, 1], terms[:, n])
+            own[:, n], number[n] = values[i], i
             n += 1
     return terms, own, number
 

@@ -14,7 +14,8 @@ class Steps(NamedTuple):
     """What a preset does.
 
     Attributes:
-        profiles: stations per gridline at most, in the first round, and in the second, if no synthesis follows.
+        profiles: rows of pixels across each gridline at most, in the first round, and in the second, if no synthesis
+            follows.
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.
@@ -31,7 +32,7 @@ class Steps(NamedTuple):
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 8), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((3, 64), 0.5, 0.085, 2, 4, 10.0),
-    "accurate": Steps((3, 4), 1.2, 0.0, 1, 10, 0.7),
+    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 1, 0.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 4, 10.0),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 10, 0.7),
 }

@@ -5,25 +5,49 @@ Fast, and sure from a start a pixel off; what the neighbourhood of the corners c
 
 from __future__ import annotations
 
-from math import erf
-
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
 from .levels import monomials
-from .sampling import clamp, sample_dot
-from .synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, PIXELS, SUMS, A, B, C, D
+from .sampling import sample_dot
+from .synthesis import (
+    AA,
+    AB,
+    AC,
+    AD,
+    BB,
+    BC,
+    BD,
+    C0,
+    C1,
+    C2,
+    C3,
+    C4,
+    C5,
+    CC,
+    CD,
+    DD,
+    MISFIT,
+    PIXELS,
+    SUMS,
+    A,
+    B,
+    C,
+    D,
+)
 
-SAMPLES = 7  # at most, on each side of a gridline
-REACH_SIGMA = 2.0  # how far a profile reaches, in units of the blur
-CLEAR_SIGMA = 2.8  # how far the other gridline of a corner must be for it not to show, in units of the blur
+BLUR_SAMPLES = 8  # on each side of a gridline
+REACH_SIGMA = 1.3  # how far a profile reaches, in units of the blur
+CLEAR_SIGMA = 2.6  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
-STATION_PX = (
-    1.5  # of a gridline's length that one station tells about, bilinear samples being means of four pixels
-)
 BILINEAR_PX2 = 1.0 / 6.0  # variance that bilinear sampling adds to the blur, on the average
+CHUNK = 1024  # pixels of one gridline at most
+CLIP = 0.3  # of the contrast, by which a pixel may lie beyond both colors
+FAR = np.float32(2.6)  # in units of the blur, as far as the polynomials hold
+HALF = np.float32(0.5)
+I1, I2, I3, I4, I5 = (np.float32(c / (2 * k + 3)) for k, c in enumerate((C1, C2, C3, C4, C5)))
 ROOM = 4  # columns: height of the lower cell beside it, sines of the angles at both ends, contrast squared
 
 
@@ -34,7 +58,7 @@ def unmixing(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, fr
     weights, room = np.zeros((lines.shape[0], 4)), np.zeros((lines.shape[0], ROOM))
     terms = np.empty(10)
     for e in range(lines.shape[0]):
-        strength = (contrasts[e] ** 2).sum()
+        strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         if lines[e, KNOWN] == 0.0 or strength < MIN_CONTRAST**2:
             continue
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
@@ -42,119 +66,205 @@ def unmixing(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, fr
         monomials(
             (x0 + 0.5 * length * ux - frame_x) / scale, (y0 + 0.5 * length * uy - frame_y) / scale, terms
         )
-        height, at_a, at_b = length, 1.0, 1.0
+        foot = 0.0
         for channel in range(3):
             weights[e, channel] = contrasts[e, channel] / strength
-            weights[e, 3] += weights[e, channel] * (terms * black[channel]).sum()
+            for k in range(10):
+                foot += weights[e, channel] * terms[k] * black[channel, k]
+        height, at_a, at_b = length, 1.0, 1.0
         for k in range(2):
             i = edge_cells[e, k]
             if i < 0:
                 continue
-            third, along = 0.0, 0.0
+            off, along = 0.0, 0.0
             for corner in range(3):
-                c = xy[cells[i, corner]]
-                off = (c[1] - y0) * ux - (c[0] - x0) * uy
-                if abs(off) > abs(third):
-                    third, along = off, (c[0] - x0) * ux + (c[1] - y0) * uy
-            if third > 0.0:  # the cell lies beyond the gridline: its level is the profile's foot
+                dx, dy = xy[cells[i, corner], 0] - x0, xy[cells[i, corner], 1] - y0
+                if abs(dy * ux - dx * uy) > abs(off):
+                    off, along = dy * ux - dx * uy, dx * ux + dy * uy
+            if off > 0.0:  # the cell lies beyond the gridline: its level is the profile's foot
                 for channel in range(3):
-                    weights[e, 3] += weights[e, channel] * levels[i, channel]
-            height = min(height, abs(third))
+                    foot += weights[e, channel] * levels[i, channel]
+            off = abs(off)
+            height = min(height, off)
             if along > 0.0:
-                at_a = min(at_a, abs(third) / np.hypot(third, along))
+                at_a = min(at_a, off / np.sqrt(off * off + along * along))
             if along < length:
-                at_b = min(at_b, abs(third) / np.hypot(third, length - along))
+                at_b = min(at_b, off / np.sqrt(off * off + (length - along) ** 2))
+        weights[e, 3] = foot
         room[e, 0], room[e, 1], room[e, 2], room[e, 3] = height, max(at_a, 0.05), max(at_b, 0.05), strength
     return weights, room
 
 
 @compiled
-def profile_blurs(image, lines, weights, room, every):  # type: ignore[no-untyped-def]
-    """The blur seen across the middle of every n-th gridline: the integral of f (1 - f) is sigma / sqrt(pi)."""
-    out = np.full(lines.shape[0] // every + 1, np.nan)
+def profile_blur(image, lines, weights, room, every):  # type: ignore[no-untyped-def]
+    """The blur (px, sigma) seen across the middle of every n-th gridline, their median; NaN where nothing is seen.
+
+    The integral of f (1 - f) is sigma / sqrt(pi); bilinear samples add to it.
+    """
+    blurs, count = np.empty(lines.shape[0] // every + 1), 0
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     for e in range(0, lines.shape[0], every):
         if room[e, 3] == 0.0:
             continue
         u0, u1, u2, zero = weights[e]
         nx, ny, length = -lines[e, UY], lines[e, UX], lines[e, LENGTH]
-        step = MAX_REACH * room[e, 0] / 8
+        step = MAX_REACH * room[e, 0] / BLUR_SAMPLES
         total = 0.0
         for k in range(3):
             t = 0.4 + 0.1 * k
             off = bow(t, length, lines[e, LEAVE], lines[e, ARRIVE])
             x = lines[e, X] + t * length * lines[e, UX] + off * nx
             y = lines[e, Y] + t * length * lines[e, UY] + off * ny
-            for m in range(-8, 9):
+            for m in range(-BLUR_SAMPLES, BLUR_SAMPLES + 1):
                 f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
                 total += f * (1.0 - f) * step / 3.0
-        out[e // every] = total * np.sqrt(np.pi)
-    return out
+        if np.isfinite(total):
+            blurs[count] = total * np.sqrt(np.pi)
+            count += 1
+    if count == 0:
+        return np.nan
+    sigma = np.median(blurs[:count])
+    return np.sqrt(max(sigma * abs(sigma) - BILINEAR_PX2, 0.0))
+
+
+@vectorized
+def _weighed(along, aside, seen, inverse, short, length, leave, arrive):  # type: ignore[no-untyped-def]
+    """A pixel's weight, its place on the gridline, and what it shows beyond the blurred step."""
+    one = np.float32(1.0)
+    t = along * short
+    s = one - t
+    z = (aside - length * (t * s * (leave * s - arrive * t))) * inverse
+    z = min(max(z, -FAR), FAR)
+    zz = z * z
+    g = C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5))))
+    step = HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
+    return g, t, s, min(max(seen, np.float32(-CLIP)), np.float32(one + CLIP)) - step
+
+
+@vectorized
+def _vote(along, aside, seen, count, inverse, short, length, leave, arrive, sums):  # type: ignore[no-untyped-def]
+    """Add ``count`` pixels to a gridline's sums, per unit of contrast and blur: their places along and aside of its
+    chord, and what they show, 1 before and 0 beyond it."""
+    zero = np.float32(0.0)
+    aa, ab, bb, a, b, squares = zero, zero, zero, zero, zero, zero
+    for k in range(count):
+        g, t, s, rest = _weighed(along[k], aside[k], seen[k], inverse, short, length, leave, arrive)
+        ga, gb = g * s, g * t
+        aa += ga * ga
+        ab += ga * gb
+        bb += gb * gb
+        a += ga * rest
+        b += gb * rest
+        squares += rest * rest
+    sums[AA] += aa
+    sums[AB] += ab
+    sums[BB] += bb
+    sums[A] += a
+    sums[B] += b
+    sums[MISFIT] += squares
+    sums[PIXELS] += count
+
+
+@vectorized
+def _vote_bending(  # type: ignore[no-untyped-def]
+    along, aside, seen, count, inverse, short, length, leave, arrive, sums
+):
+    """The same for a gridline's bending."""
+    zero = np.float32(0.0)
+    ac, ad, bc, bd, cc, cd, dd, c, d = zero, zero, zero, zero, zero, zero, zero, zero, zero
+    for k in range(count):
+        g, t, s, rest = _weighed(along[k], aside[k], seen[k], inverse, short, length, leave, arrive)
+        ga, gb = g * s, g * t
+        gc = ga * t
+        gd = gc * (s - t)
+        ac += ga * gc
+        ad += ga * gd
+        bc += gb * gc
+        bd += gb * gd
+        cc += gc * gc
+        cd += gc * gd
+        dd += gd * gd
+        c += gc * rest
+        d += gd * rest
+    sums[AC] += ac
+    sums[AD] += ad
+    sums[BC] += bc
+    sums[BD] += bd
+    sums[CC] += cc
+    sums[CD] += cd
+    sums[DD] += dd
+    sums[C] += c
+    sums[D] += d
 
 
 @compiled
-def read_profiles(image, lines, weights, room, sigma, most):  # type: ignore[no-untyped-def]
-    """(E, 24) sums as ``read_gridlines`` gives them, from at most ``most`` stations a gridline.
+def read_profiles(image, lines, weights, room, sigma, loose, most):  # type: ignore[no-untyped-def]
+    """(E, 24) sums as ``read_gridlines`` gives them, from at most ``most`` rows of pixels across each gridline; C and D
+    where it is ``loose`` (E,) bool.
 
-    At each station the matched filter of a blurred step tells how far the gridline lies from where it is thought to
-    be; it weighs as much as the station's length carries information.
+    The pixels are held against a blurred step, each weighed by the step's derivative: the matched filter, which tells
+    how far the gridline lies from where it is thought to be, with all that these pixels know.
     """
     out = np.zeros((lines.shape[0], SUMS))
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    kernel, step_profile = np.zeros(2 * SAMPLES + 1), np.zeros(2 * SAMPLES + 1)
-    kept_reach = -1.0
-    samples, norm, step = 2, 1.0, 1.0
+    one, two = np.uint64(1), np.uint64(2)
+    alongs, asides = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.float32)
+    seen = np.empty(CHUNK, np.float32)
+    inverse, small_weights = 1.0 / sigma, weights.astype(np.float32)
     for e in range(lines.shape[0]):
-        if room[e, 3] == 0.0:
+        strength = room[e, 3]
+        if strength == 0.0:
             continue
-        u0, u1, u2, zero = weights[e]
-        nx, ny, length = -lines[e, UY], lines[e, UX], lines[e, LENGTH]
+        u0, u1, u2, zero = small_weights[e]
+        x0, y0, ux, uy, length = lines[e, X], lines[e, Y], lines[e, UX], lines[e, UY], lines[e, LENGTH]
+        leave, arrive = lines[e, LEAVE], lines[e, ARRIVE]
         # the sharper a corner, the longer the gridline runs close to its neighbour
-        start = min(max(CLEAR_SIGMA * sigma / (length * room[e, 1]), 0.15), 0.4)
-        end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * room[e, 2]), 0.15), 0.4)
-        stations = min(max(int(length * (end - start)), 3), most)
+        start = min(max(CLEAR_SIGMA * sigma / (length * room[e, 1]), 0.1), 0.4)
+        end = 1.0 - min(max(CLEAR_SIGMA * sigma / (length * room[e, 2]), 0.1), 0.4)
         reach = min(REACH_SIGMA * sigma, MAX_REACH * room[e, 0])
-        if reach != kept_reach:
-            kept_reach, norm = reach, 0.0
-            samples = min(max(int(np.ceil(reach)), 2), SAMPLES)
-            step = reach / samples
-            for m in range(-samples, samples + 1):
-                z = m * step / sigma
-                kernel[m + samples] = np.exp(-0.5 * z * z) / (np.sqrt(2 * np.pi) * sigma)
-                step_profile[m + samples] = 0.5 * (1.0 - erf(z / np.sqrt(2.0)))
-                norm += kernel[m + samples] ** 2
-        information = room[e, 3] / (2 * np.sqrt(np.pi) * sigma)
-        information *= min(length * (end - start) / stations, STATION_PX)
-        for j in range(stations):
-            t = start + (end - start) * (j + 0.5) / stations
-            off = bow(t, length, lines[e, LEAVE], lines[e, ARRIVE])
-            x = lines[e, X] + t * length * lines[e, UX] + off * nx
-            y = lines[e, Y] + t * length * lines[e, UY] + off * ny
-            product, squares = 0.0, 0.0
-            for m in range(-samples, samples + 1):
-                f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
-                rest = clamp(f, -0.3, 1.3) - step_profile[m + samples]
-                product += kernel[m + samples] * rest
-                squares += rest * rest
-            offset = product / norm
-            if not abs(offset) < max(1.0, 0.15 * length):
+        # p counts along the longer axis, q along the other
+        across = abs(ux) > abs(uy)
+        p0, q0, up, uq = (x0, y0, ux, uy) if across else (y0, x0, uy, ux)
+        sense = 1.0 if across else -1.0
+        p_end, q_end = (width - 1, height - 1) if across else (height - 1, width - 1)
+        stride = np.uint64(3 * width) if across else np.uint64(3)
+        from_p, to_p = p0 + start * length * up, p0 + end * length * up
+        first, last = int(np.ceil(min(from_p, to_p))), int(np.floor(max(from_p, to_p)))
+        every = max((last - first) // most + 1, 1)
+        first += ((last - first) % every) // 2
+        half, lean, per_length = reach / abs(up), uq / up, 1.0 / (up * length)
+        filled = 0
+        for p in range(first, last + 1, every):
+            if p < 0 or p > p_end:
                 continue
-            out[e, AA] += information * (1 - t) * (1 - t)
-            out[e, AB] += information * (1 - t) * t
-            out[e, BB] += information * t * t
-            out[e, A] += information * (1 - t) * offset
-            out[e, B] += information * t * offset
-            c = t * (1 - t)
-            d = c * (1 - 2 * t)
-            out[e, AC] += information * (1 - t) * c
-            out[e, AD] += information * (1 - t) * d
-            out[e, BC] += information * t * c
-            out[e, BD] += information * t * d
-            out[e, CC] += information * c * c
-            out[e, CD] += information * c * d
-            out[e, DD] += information * d * d
-            out[e, C] += information * c * offset
-            out[e, D] += information * d * offset
-            out[e, MISFIT] += information * squares / norm
-            out[e, PIXELS] += 2.0 * samples + 1.0
+            middle = q0 + (p - p0) * lean + sense * bow((p - p0) * per_length, length, leave, arrive) / up
+            low, high = int(np.ceil(middle - half)), int(np.floor(middle + half))
+            if low < 0 or high > q_end or filled + high - low + 1 > CHUNK:
+                continue
+            at = np.uint64((low * width + p if across else p * width + low) * 3)
+            along = (p - p0) * up + (low - q0) * uq
+            aside = sense * ((low - q0) * up - (p - p0) * uq)
+            for _ in range(high - low + 1):
+                seen[filled] = u0 * flat[at] + u1 * flat[at + one] + u2 * flat[at + two] - zero
+                alongs[filled], asides[filled] = along, aside
+                filled += 1
+                at += stride
+                along += uq
+                aside += sense * up
+        sums = out[e]
+        small = np.float32(inverse), np.float32(1.0 / length)
+        shape = np.float32(length), np.float32(leave), np.float32(arrive)
+        _vote(alongs, asides, seen, filled, *small, *shape, sums)
+        if loose[e]:
+            _vote_bending(alongs, asides, seen, filled, *small, *shape, sums)
+        # a gridline that would have to move too far is none
+        votes, weight = sums[A] + sums[B], sums[AA] + 2 * sums[AB] + sums[BB]
+        if not abs(votes) * sigma < max(1.0, 0.15 * length) * weight:
+            sums[:] = 0.0
+            continue
+        for k in (AA, AB, BB, AC, AD, BC, BD, CC, CD, DD):
+            sums[k] *= strength * inverse * inverse
+        for k in (A, B, C, D):
+            sums[k] *= strength * inverse
+        sums[MISFIT] *= strength
     return out

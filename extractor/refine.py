@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around, bend_gridlines, bent, eliminate, freedom, hidden_misfit, roughness
+from .engine import compiled
 from .fit import Across, Fit, Refined
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .image import estimate_noise
@@ -23,7 +24,7 @@ from .levels import Levels, black_at, cell_means, smooth_levels
 from .offsets import Reading, foot_of, measure
 from .placing import Places
 from .presets import STEPS, Preset
-from .profiles import BILINEAR_PX2, profile_blurs, read_profiles, unmixing
+from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .stepping import (
     MIN_NOISE,
@@ -47,7 +48,8 @@ MIN_EDGE_PX = 6.5  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
-BLUR_EDGES = 100  # gridlines that the first estimate of the blur is taken from
+BLIND_SIGMA_PX = 0.9  # where no gridline shows it
+BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
 MARGIN_SIGMA = 4.0
 # Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
 # profiles may lie apart, in units of the edges around the marker.
@@ -85,7 +87,7 @@ class Refiner:
         edge = short_edge(places.xy_px, self._mesh.edges)
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
-        scale = self._scale(view.scale * _sharpened(fit.sigma), edge)
+        scale = self._scale(view.scale * fit.sigma, edge)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
@@ -98,8 +100,9 @@ class Refiner:
 
     def _begin(self, view: Sight, places: Places) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
-        mesh, noise = self._mesh, max(estimate_noise(view.image), MIN_NOISE)
+        mesh = self._mesh
         xy, beyond, maps = self._completed(view.reduced(places.xy_px))
+        noise = max(estimate_noise(view.image, xy, mesh.cells), MIN_NOISE)
         usual = USUAL_SIGMA_PX / view.scale
         levels = smooth_levels(
             cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
@@ -113,22 +116,22 @@ class Refiner:
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
         fit = Fit(xy, xy, beyond, maps, 0.0, noise, levels, nothing, smooth, stiff, straight, 0.0, None)
-        across = self._across(view, fit)
-        fit = fit._replace(sigma=self._blur(view, fit, across))
+        lines = self._lines(fit)
+        across = self._across(view, fit, lines)
+        fit = fit._replace(sigma=self._blur(view, lines, across))
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
         return fit, across
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
         steps = self._steps
-        sharp = _sharpened(fit.sigma) < steps.sharp * edge_px and view.scale < steps.reduced
+        sharp = fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced
         if sharp:
             fit, trusted = self._profile_step(view, fit, across, steps.profiles[1], judged=True)
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted, places)
         start = fit
-        fit = fit._replace(sigma=_sharpened(fit.sigma))
         for _ in range(steps.synthesis):
             fit = self._synthesis_step(view, fit)
             if fit.moved < steps.enough:
@@ -150,10 +153,9 @@ class Refiner:
         bend_gridlines(lines, fit.bend)
         return lines
 
-    def _across(self, view: Sight, fit: Fit) -> Across:
+    def _across(self, view: Sight, fit: Fit, lines: NDArray[np.float64]) -> Across:
         """The colors beside the gridlines."""
         mesh, levels = self._mesh, fit.levels
-        lines = self._lines(fit)
         sides = mesh.cells, mesh.edge_cells, levels.cell
         contrasts = edge_contrasts(lines, fit.xy, *sides, levels.slope)
         return Across(contrasts, *unmixing(lines, contrasts, fit.xy, *sides, levels.black, *view.frame))
@@ -167,7 +169,9 @@ class Refiner:
         """
         mesh = self._mesh
         lines = self._lines(fit)
-        sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, stations)
+        sums = read_profiles(
+            view.image, lines, across.weights, across.room, fit.sigma, self._loose(fit), stations
+        )
         to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
         fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
         use = (sums[:, AA] > 0).astype(np.float64)
@@ -176,18 +180,16 @@ class Refiner:
             use, _ = trust(sums, to_a, to_b, pardon, *JUDGED_BY_SAMPLES)
         shift, information = self._solve(sums, to_a, to_b, use, lines, across.contrasts, False, fit)
         fit = fit._replace(bend=bent(fit.bend, kept, shift, lines, mesh.edges))
-        foot, sigma = across.weights[:, 3].copy(), _sharpened(fit.sigma)
+        foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
         return self._moved(fit, sums, lines, shift, information), trusted_markers(use, mesh.spokes)
 
-    def _blur(self, view: Sight, fit: Fit, across: Across) -> float:
-        """The blur that some of the gridlines show."""
-        lines = self._lines(fit)
+    def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
+        """The blur that some of the gridlines show, px."""
         every = max(1, len(lines) // BLUR_EDGES)
-        blurs = profile_blurs(view.image, lines, across.weights, across.room, every)
-        seen = blurs[np.isfinite(blurs)]
-        return max(float(np.median(seen)) if len(seen) else 1.0, MIN_SIGMA_PX)
+        sigma = profile_blur(view.image, lines, across.weights, across.room, every)
+        return max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else BLIND_SIGMA_PX
 
     def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
         image, frame = view.image, view.frame
@@ -199,8 +201,7 @@ class Refiner:
         bettered = self._level_step(view, model, fit)
         middle = middles(lines)
         black = black_at(levels.black, middle, *frame)
-        loose = (fit.rough[mesh.edges] > 0.0).any(axis=1) | (fit.bend != 0.0).any(axis=1)
-        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, loose)
+        sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, self._loose(fit))
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
         fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
@@ -227,6 +228,10 @@ class Refiner:
         sides = mesh.cells, mesh.cell_edges, mesh.edges, lines
         draw_cells(fit.xy, *sides, levels.cell, levels.slope, fit.sigma, box, model)
         return model
+
+    def _loose(self, fit: Fit) -> NDArray[np.bool_]:
+        """(E,) the gridlines that may bend beyond the map, or did."""
+        return np.asarray((fit.rough[self._mesh.edges] > 0.0).any(axis=1) | (fit.bend != 0.0).any(axis=1))
 
     def _eliminated(
         self,
@@ -327,8 +332,7 @@ class Refiner:
         cov[left] = ((AGREED * places.edge_px[left]) ** 2)[:, None, None] * np.eye(2)
         scale, reading = view.scale, fit.reading
         assert reading is not None
-        points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual)
-        points[..., :2], points[..., 2] = view.full(points[..., :2]), scale**2 * points[..., 2]
+        points = measure(view.image, self._buffer(view.image.shape), reading, self._virtual, scale)
         free = scale * np.sqrt(around(fit.loose, self._mesh.spokes))
         blur, noise = scale * fit.sigma, scale * fit.noise
         return Refined(view.full(xy), scale**2 * cov, explained, free, blur, noise, points)
@@ -339,20 +343,27 @@ class Refiner:
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         cov += HIDDEN**2 * around(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
-        with np.errstate(invalid="ignore"):
-            limit = np.where(places.whole, MAX_APART, MAX_SHIFT) * places.edge_px
-            near = np.linalg.norm(xy - places.xy_px, axis=1) < limit
-            sure = np.einsum("mii->m", cov) < (MAX_SIGMA * places.edge_px) ** 2
-        lost = ~(near & sure)
-        xy[lost] = np.nan
-        cov[lost] = np.nan
+        _drop_unsure(xy, cov, places.xy_px, places.edge_px, places.whole)
         return xy, cov
+
+
+@compiled
+def _drop_unsure(xy, cov, start, edge, whole):  # type: ignore[no-untyped-def]
+    """Set to NaN what lies far from its ``start`` or is not sure, in place."""
+    for m in range(xy.shape[0]):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
+        spread = cov[m, 0, 0] + cov[m, 1, 1]
+        if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
+            xy[m], cov[m] = np.nan, np.nan
 
 
 def _doubt(
     xy: NDArray[np.float64], cov: NDArray[np.float64], which: NDArray[np.bool_], places: Places
 ) -> None:
     """Put markers on which something lies between what profiles and triangles say, in place; NaN where these differ."""
+    if not which.any():
+        return
     apart = np.linalg.norm(xy - places.xy_px, axis=1)
     with np.errstate(invalid="ignore"):
         lost = which & ~(apart < MAX_APART * places.edge_px)
@@ -360,11 +371,6 @@ def _doubt(
     doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
     cov[which] += doubt[which, None, None] * np.eye(2)
     xy[lost], cov[lost] = np.nan, np.nan
-
-
-def _sharpened(sigma: float) -> float:
-    """The blur without that which the profiles' bilinear samples added."""
-    return float(max(np.sqrt(max(sigma**2 - BILINEAR_PX2, 0.0)), MIN_SIGMA_PX))
 
 
 def _in(view: Sight, places: Places) -> Places:

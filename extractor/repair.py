@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
 from .fit import Refined
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
 from .placing import Places
@@ -21,7 +22,7 @@ from .types import Status
 ROUNDS = 4
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
+FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
@@ -67,7 +68,8 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
-    _drop_slid(xy, cov, refined.free_px, places, lattice)
+    around = lattice.neighbours[:, INNER]
+    _drop_slid(xy, cov, refined.free_px, places.xy_px, edge_px, around, lattice.present)
     measured, edge = xy.copy(), _filled(edge_px, lattice)
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
@@ -108,6 +110,8 @@ def _drop_outliers(
         known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
         doubtful = deviant(xy, MAX_DEVIATION * edge * believed, lattice.ring_weights, table)
+        if not doubtful.any():
+            break
         place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
         sigma = np.sqrt(variance * (1 + leverage))
         apart = xy - place
@@ -133,35 +137,34 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
-    outer = np.isfinite(xy[:, 0]) & (lattice.layer == lattice.layers)
-    place, variance, _, support = predict(xy, outer, lattice.marker_mm, lattice.inner)
-    apart, edge = xy - place, places.edge_px
-    with np.errstate(invalid="ignore"):
-        # the worse a quadratic fits the layers inside, the less it tells beyond them
-        allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
-        bad = (np.hypot(apart[:, 0], apart[:, 1]) > allowed * edge) & (support >= MIN_QUADRATIC)
-    xy[bad], cov[bad] = np.nan, np.nan
+    edge, inner = places.edge_px, lattice.inner
+    # only what may be too far is looked at closely
+    doubtful = deviant(xy, FRAYED[0] * edge, lattice.inner_weights, inner) & (inner[:, 0] >= 0)
+    if doubtful.any():
+        place, variance, _, support = predict(xy, doubtful, lattice.marker_mm, inner)
+        with np.errstate(invalid="ignore"):
+            # the worse a quadratic fits the layers inside, the less it tells beyond them
+            allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
+            apart = np.hypot(*(xy - place).T)
+            bad = (apart > allowed * edge) & (support >= MIN_QUADRATIC)
+        xy[bad], cov[bad] = np.nan, np.nan
 
 
-def _drop_slid(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    free_px: NDArray[np.float64],
-    places: Places,
-    lattice: Lattice,
-) -> None:
-    """Set to NaN the markers of the pattern's rim that refinement took far from their triangles and is not sure of.
+@compiled
+def _drop_slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-untyped-def]
+    """Set to NaN the markers of the pattern's rim that lie far from their ``start`` and are not sure, in place.
 
-    Where two gridlines end that may bend, the corner between them slides along both.
+    Where two gridlines end that may bend (``free``, px), the corner between them slides along both.
     """
-    around = lattice.neighbours[:, INNER]
-    rim = ~(lattice.present[around] & (around >= 0)).all(axis=1)
-    moved, edge = xy - places.xy_px, places.edge_px
-    with np.errstate(invalid="ignore"):
-        vague = np.trace(cov, axis1=1, axis2=2) > (VAGUE * edge) ** 2
-        vague |= free_px > VAGUE * edge
-        bad = rim & vague & (np.hypot(moved[:, 0], moved[:, 1]) > MAX_MOVED * edge)
-    xy[bad], cov[bad] = np.nan, np.nan
+    for m in range(xy.shape[0]):
+        inside = True
+        for n in around[m]:
+            inside = inside and n >= 0 and present[n]
+        limit = VAGUE * edge[m]
+        if not inside and (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
+            dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+            if dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2:
+                xy[m], cov[m] = np.nan, np.nan
 
 
 def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:

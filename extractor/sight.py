@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
+
 
 class Frame(NamedTuple):
     """The image coordinates of polynomials: (x - x) / scale, (y - y) / scale."""
@@ -53,9 +55,33 @@ class Sights:
 
 
 def _sight(image: NDArray[np.uint8], scale: int) -> Sight:
-    if scale > 1:
+    if scale == 2:
+        image = _halved(image)
+    elif scale > 1:
         width, height = image.shape[1] // scale, image.shape[0] // scale
         whole = image[: height * scale, : width * scale]
         image = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
     height, width = image.shape[:2]
     return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
+
+
+@compiled
+def _halved(image):  # type: ignore[no-untyped-def]
+    """The means of 2 x 2 pixels, halves rounded up: what OpenCV makes of them, at half of its time."""
+    height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
+    out = np.empty((height, width, 3), np.uint8)
+    flat, means = image.reshape(-1), out.reshape(-1)
+    both = np.empty(6 * width, np.uint16)
+    one, three, six = np.uint16(1), np.uint64(3), np.uint64(6)
+    for y in range(height):
+        above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
+        for i in range(6 * width):
+            both[i] = np.uint16(above[i]) + np.uint16(below[i])
+        line = means[3 * y * width : 3 * (y + 1) * width]
+        for x in range(np.uint64(width)):
+            for channel in range(three):
+                left = both[six * x + channel]
+                line[three * x + channel] = (left + both[six * x + channel + three] + one + one) >> np.uint16(
+                    2
+                )
+    return out

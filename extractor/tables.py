@@ -30,7 +30,8 @@ class Lattice:
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
         inner: (M, 18) int32, for markers of the outermost layer the nearest ones of the others, else -1.
-        ring_weights: (M, 18) float64, weights of these that give a marker's place; 0 where they are too few.
+        ring_weights, inner_weights: (M, 18) float64, weights of ``neighbours`` and of ``inner`` that give a marker's
+            place; 0 where they are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
@@ -44,6 +45,7 @@ class Lattice:
     neighbours: NDArray[np.int32]
     inner: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
+    inner_weights: NDArray[np.float64]
     present: NDArray[np.bool_]
 
     @cached_property
@@ -68,6 +70,7 @@ def lattice_of(reference: Reference) -> Lattice:
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
     neighbours = neighbour_table(coordinates, int(reference.layer.max()))
+    inner = inner_table(coordinates, reference.layer)
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
     cell_of = np.full(len(coordinates), -1, np.int32)
     cell_of[lower_left] = np.arange(len(inked))
@@ -80,8 +83,9 @@ def lattice_of(reference: Reference) -> Lattice:
         axial=coordinates[lower_left],
         layer=reference.layer,
         neighbours=neighbours,
-        inner=inner_table(coordinates, reference.layer),
+        inner=inner,
         ring_weights=ring_weights(reference.xy_mm, neighbours),
+        inner_weights=ring_weights(reference.xy_mm, inner),
         present=reference.present,
     )
 

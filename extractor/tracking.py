@@ -14,12 +14,19 @@ from .displacement import Rest, rest_at
 from .errors import ImageError
 from .image import prepare
 from .pipeline import Extractor, Stages
+from .proof import examine
 from .reference import Reference
 from .sight import Sights
+from .stepping import short_edge
 from .types import Markers, Origin, Reason, Status
-from .warm import Tables, WarmStart, completed, examine, predict, prove, tables_of
+from .warm import WarmStart, predict, prove
+from .warm_tables import Tables, completed, tables_of
 
 MIN_KEPT = 0.97  # of the markers of the last cold start; below it, a cold start may find more
+WARM_EDGE_PX = (
+    8.0  # a warm start looks at the image at a scale that leaves edges of so many px, or up to twice
+)
+EVERY = 8  # edges of the layout; one of so many is looked at for that
 COLD_EVERY = 200  # frames; a cold start at least this often
 
 
@@ -112,6 +119,7 @@ class Tracker:
         self._extractor = Extractor(layout)
         self._mm_per_px = mm_per_px
         self._tables: Tables | None = tables_of(layout) if warm else None
+        self._some_edges = np.ascontiguousarray(layout.edges[::EVERY])
         self._memory: _Memory | None = None
         self._size: tuple[int, ...] | None = None
         self._count = 0
@@ -126,7 +134,7 @@ class Tracker:
             time_s: its time stamp.
         """
         started = time.perf_counter()
-        markers, status, start = self._nothing(), FrameStatus.UNREADABLE, None
+        markers, status, start = None, FrameStatus.UNREADABLE, None
         try:
             if image is None:
                 reason = reason or "no image"
@@ -139,6 +147,7 @@ class Tracker:
                 status = FrameStatus.LOST if markers.reason else FrameStatus.TRACKED
         except ImageError as error:
             reason = str(error)
+        markers = markers or self._extractor._nothing(Reason.NO_PATTERN, Stages())
         elapsed_ms = 1e3 * (time.perf_counter() - started)
         if status == FrameStatus.TRACKED and self.rest is None:
             self.rest = rest_at(markers.xy_px, self.layout, self._mm_per_px)
@@ -170,27 +179,28 @@ class Tracker:
         bgr = stages.done("image", prepare(image))
         if bgr is None:
             return None
-        guesses = [memory.xy_px]
+        sights = Sights(bgr)
+        edge_px = float(short_edge(memory.xy_px, self._some_edges))
+        view = sights.at(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
+        guesses = [view.reduced(memory.xy_px)]
         if memory.before_px is not None:
-            moving = 2 * memory.xy_px - memory.before_px
-            guesses.append(np.where(np.isfinite(moving), moving, memory.xy_px))
-        predicted = stages.done("predict", predict(bgr, guesses, tables, memory.look))
+            moving = view.reduced(2 * memory.xy_px - memory.before_px)
+            guesses.append(np.where(np.isfinite(moving), moving, guesses[0]))
+        predicted = stages.done("predict", predict(view.image, guesses, tables, memory.look))
         if predicted is None:
             return None
-        start = prove(bgr, completed(tables, predicted), memory.known, tables, memory.look)
+        start = prove(view, completed(tables, predicted), memory.known, tables, memory.look)
         if stages.done("prove", start) is None:
             return None
         assert start is not None
-        return self._finished(bgr, start, stages)
+        return self._finished(sights, start, stages)
 
-    def _finished(
-        self, bgr: NDArray[np.uint8], start: WarmStart, stages: Stages
-    ) -> tuple[Markers, StartKind] | None:
+    def _finished(self, sights: Sights, start: WarmStart, stages: Stages) -> tuple[Markers, StartKind] | None:
         """Refined, which moves no marker by more than a quarter of an edge; None where too few are left."""
         memory = self._memory
         assert memory is not None
         origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        markers = self._extractor.finish(Sights(bgr), start.places, memory.mirrored, origin, stages)
+        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT * memory.expected:
             return None
@@ -226,9 +236,6 @@ class Tracker:
         )
         self._count += 1
         return frame
-
-    def _nothing(self) -> Markers:
-        return self._extractor._nothing(Reason.NO_PATTERN, Stages())
 
     def _other_size(self, image: NDArray[Any]) -> str:
         height, width = np.shape(image)[:2]

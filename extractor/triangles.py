@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .regions import Regions
-from .sampling import clamp, sample_dot, sample_patch
+from .sampling import clamp, sample_inside, sample_patch
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
 # radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
@@ -19,7 +19,7 @@ MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4
 MAX_GROWTH = 3.0  # of a domain's area over its region's
-STATIONS = 3
+FIRST = 0.25  # of an edge, where its first profile crosses it; the second does as far from its end
 HALF_PROFILE = 4  # samples on each side of an edge
 WINDOW = 0.8  # reach of a profile in units of the way from the cell's center to the middle of the edge
 FINE_REACH_PX = 8.0  # profiles that reach farther are followed by narrower ones
@@ -98,22 +98,21 @@ def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _edge_line(flat, height, width, a, b, center, ink, share, line):  # type: ignore[no-untyped-def]
+def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # type: ignore[no-untyped-def]
     """Write the line n . p = d of the edge a-b, where its ink has fallen halfway to the color beyond; False without.
 
     The ink's profile across the edge, 1 inside and 0 outside, is integrated: its area is the edge's position
-    whatever the blur, so no blur has to be known. A line through the stations' positions is the edge. Profiles run
-    along the median, not the normal: so they stay clear of the other edges in any triangle.
+    whatever the blur, so no blur has to be known. The line through two such positions is the edge. Profiles run
+    along the median, not the normal: so they stay clear of the other edges in any triangle. ``beyond`` is a buffer.
     """
-    beyond = np.zeros(3)
-    offset, along = np.zeros(STATIONS), np.zeros(STATIONS)
     dx, dy = b[0] - a[0], b[1] - a[1]
-    length = np.hypot(dx, dy)
+    length = np.sqrt(dx * dx + dy * dy)
     nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
-    depth = (a[0] - center[0]) * nx + (a[1] - center[1]) * ny
-    mx, my = a[0] + 0.5 * dx, a[1] + 0.5 * dy
-    ux, uy = mx - center[0], my - center[1]
-    if not depth > 0.3 or not sample_patch(flat, height, width, mx + ux, my + uy, 0.4 * depth, beyond):
+    depth = (a[0] - cx) * nx + (a[1] - cy) * ny
+    ux, uy = a[0] + 0.5 * dx - cx, a[1] + 0.5 * dy - cy
+    if not depth > 0.3 or not sample_patch(
+        flat, height, width, cx + 2 * ux, cy + 2 * uy, 0.4 * depth, beyond
+    ):
         return False
     u0, u1, u2 = ink[0] - beyond[0], ink[1] - beyond[1], ink[2] - beyond[2]
     contrast = u0 * u0 + u1 * u1 + u2 * u2
@@ -122,26 +121,31 @@ def _edge_line(flat, height, width, a, b, center, ink, share, line):  # type: ig
     u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
     zero = u0 * beyond[0] + u1 * beyond[1] + u2 * beyond[2]
     step = share / HALF_PROFILE
-    used = 0
-    for j in range(STATIONS):
-        t = 0.25 + 0.5 * j / (STATIONS - 1)
-        x, y = a[0] + t * dx, a[1] + t * dy
-        area = 0.0
-        for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
-            f = sample_dot(flat, height, width, x + m * step * ux, y + m * step * uy, u0, u1, u2) - zero
-            area += (0.5 if abs(m) == HALF_PROFILE else 1.0) * clamp(f, -0.2, 1.2)
-        if area == area:  # a profile that leaves the image is NaN
-            offset[used] = (ux * nx + uy * ny) * (area * step - share)
-            along[used] = t - 0.5
-            used += 1
-    if used < STATIONS:
-        return False
-    middle, level = along[:used].mean(), offset[:used].mean()
-    slope = ((along[:used] - middle) * (offset[:used] - level)).sum() / ((along[:used] - middle) ** 2).sum()
-    ax, ay = a[0] + (level - slope * (0.5 + middle)) * nx, a[1] + (level - slope * (0.5 + middle)) * ny
-    bx, by = b[0] + (level + slope * (0.5 - middle)) * nx, b[1] + (level + slope * (0.5 - middle)) * ny
-    norm = np.hypot(bx - ax, by - ay)
-    line[0], line[1] = (by - ay) / norm, -(bx - ax) / norm
+    x0, y0 = a[0] + FIRST * dx, a[1] + FIRST * dy
+    x1, y1 = b[0] - FIRST * dx, b[1] - FIRST * dy
+    wide, high = share * abs(ux), share * abs(uy)
+    if not (
+        min(x0, x1) >= wide
+        and min(y0, y1) >= high
+        and max(x0, x1) + wide < width - 1.0
+        and max(y0, y1) + high < height - 1.0
+    ):
+        return False  # a profile leaves the image
+    first, second = 0.0, 0.0
+    for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
+        sx, sy = m * step * ux, m * step * uy
+        weight = 0.5 if abs(m) == HALF_PROFILE else 1.0
+        f = sample_inside(flat, width, x0 + sx, y0 + sy, u0, u1, u2) - zero
+        first += weight * clamp(f, -0.2, 1.2)
+        f = sample_inside(flat, width, x1 + sx, y1 + sy, u0, u1, u2) - zero
+        second += weight * clamp(f, -0.2, 1.2)
+    first, second = depth * (first * step - share), depth * (second * step - share)
+    slope = (second - first) / (1.0 - 2 * FIRST)
+    off_a, off_b = first - FIRST * slope, second + FIRST * slope
+    ax, ay = a[0] + off_a * nx, a[1] + off_a * ny
+    dx, dy = b[0] + off_b * nx - ax, b[1] + off_b * ny - ay
+    norm = np.sqrt(dx * dx + dy * dy)
+    line[0], line[1] = dy / norm, -dx / norm
     line[2] = line[0] * ax + line[1] * ay
     return norm > 0.0
 
@@ -153,37 +157,44 @@ def _fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
     The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, center, lines = np.zeros(3), np.zeros(2), np.zeros((3, 3))
+    ink, beyond, lines = np.zeros(3), np.zeros(3), np.zeros((3, 3))
     moved = np.zeros((3, 2))
     for i in range(corners.shape[0]):
-        if not good[i]:
-            continue
         share, passes = WINDOW, 0
         while good[i]:
-            center[0], center[1] = corners[i, :, 0].mean(), corners[i, :, 1].mean()
-            size = np.hypot(corners[i, 0, 0] - center[0], corners[i, 0, 1] - center[1])
-            good[i] = sample_patch(flat, height, width, center[0], center[1], 0.2 * size, ink)
-            for k in range(3):
-                good[i] = good[i] and _edge_line(
-                    flat, height, width, corners[i, k], corners[i, (k + 1) % 3], center, ink, share, lines[k]
-                )
-            for k in range(3):
-                before, after = lines[(k + 2) % 3], lines[k]
-                sine = before[0] * after[1] - before[1] * after[0]
-                if not good[i] or abs(sine) < MIN_SINE:
-                    good[i] = False
-                    break
-                moved[k, 0] = (before[2] * after[1] - before[1] * after[2]) / sine
-                moved[k, 1] = (before[0] * after[2] - before[2] * after[0]) / sine
-                shift = np.hypot(moved[k, 0] - corners[i, k, 0], moved[k, 1] - corners[i, k, 1])
-                good[i] = shift < MAX_CORNER_SHIFT * size
-            if not good[i]:
+            a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
+            cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
+            size = np.sqrt((a[0] - cx) ** 2 + (a[1] - cy) ** 2)
+            if not (
+                sample_patch(flat, height, width, cx, cy, 0.2 * size, ink)
+                and _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, lines[0])
+                and _edge_line(flat, height, width, b, c, cx, cy, ink, share, beyond, lines[1])
+                and _edge_line(flat, height, width, c, a, cx, cy, ink, share, beyond, lines[2])
+                and _meeting(lines, corners[i], MAX_CORNER_SHIFT * size, moved)
+            ):
+                good[i] = False
                 break
             corners[i] = moved
             passes += 1
             if passes == 3 or share * size < 2 * FINE_REACH_PX:
                 break
             share = max(0.25 * share, 2 * FINE_REACH_PX / size)
+
+
+@compiled
+def _meeting(lines, corners, limit, moved):  # type: ignore[no-untyped-def]
+    """Write where the lines of edges meet, corner by corner; False where one does not or lies beyond the limit."""
+    for k in range(3):
+        before, after = lines[(k + 2) % 3], lines[k]
+        sine = before[0] * after[1] - before[1] * after[0]
+        if not abs(sine) >= MIN_SINE:
+            return False
+        moved[k, 0] = (before[2] * after[1] - before[1] * after[2]) / sine
+        moved[k, 1] = (before[0] * after[2] - before[2] * after[0]) / sine
+        dx, dy = moved[k, 0] - corners[k, 0], moved[k, 1] - corners[k, 1]
+        if not dx * dx + dy * dy < limit * limit:
+            return False
+    return True
 
 
 def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:

@@ -39,6 +39,10 @@ def place_virtual(mesh: Topology, repaired: Repaired, points: NDArray[np.float64
     Lost where either marker of the edge is; interpolated where nothing was measured, as on gridlines that border black
     on both sides, or where what was measured lies too far off to be the gridline.
     """
+    if points.shape[1] == 0:
+        return Virtual(
+            points[..., :2], np.empty((len(points), 0, 2, 2)), np.empty((len(points), 0), np.uint8)
+        )
     maps = local_maps(repaired.xy_px, mesh.near, mesh.offset, mesh.stencil)
     known = repaired.status != Status.LOST
     tables = mesh.edges, mesh.near, mesh.offset
@@ -64,37 +68,32 @@ def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[n
         a, b = edges[e]
         if not (known[a] and known[b]):
             continue
-        cx, cy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
-        length = np.hypot(cx, cy)
+        x0, y0 = xy[a]
+        cx, cy = xy[b, 0] - x0, xy[b, 1] - y0
+        length = np.sqrt(cx * cx + cy * cy)
+        tx, ty = cx / length, cy / length
         ax, ay = _tangent(maps, near, offset, a, b, (cx, cy))
         bx, by = _tangent(maps, near, offset, b, a, (-cx, -cy))
         for j in range(m):
             t = (j + 1.0) / (m + 1.0)
             s = 1.0 - t
             # a cubic through both markers with the map's derivatives there
-            start, end, leave, arrive = s * s * (1 + 2 * t), t * t * (3 - 2 * t), s * s * t, s * t * t
-            x = start * xy[a, 0] + end * xy[b, 0] + leave * ax + arrive * bx
-            y = start * xy[a, 1] + end * xy[b, 1] + leave * ay + arrive * by
-            hidden = BENT**2 * ((x - xy[a, 0] - t * cx) ** 2 + (y - xy[a, 1] - t * cy) ** 2)
-            for i in range(2):
-                for k in range(2):
-                    spread[e, j, i, k] = s * s * cov[a, i, k] + t * t * cov[b, i, k]
-                spread[e, j, i, i] += hidden
+            end, leave, arrive = t * t * (3 - 2 * t), s * s * t, s * t * t
+            x = end * cx + leave * ax + arrive * bx
+            y = end * cy + leave * ay + arrive * by
+            hidden = BENT**2 * ((x - t * cx) ** 2 + (y - t * cy) ** 2)
+            xx = s * s * cov[a, 0, 0] + t * t * cov[b, 0, 0] + hidden
+            cross = s * s * cov[a, 0, 1] + t * t * cov[b, 0, 1]
+            yy = s * s * cov[a, 1, 1] + t * t * cov[b, 1, 1] + hidden
+            across = (points[e, j, 1] - y0 - y) * tx - (points[e, j, 0] - x0 - x) * ty
             status[e, j] = VirtualStatus.INTERPOLATED
-            tx, ty = cx / length, cy / length
-            across = (points[e, j, 1] - y) * tx - (points[e, j, 0] - x) * ty
             if abs(across) < MAX_APART * length:  # not where there is none
                 x, y = x - across * ty, y + across * tx
-                along = (
-                    spread[e, j, 0, 0] * tx * tx
-                    + 2 * spread[e, j, 0, 1] * tx * ty
-                    + spread[e, j, 1, 1] * ty * ty
-                )
-                aside = points[e, j, 2]
-                spread[e, j, 0, 0] = along * tx * tx + aside * ty * ty
-                spread[e, j, 1, 1] = along * ty * ty + aside * tx * tx
-                spread[e, j, 0, 1] = (along - aside) * tx * ty
-                spread[e, j, 1, 0] = spread[e, j, 0, 1]
+                along, aside = xx * tx * tx + 2 * cross * tx * ty + yy * ty * ty, points[e, j, 2]
+                xx, cross = along * tx * tx + aside * ty * ty, (along - aside) * tx * ty
+                yy = along * ty * ty + aside * tx * tx
                 status[e, j] = VirtualStatus.MEASURED
-            places[e, j, 0], places[e, j, 1] = x, y
+            places[e, j, 0], places[e, j, 1] = x0 + x, y0 + y
+            spread[e, j, 0, 0], spread[e, j, 1, 1] = xx, yy
+            spread[e, j, 0, 1], spread[e, j, 1, 0] = cross, cross
     return places, spread, status

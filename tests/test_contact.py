@@ -254,6 +254,24 @@ def test_every_object_lies_on_the_surface(thing: Ball) -> None:
     assert found.force_n[2] < 0
 
 
+@pytest.mark.parametrize("motion", [Motion(1.0, (0.8, 0.0)), Motion(1.0, twist_deg=20.0)])
+def test_sheared_and_twisted_contacts_take_few_answers(motion: Motion) -> None:
+    """The layer's answer is what a contact's time goes into: eight increments, of which four are solved twice."""
+    found = solve(LAYER, Ball(12.0), motion, size_mm=(24, 24), grid=96)
+    assert found.iterations < 360 and not [one for one in found.warnings if "solver" in one]
+
+
+def test_much_friction_is_solved_too() -> None:
+    """Where the limit follows the pressure by so much that renewing it at every step runs in circles."""
+    for thing, layer in (
+        (Ring(4.0, 1.0), Elastomer(THICK, 0.3, 0.3)),
+        (Cube(6.0, 0.3), Elastomer(10.0, 0.3, 0.3)),
+    ):
+        found = solve(layer, thing, Motion(0.45, twist_deg=40.0), friction=3.0, size_mm=(20, 20), grid=64)
+        assert not [one for one in found.warnings if "solver" in one]
+        assert found.iterations < 3000
+
+
 def test_surface_is_the_displacement_between_and_zero_far_away() -> None:
     found = solve(LAYER, Ball(8.0), Motion(0.6, (0.2, 0)), size_mm=(16, 12), grid=64)
     surface = found.surface()

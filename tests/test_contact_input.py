@@ -203,6 +203,10 @@ def test_modulus_scales_forces_alone() -> None:
     soft, hard = (solve(Elastomer(4.0, e), Ball(8.0), Motion(0.4, (0.2, 0)), **SMALL) for e in (0.1, 10.0))
     np.testing.assert_allclose(hard.force_n, 100 * soft.force_n, rtol=1e-4, atol=1e-9)
     np.testing.assert_allclose(hard.displacement_mm, soft.displacement_mm, atol=1e-4)
+    # Far beyond what single precision holds.
+    for young in (1e-30, 1e30):
+        found = solve(Elastomer(4.0, young), Ball(8.0), Motion(0.4, (0.2, 0)), **SMALL)
+        np.testing.assert_allclose(found.force_n / young, soft.force_n / 0.1, rtol=1e-4, atol=1e-6)
 
 
 TABLE = """

@@ -164,8 +164,30 @@ def test_reciprocity_and_energy(thickness: float, nu: float) -> None:
     scale = np.sqrt(np.sum(one * operator(one)) * np.sum(other * operator(other)))
     assert abs(there - back) < 1e-12 * scale
     assert np.sum(one * operator(one)) > 0
-    assert np.sum(one * operator(one)) <= operator.largest * np.sum(one * one)
-    np.testing.assert_allclose(operator.normal(one[2]), operator(one * [[[0]], [[0]], [[1]]])[2], atol=1e-12)
+    assert np.sum(one * operator(one)) <= operator.largest(3) * np.sum(one * one)
+    alone = operator(one[2:])
+    np.testing.assert_allclose(alone[0], operator(one * [[[0]], [[0]], [[1]]])[2], atol=1e-12)
+    assert np.sum(one[2:] * alone) <= operator.largest(1) * np.sum(one[2:] * one[2:])
+    single = operator(one.astype(np.float32))
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, operator(one), atol=3e-6 * np.abs(operator(one)).max())
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+@pytest.mark.parametrize("thickness", [0.2, 3.0, 1e3])
+def test_preconditioner_is_symmetric_positive_and_near_the_inverse(thickness: float, nu: float) -> None:
+    """Of what it undoes, the layer makes nearly what was given."""
+    shape = (16, 12)
+    operator = Operator(green(Elastomer(thickness, 1.0, nu), 0.1, 32), shape)
+    for components in (1, 3):
+        one, other = (load[-components:].astype(np.float32) for load in random_loads(shape))
+        there, back = np.vdot(one, operator.undo(other)), np.vdot(other, operator.undo(one))
+        scale = np.sqrt(np.vdot(one, operator.undo(one)) * np.vdot(other, operator.undo(other)))
+        assert abs(there - back) < 1e-5 * scale and np.vdot(one, operator.undo(one)) > 0
+        unit = np.eye(components * 16 * 12, dtype=np.float32).reshape(-1, components, *shape)
+        product = np.stack([operator(operator.undo(load)).ravel() for load in unit])
+        found = np.abs(np.linalg.eigvals(product.astype(np.float64)))
+        assert found.max() / found.min() < 10
 
 
 def test_fourier_sum_is_the_plain_sum() -> None:

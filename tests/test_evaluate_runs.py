@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.evaluate import journal
 from cmpdesign.evaluate.journal import NAME, Journal, fingerprint
 from cmpdesign.evaluate.runner import Options, Trial, rng, run
 
@@ -29,8 +30,8 @@ def interrupted(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def all_of(folder: Path, work: Any = drawn, trials: list[Trial] = TRIALS, workers: int = 1) -> list[Any]:
-    with Journal(folder, CONDITIONS) as journal:
-        return run(work, trials, journal, workers=workers, title="test", show=False)
+    with Journal(folder, CONDITIONS) as kept:
+        return run(work, trials, kept, workers=workers, title="test", show=False)
 
 
 def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
@@ -79,6 +80,47 @@ def test_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / NAME).write_text("not a journal\n")
     with pytest.raises(CmpDesignError, match="is not the journal"):
         Journal(tmp_path, CONDITIONS)
+
+
+def test_a_run_of_other_code_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    all_of(tmp_path, trials=TRIALS[:2])
+    before = (tmp_path / NAME).read_bytes()
+    monkeypatch.setattr(journal, "code_digest", lambda: "0" * 64)
+    with pytest.raises(CmpDesignError, match=r"begun by other code.*another folder, or remove"):
+        Journal(tmp_path, CONDITIONS)
+    assert (tmp_path / NAME).read_bytes() == before
+    (tmp_path / NAME).unlink()
+    assert len(all_of(tmp_path)) == len(TRIALS)
+
+
+def test_the_code_digest_knows_every_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A changed line, a new file and a new name each make another digest; other packages do not count."""
+    package = tmp_path / "measured_code"
+    (package / "inner").mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "inner" / "one.py").write_text("LIMIT = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(journal, "SOURCES", ("measured_code",))
+    digest = journal.code_digest.__wrapped__
+    found = [digest(), digest()]
+    (package / "inner" / "one.py").write_text("LIMIT = 2\n")
+    found.append(digest())
+    (package / "inner" / "two.py").write_text("")
+    found.append(digest())
+    (package / "inner" / "two.py").rename(package / "two.py")
+    found.append(digest())
+    (package / "notes.txt").write_text("nothing that runs")
+    found.append(digest())
+    assert found[0] == found[1] and found[4] == found[5] and len(set(found)) == 4
+
+
+def test_two_runs_in_one_folder_do_not_meet(tmp_path: Path) -> None:
+    with Journal(tmp_path, CONDITIONS) as first:
+        with pytest.raises(CmpDesignError, match="in use by another run"):
+            Journal(tmp_path, CONDITIONS)
+        first.add("draw-0", {"value": 1.0})
+    with Journal(tmp_path, CONDITIONS) as second:
+        assert second.results == {"draw-0": {"value": 1.0}}
 
 
 def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path) -> None:

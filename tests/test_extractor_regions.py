@@ -112,11 +112,15 @@ def test_the_target_holds_the_pattern_and_leaves_out_what_lies_apart() -> None:
     assert not target.mask[60:, 60:].any()
 
 
+@pytest.mark.parametrize("pitch_px", [10.0, 26.0])
 @pytest.mark.parametrize("sigma", [1.0, 2.0, 5.0, 10.0])
-def test_noise_is_estimated_beside_edges(sigma: float) -> None:
-    clean = picture(noise=0.0).image.astype(np.float64)
-    noisy = clean * 0.7 + 30 + np.random.default_rng(0).normal(0, sigma, clean.shape)
-    assert estimate_noise(np.rint(noisy).astype(np.uint8)) == pytest.approx(sigma, rel=0.25)
+def test_noise_is_estimated_in_the_middle_of_the_cells(sigma: float, pitch_px: float) -> None:
+    seen = picture(noise=0.0, pitch_px=pitch_px)
+    noise = np.random.default_rng(0).normal(0, sigma, seen.image.shape)
+    noisy = np.rint(seen.image * 0.6 + 50 + noise).astype(np.uint8)
+    cells = parse_layout(small_text("honeycomb", 4)).cell_corners
+    assert estimate_noise(noisy, seen.truth.marker_xy_px, cells) == pytest.approx(sigma, rel=0.12)
+    assert np.isnan(estimate_noise(noisy, seen.truth.marker_xy_px + 1000, cells))
 
 
 def test_seeds_are_in_their_domains() -> None:

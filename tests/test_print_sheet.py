@@ -25,6 +25,7 @@ from cmpdesign.writers.print_sheet import make_print_sheet
 
 DPI = 200.0
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
+Points = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def design(**values: str) -> Design:
@@ -243,6 +244,84 @@ def test_pdf_is_true_to_size_and_the_same_again() -> None:
     )
     assert isinstance(first, bytes) and first == second and first.startswith(b"%PDF")
     assert b"/MediaBox [ 0 0 595.2756 841.8898 ]" in first
+
+
+MARK_DPI = 600
+ROUND = {"clip": "circle", "clip_diameter_mm": "16"}
+
+
+def pad_alone(renderer: str, **values: str) -> tuple[Points, Pixels]:
+    """A page's only pad: its outline in mm, and the page's upper part, dark where it is printed."""
+    import pypdfium2
+    import resvg_py
+
+    parameters = design(**{"sheet.pads": "1", **values})
+    layout = build_layout(parameters)
+    files = make_print_sheet(parameters, layout).files
+    svg, pdf = files["print/sheet.svg"], files["print/sheet.pdf"]
+    assert isinstance(svg, str) and isinstance(pdf, bytes)
+    if renderer == "svg":
+        png = bytes(resvg_py.svg_to_bytes(svg_string=svg, dpi=MARK_DPI))
+        picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE)
+    else:
+        picture = pypdfium2.PdfDocument(pdf)[0].render(scale=MARK_DPI / 72, grayscale=True).to_numpy()
+    return layout.outline_mm, np.asarray(picture[: int(100 / 25.4 * MARK_DPI)] < 140, np.uint8)
+
+
+def marks_in(printed: Pixels) -> tuple[Points, Points]:
+    """(M, 2, 2) both ends of every hairline, mm around the pad's middle, y up; (M,) its distance from the bleed."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(printed)
+    ground = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    away = cv2.distanceTransform(np.asarray(labels != ground, np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    left, top, width, height = (float(v) for v in stats[ground, :4])
+    middle = np.array([left + (width - 1) / 2, top + (height - 1) / 2])
+    ends, gaps = [], []
+    for label in range(1, len(stats)):
+        y, x = np.nonzero(labels == label)
+        # The color of cells is dark, too, and the ground surrounds it.
+        if label == ground or away[y, x].min() < 3:
+            continue
+        points = np.stack([x, y], -1) - middle
+        mean = points.mean(axis=0)
+        way = np.linalg.svd(points - mean, full_matrices=False)[2][0]
+        along = (points - mean) @ way
+        ends.append([mean + (along.min() - 0.5) * way, mean + (along.max() + 0.5) * way])
+        gaps.append(away[y, x].min())
+    mm = 25.4 / MARK_DPI
+    return np.array(ends) * (mm, -mm), np.array(gaps) * mm
+
+
+@pytest.mark.parametrize(
+    ("renderer", "values"),
+    [
+        ("svg", {}),
+        ("pdf", {"rotation_deg": "17", "sheet.bleed_mm": "0"}),
+        ("pdf", {"pattern": "square", "sheet.bleed_mm": "3"}),
+        ("pdf", ROUND),
+    ],
+    ids=["hexagon", "turned", "square", "round"],
+)
+def test_crop_marks_continue_the_sides(renderer: str, values: dict[str, str]) -> None:
+    outline, printed = pad_alone(renderer, **values)
+    ends, gaps = marks_in(printed)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    corners = outline - (low + high) / 2
+    if values is ROUND:
+        (left, bottom), (right, top) = low - (low + high) / 2, high - (low + high) / 2
+        corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    else:
+        assert gaps == pytest.approx(0.5, abs=0.06)
+    assert len(ends) == 2 * len(corners)
+    assert np.hypot(*(ends[:, 1] - ends[:, 0]).T) == pytest.approx(4.0, abs=0.09)
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        way = (end - start) / np.hypot(*(end - start))
+        off = (ends - start) @ (-way[1], way[0])
+        on_line = ends[(np.abs(off) < 0.05).all(axis=1)]
+        along = np.sort(((on_line - start) @ way).reshape(len(on_line), 2), axis=1)
+        beyond = np.hypot(*(end - start))
+        # One before the side's beginning, and one after its end.
+        assert len(on_line) == 2 and along.min() < -4 and along.max() > beyond + 4
+        assert not ((along > 0) & (along < beyond)).any()
 
 
 def test_as_many_pads_as_fit() -> None:

@@ -15,7 +15,7 @@ from cmpdesign.scene import Camera, Light, Press, Rendered, composed, render
 from cmpdesign.scene.camera import homography
 from extractor import Extractor, FrameStatus, StartKind, Status, Tracker
 from extractor.errors import LayoutError
-from extractor.warm import completed, tables_of
+from extractor.warm_tables import completed, tables_of
 
 WRONG_PX = 0.4 * PITCH_PX
 

@@ -29,11 +29,13 @@ class Green:
     """Displacement in mm at offsets (row, column) >= 0 cells for 1 MPa on one cell; the rest by symmetry.
 
     Attributes:
+        elastomer: the layer.
         zz, xx, yy, xy, xz, yz: (n, n) each; xz is u_x for t_z, odd in x. u_z for t_x is its negative.
         step_mm: the grid's step.
         reach: cells beyond which all of them are negligible.
     """
 
+    elastomer: Elastomer
     zz: Array
     xx: Array
     yy: Array
@@ -65,7 +67,9 @@ def green(elastomer: Elastomer, step_mm: float, cells: int) -> Green:
     zz, xx, xy, xz = total
     for kernel in (zz, xx, xy, xz):
         kernel.setflags(write=False)
-    return Green(zz=zz, xx=xx, yy=xx.T, xy=xy, xz=xz, yz=xz.T, step_mm=step_mm, reach=reach)
+    return Green(
+        elastomer=elastomer, zz=zz, xx=xx, yy=xx.T, xy=xy, xz=xz, yz=xz.T, step_mm=step_mm, reach=reach
+    )
 
 
 def _waves(

@@ -15,21 +15,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.contact.allowed import Friction, Pressure
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.green import green
 from cmpdesign.contact.grid import Grid
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects import Indenter
 from cmpdesign.contact.operator import Operator
-from cmpdesign.contact.quadratic import Friction, Pressure, minimise
+from cmpdesign.contact.quadratic import minimise
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Box = tuple[slice, slice]
 # The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
 TOLERANCE = 1e-4
-# With friction, whose limits have to be found as well, three tenths.
+# With friction, whose limits have to be found as well, three tenths; more where that is but a start, or where the
+# height is looked up again after.
 TOLERANCE_RUBBING = 3e-4
+TOLERANCE_BEFORE, TOLERANCE_START = 3e-3, 1e-2
+# The change of friction's limits, as a share of them, over the tolerance.
+STEADY = 1.7
 # Cells around what is near enough to touch.
 MARGIN = 3
 
@@ -57,7 +62,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What stays the same in all increments."""
+    """What stays the same in all increments; the elastomer is one of 1 MPa."""
 
     elastomer: Elastomer
     indenter: Indenter
@@ -79,9 +84,10 @@ class Problem:
         return self.operators[shape]
 
     def answer_mm(self, traction_mpa: Array) -> Array:
-        """Displacement (3, ny, nx) of all cells."""
+        """Displacement (3, ny, nx) of all cells, in single precision: what errs is a millionth of the solver's gap."""
         rows, columns = self.grid.shape
-        return self.operator((slice(0, rows), slice(0, columns)))(traction_mpa)
+        whole = self.operator((slice(0, rows), slice(0, columns)))
+        return whole(traction_mpa.astype(np.float32)).astype(np.float64)
 
 
 def untouched(motion: Motion, shape: tuple[int, int]) -> State:
@@ -140,12 +146,17 @@ def _solved(
     if problem.friction > 0:
         wanted = _wanted(grid, state, motion, centre)
         # Where the object slides its height over a point changes; it is looked up again with what has slid so far.
-        for again in (False,) if pressing else (False, True):
-            if again:
-                moved = grid.xy_mm + problem.answer_mm(traction)[:2] - state.settled_mm
-                height = problem.height_mm(motion.brought_back(moved, centre))
-            traction, limit[box], more, left = _rubbed(problem, traction, height, wanted, motion, box)
+        if not pressing:
+            traction, _, more, _ = _rubbed(problem, traction, height, wanted, motion, box, TOLERANCE_BEFORE)
             applied += more
+            moved = grid.xy_mm + problem.answer_mm(traction)[:2] - state.settled_mm
+            height = problem.height_mm(motion.brought_back(moved, centre))
+            traction, more, _ = _pressed(problem, traction, height, motion, box)
+            applied += more
+        traction, limit[box], more, left = _rubbed(
+            problem, traction, height, wanted, motion, box, TOLERANCE_RUBBING
+        )
+        applied += more
     displacement = problem.answer_mm(traction)
     settled = state.settled_mm + (displacement - state.displacement_mm)[:2] if pressing else state.settled_mm
     found = State(motion, traction, displacement, settled, limit, state.iterations + applied, left)
@@ -162,29 +173,35 @@ def _wanted(grid: Grid, state: State, motion: Motion, centre_mm: tuple[float, fl
 def _pressed(
     problem: Problem, traction: Array, height: Array, motion: Motion, box: Box
 ) -> tuple[Array, int, float]:
-    """Tractions whose pressure leaves no gap, friction held as it is."""
+    """Tractions whose pressure leaves no gap, friction held as it is; with friction, this is but a start."""
     operator, inside = problem.operator(box), (..., *box)
     held = traction[inside].copy()
     start, held[2] = held[2].copy(), 0.0
-    offset = operator(held)[2] if held.any() else 0.0
+    offset = operator(held.astype(np.float32))[2] if held.any() else 0.0
     touchable = np.isfinite(height[box])
     target = np.where(touchable, height[box], 0.0) - motion.press_mm - offset
     z = minimise(
-        operator.normal,
-        target,
-        Pressure(touchable),
-        start,
-        largest=operator.largest_normal,
-        tolerance_mm=TOLERANCE * motion.press_mm,
+        operator,
+        target[None],
+        Pressure(touchable[None]),
+        start[None],
+        tolerance_mm=(TOLERANCE_START if problem.friction > 0 else TOLERANCE) * motion.press_mm,
+        checked=problem.friction == 0,
     )
     found = np.zeros_like(traction)
     found[inside] = held
-    found[(2, *box)] = z.traction_mpa
+    found[(2, *box)] = z.traction_mpa[0]
     return found, z.applied, z.left_mm
 
 
 def _rubbed(
-    problem: Problem, traction: Array, height: Array, wanted: Array, motion: Motion, box: Box
+    problem: Problem,
+    traction: Array,
+    height: Array,
+    wanted: Array,
+    motion: Motion,
+    box: Box,
+    tolerance: float,
 ) -> tuple[Array, Array, int, float]:
     """Tractions with friction up to the friction coefficient times the pressure, and that limit in the box."""
     operator, inside = problem.operator(box), (..., *box)
@@ -195,8 +212,9 @@ def _rubbed(
         target,
         Friction.at(touchable, problem.friction, traction[(2, *box)]),
         traction[inside],
-        largest=operator.largest,
-        tolerance_mm=TOLERANCE_RUBBING * motion.press_mm,
+        tolerance_mm=tolerance * motion.press_mm,
+        steady=STEADY * tolerance,
+        checked=tolerance <= TOLERANCE_RUBBING,
     )
     found = np.zeros_like(traction)
     found[inside] = t.traction_mpa

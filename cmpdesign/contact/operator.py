@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact.green import Green
+from cmpdesign.contact.inverse import Inverse
 
 Array = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+Single = NDArray[np.float32]
+# In double or single precision.
+Field = NDArray[Any]
+Spectrum = NDArray[Any]
 
 
 class Operator:
@@ -24,61 +30,66 @@ class Operator:
         self.shape = shape
         self.padded = tuple(int(next_fast_len(n + min(n, green.reach), real=True)) for n in shape)
 
-        def spectrum(kernel: Array, odd_y: bool, odd_x: bool) -> Array:
+        def spectrum(kernel: Array, odd_y: bool, odd_x: bool) -> Field:
             whole = rfft2(_wrapped(kernel, self.padded, odd_y, odd_x), workers=1)
             return np.ascontiguousarray(whole.imag if odd_y != odd_x else whole.real)
 
-        self._zz = spectrum(green.zz, False, False)
-        self._xx = spectrum(green.xx, False, False)
-        self._yy = spectrum(green.yy, False, False)
-        self._xy = spectrum(green.xy, True, True)
-        self._xz = spectrum(green.xz, False, True)
-        self._yz = spectrum(green.yz, True, False)
-        self._found = np.empty((3, *self._zz.shape), dtype=np.complex128)
-        self._part = np.empty(self._zz.shape, dtype=np.complex128)
-        self.largest = self._largest()
-        self.largest_normal = float(np.abs(self._zz).max())
+        zz = spectrum(green.zz, False, False)
+        xx, yy = spectrum(green.xx, False, False), spectrum(green.yy, False, False)
+        xy = spectrum(green.xy, True, True)
+        xz, yz = spectrum(green.xz, False, True), spectrum(green.yz, True, False)
+        self._spectra: dict[Any, list[Field]] = {
+            np.dtype(kind): [one.astype(kind) for one in (xx, yy, zz, xy, xz, yz)]
+            for kind in (np.float64, np.float32)
+        }
+        self._inverse = Inverse.of(green, shape)
+        self._largest = {1: float(np.abs(zz).max()), 3: _bound(xx, yy, zz, xy, xz, yz)}
+        self.stiffest = self._inverse.stiffest
 
-    def _largest(self) -> float:
-        """A bound on all eigenvalues in mm/MPa: of the plane's block, then of that with z."""
-        plane = (self._xx + self._yy) / 2 + np.hypot((self._xx - self._yy) / 2, self._xy)
-        both = (plane + self._zz) / 2 + np.hypot((plane - self._zz) / 2, np.hypot(self._xz, self._yz))
-        return float(both.max())
+    def largest(self, components: int) -> float:
+        """At least the largest eigenvalue in mm/MPa, for z alone (1) or all three components."""
+        return self._largest[components]
 
-    def __call__(self, traction_mpa: Array) -> Array:
-        """Displacement (3, rows, columns) in mm of the traction (3, rows, columns) in MPa."""
-        # The spectra of xz and yz are imaginary; with z turned by i, the equations are real and symmetric.
-        x, y, z = self._forward(traction_mpa)
-        z *= 1j
-        found, part = self._found, self._part
-        for axis, (from_x, from_y, from_z) in enumerate(
-            ((self._xx, self._xy, self._xz), (self._xy, self._yy, self._yz), (self._xz, self._yz, self._zz))
-        ):
-            np.multiply(from_x, x, out=found[axis])
-            found[axis] += np.multiply(from_y, y, out=part)
-            found[axis] += np.multiply(from_z, z, out=part)
-        found[2] *= -1j
-        return self._back(found)
+    def undo(self, displacement_mm: Single) -> Single:
+        """About the traction that makes a displacement, both as in a call; symmetric and positive definite."""
+        return self._inverse(displacement_mm)
 
-    def normal(self, traction_z_mpa: Array) -> Array:
-        """Displacement z (rows, columns) in mm of the traction z (rows, columns) in MPa alone."""
-        found: Array = self._back(self._forward(traction_z_mpa[None]) * self._zz)[0]
-        return found
+    def __call__(self, traction_mpa: Field) -> Field:
+        """Displacement in mm of the traction in MPa, both (3, rows, columns), or (1, rows, columns) for z alone.
 
-    def _forward(self, values: Array) -> Spectrum:
+        In single precision if the traction is.
+        """
+        from cmpdesign.contact.spectra import answer_waves
+
+        spectra = self._spectra[traction_mpa.dtype]
+        waves = self._forward(traction_mpa)
+        if len(waves) == 1:
+            waves *= spectra[2]
+        else:
+            answer_waves(waves.view(spectra[0].dtype).reshape(*waves.shape, 2), *spectra)
+        return self._back(waves)
+
+    def _forward(self, values: Field) -> Spectrum:
         """The padded spectrum; the padding's rows are not transformed along x, as they are empty."""
         from scipy.fft import fft, rfft
 
         along = rfft(values, n=self.padded[1], axis=2, workers=1)
         return np.asarray(fft(along, n=self.padded[0], axis=1, workers=1, overwrite_x=True))
 
-    def _back(self, spectrum: Spectrum) -> Array:
+    def _back(self, spectrum: Spectrum) -> Field:
         """The box's part of the values."""
         from scipy.fft import ifft, irfft
 
         rows, columns = self.shape
         along = ifft(spectrum, axis=1, workers=1, overwrite_x=True)[:, :rows]
         return np.asarray(irfft(along, n=self.padded[1], axis=2, workers=1)[:, :, :columns])
+
+
+def _bound(xx: Array, yy: Array, zz: Array, xy: Array, xz: Array, yz: Array) -> float:
+    """A bound on all eigenvalues in mm/MPa: of the plane's block, then of that with z."""
+    plane = (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
+    both = (plane + zz) / 2 + np.hypot((plane - zz) / 2, np.hypot(xz, yz))
+    return float(both.max())
 
 
 def _wrapped(kernel: Array, padded: tuple[int, ...], odd_y: bool, odd_x: bool) -> Array:

@@ -1,122 +1,36 @@
-"""Contact as a quadratic program: conjugate gradients on the free tractions, projection onto what friction allows.
+"""Contact as a quadratic program: Newton steps on the tractions that are free, by preconditioned conjugate gradients.
 
 Minimise  1/2 t.Ct - t.b  over  t_z <= 0 (no adhesion)  and  |(t_x, t_y)| <= limit  in every cell. Its gradient Ct - b
-is the gap that is left: 0 where tractions are free, of one sign where they are not. This is the conjugate gradient
-method with an active set of Polonsky & Keer (Wear 231, 1999) and Rey, Anciaux & Molinari (Comput. Mech. 60, 2017), with
-the rule of Dostal's MPRGP for when to let bound tractions go.
+is the gap that is left: 0 where tractions are free, of one sign where they are not. Each step guesses from tractions
+and gap what presses, sticks and slips (the primal-dual active set of Hintermueller, Ito & Kunisch, SIAM J. Optim. 13,
+2003), and then closes the gap of those for a while: what slips may turn its friction along the limit's circle. The
+layer's inverse in Fourier space, where it is diagonal but for the edges, is the preconditioner.
 
-Coulomb's limit is the friction coefficient times the pressure that is sought. It is renewed from the pressure so far
-while the iteration runs, which ends when the limit is steady too: Panagiotopoulos' fixed point (1975), but not solved
-out for every limit on the way.
+Coulomb's limit is the friction coefficient times the pressure that is sought. It is renewed from the pressure before
+every step: Panagiotopoulos' fixed point (1975), but not solved out for every limit on the way.
+
+Steps are made with single precision, which is as good as the tolerance by far. What is handed out was checked, and
+corrected, with double, unless it is but a start.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.contact.allowed import Allowed, Face
+from cmpdesign.contact.operator import Operator
+
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Single = NDArray[np.float32]
 MOST_ITERATIONS = 2000
-# Applications of the operator between two renewals of the limit, and the change of the limit that is taken for none.
-RENEW_AFTER, STEADY = 10, 5e-4
-# Gradient steps are this long over the largest eigenvalue; up to 2 they descend.
-STEP = 1.9
-
-
-class Allowed(Protocol):
-    """The set of tractions to choose from."""
-
-    @property
-    def limit_mpa(self) -> Array:
-        """The most shear in every cell."""
-
-    def project(self, t: Array) -> Array:
-        """The nearest allowed tractions."""
-
-    def free(self, t: Array) -> Mask:
-        """Components that may move both ways."""
-
-    def renewed(self, t: Array) -> Self:
-        """The set with its limits taken from these tractions."""
-
-    def change(self, t: Array) -> float:
-        """How far that would move the limits, as a share of them."""
-
-
-@dataclass(frozen=True)
-class Friction:
-    """Tractions (3, rows, columns): pressure where ``touchable``, shear up to ``limit_mpa``."""
-
-    touchable: Mask
-    coefficient: float
-    limit_mpa: Array
-
-    @classmethod
-    def at(cls, touchable: Mask, coefficient: float, traction_z_mpa: Array) -> Self:
-        """With the limit of these pressures; without limit where they press if the coefficient is infinite."""
-        pressed = traction_z_mpa < 0
-        if np.isinf(coefficient):
-            return cls(touchable, coefficient, np.where(pressed, np.inf, 0.0))
-        return cls(touchable, coefficient, np.where(pressed, -coefficient * traction_z_mpa, 0.0))
-
-    def project(self, t: Array) -> Array:
-        """The nearest allowed tractions."""
-        found = np.empty_like(t)
-        found[2] = np.where(self.touchable, np.minimum(t[2], 0.0), 0.0)
-        size = np.hypot(t[0], t[1])
-        over = size > self.limit_mpa
-        shrink = np.where(over, self.limit_mpa, 1.0) / np.where(over, size, 1.0)
-        found[:2] = t[:2] * shrink
-        return found
-
-    def free(self, t: Array) -> Mask:
-        """Where it sticks, and where it presses."""
-        sticks = np.hypot(t[0], t[1]) < self.limit_mpa * (1 - 1e-12)
-        return np.stack([sticks, sticks, t[2] < 0])
-
-    def renewed(self, t: Array) -> Self:
-        """With the limit of these tractions' pressure."""
-        return self.at(self.touchable, self.coefficient, t[2])
-
-    def change(self, t: Array) -> float:
-        """Sum of the limit's changes over its sum; of cells, where there is no limit."""
-        new, old = self.renewed(t).limit_mpa, self.limit_mpa
-        if np.isinf(self.coefficient):
-            return float(np.count_nonzero(new != old) / max(int(np.count_nonzero(old)), 1))
-        return float(np.abs(new - old).sum() / max(float(old.sum()), 1e-300))
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """Pressure alone: tractions (rows, columns), z only."""
-
-    touchable: Mask
-
-    @property
-    def limit_mpa(self) -> Array:
-        """No shear."""
-        return np.zeros(self.touchable.shape)
-
-    def project(self, t: Array) -> Array:
-        """The nearest allowed tractions."""
-        return np.where(self.touchable, np.minimum(t, 0.0), 0.0)
-
-    def free(self, t: Array) -> Mask:
-        """Where it presses."""
-        return np.asarray(t < 0)
-
-    def renewed(self, t: Array) -> Self:
-        """Itself: nothing here depends on the tractions."""
-        return self
-
-    def change(self, t: Array) -> float:
-        """None."""
-        return 0.0
+# How far the gap pulls tractions when guessing what slips and lets go, over the largest eigenvalue. Guesses that do not
+# lead to a smaller gap within some steps are made with less, and the limit then stays until its problem is solved.
+PULL, LEAST_PULL, STALLED = 4.0, 1.0, 8
+# A step ends when the gap of what is free has shrunk to this, or after so many conjugate gradients.
+SHRUNK, MOST_DIRECTIONS = 0.1, 3
 
 
 class Minimum(NamedTuple):
@@ -132,61 +46,82 @@ class Minimum(NamedTuple):
 
 
 def minimise(
-    apply: Callable[[Array], Array],
+    operator: Operator,
     b: Array,
     allowed: Allowed,
     t: Array,
     *,
-    largest: float,
     tolerance_mm: float,
+    steady: float = 0.0,
+    checked: bool = True,
 ) -> Minimum:
     """Tractions that leave no more than ``tolerance_mm`` of gap, as a root mean square over the loaded cells.
 
     Args:
-        apply: the operator C; ``largest`` is at least its largest eigenvalue.
+        operator: the layer's answer C.
         b: the displacement that the object asks for, shaped as t.
-        t: where to start.
+        t: where to start, (3, rows, columns), or (1, rows, columns) for pressure alone.
+        steady: the change of the limit that is taken for none.
+        checked: with double precision, before it is handed out.
     """
-    step = STEP / largest
+    largest = operator.largest(len(t))
     t = allowed.project(t)
-    gap = apply(t) - b
-    applied, renewed, ahead, before = 1, 0, None, 1.0
+    gap, applied, exact = operator(t.astype(np.float32)) - b, 1, False
+    pull, patient = PULL, False
+    left, least, stalled = np.inf, np.inf, 0
     while True:
-        free = allowed.free(t)
-        to_go = (t - allowed.project(t - gap / largest)) * largest
-        left = float(np.sqrt(np.sum(to_go**2) / max(int(np.count_nonzero(free)), 1)))
-        done = left <= tolerance_mm
-        if applied >= MOST_ITERATIONS or (done and allowed.change(t) <= STEADY):
+        change = allowed.change(t)
+        if not patient or left <= tolerance_mm:
+            allowed, least = allowed.renewed(t), np.inf if patient else least
+        face = allowed.face(t, t - pull / largest * gap)
+        if (face.base_mpa != t).any():
+            gap, exact = gap + operator((face.base_mpa - t).astype(np.float32)), False
+            applied += 1
+            t = face.base_mpa
+        left = _left(allowed, t, gap, largest)
+        if checked and not exact and left <= tolerance_mm and change <= steady:
+            gap, exact = operator(t) - b, True
+            applied += 1
+            left = _left(allowed, t, gap, largest)
+        if applied >= MOST_ITERATIONS or (left <= tolerance_mm and change <= steady):
             return Minimum(t, allowed, applied, left)
-        if done or (ahead is None and applied - renewed >= RENEW_AFTER):
-            allowed = allowed.renewed(t)
-            t, renewed, ahead = allowed.project(t), applied, None
-            gap = apply(t) - b
-            applied += 1
-            free = allowed.free(t)
-            to_go = (t - allowed.project(t - gap / largest)) * largest
-        inside = np.where(free, gap, 0.0)
-        strength = float(np.sum(inside * inside))
-        if float(np.sum(np.where(free, 0.0, to_go) ** 2)) > strength:  # the free set is wrong: let go
-            t, ahead = allowed.project(t - step * gap), None
-            gap = apply(t) - b
-            applied += 1
-            continue
-        ahead = inside if ahead is None else np.where(free, inside + strength / before * ahead, 0.0)
+        least, stalled = (left, 0) if left < 0.9 * least else (least, stalled + 1)
+        if stalled >= STALLED:
+            pull, patient, least, stalled = max(pull / 2, LEAST_PULL), True, np.inf, 0
+        step, answer, more = _step(operator, face, gap, tolerance_mm)
+        # A step that moves nothing counts too, so that there is an end.
+        t, gap, applied, exact = t + step, gap + answer, applied + max(more, 1), False
+
+
+def _left(allowed: Allowed, t: Array, gap: Array, largest: float) -> float:
+    """Root mean square in mm of the gap that allowed tractions could still close, over the free components."""
+    to_go = (t - allowed.project(t - gap / largest)) * largest
+    return float(np.sqrt(np.sum(to_go**2) / max(int(np.count_nonzero(allowed.free(t))), 1)))
+
+
+def _step(operator: Operator, face: Face, gap: Array, tolerance_mm: float) -> tuple[Single, Single, int]:
+    """A change of the tractions that closes most of the gap of what is free, its answer, and applications of C."""
+    step, answer = np.zeros_like(gap, dtype=np.float32), np.zeros_like(gap, dtype=np.float32)
+    turning = face.turning(gap)
+    # What turns with effort is scaled down to what the layer's inverse is made for.
+    soft = np.ones_like(step)
+    soft[:-1] = np.sqrt(operator.stiffest / (operator.stiffest + turning))
+    rest = face.tangent(-gap.astype(np.float32))
+    free = float(np.count_nonzero(face.moves))
+    enough = max(SHRUNK**2 * float(np.vdot(rest, rest)), 0.1 * tolerance_mm**2 * free)
+    ahead, before = np.zeros_like(step), np.inf
+    for applied in range(MOST_DIRECTIONS + 1):
+        if applied == MOST_DIRECTIONS or float(np.vdot(rest, rest)) <= enough:
+            break
+        undone = face.tangent(soft * operator.undo(soft * rest))
+        strength = float(np.vdot(rest, undone))
+        ahead = undone + (strength / before) * ahead
+        moved = operator(ahead)
+        resisted = moved.copy()
+        resisted[:-1] += turning * ahead[:-1]
+        way = strength / float(np.vdot(ahead, resisted))
+        step += way * ahead
+        answer += way * moved
+        rest -= way * face.tangent(resisted)
         before = strength
-        answer = apply(ahead)
-        applied += 1
-        way = float(np.sum(inside * ahead)) / float(np.sum(ahead * answer))
-        full = t - way * ahead
-        cut = allowed.project(full)
-        if np.array_equal(cut, full):
-            t, gap = full, gap - way * answer
-            continue
-        cut = allowed.project(cut - step * (apply(cut) - b))
-        new_gap, ahead = apply(cut) - b, None
-        applied += 2
-        if np.sum(cut * (new_gap - b)) > np.sum(t * (gap - b)):  # twice the energy; a gradient step lowers it
-            cut = allowed.project(t - step * gap)
-            new_gap = apply(cut) - b
-            applied += 1
-        t, gap = cut, new_gap
+    return step, answer, applied

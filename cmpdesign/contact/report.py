@@ -17,12 +17,15 @@ Array = NDArray[np.float64]
 FEWEST_CELLS = 12
 
 
-def report(problem: Problem, state: State) -> Contact:
-    """The contact of a state: forces, strain and warnings worked out, fields turned to (ny, nx, 3)."""
+def report(problem: Problem, state: State, young_mpa: float) -> Contact:
+    """The contact of a state: forces, strain and warnings worked out, fields turned to (ny, nx, 3).
+
+    The state is that of a layer of 1 MPa; tractions and forces are scaled to ``young_mpa``.
+    """
     grid, traction, moved = problem.grid, state.traction_mpa, state.displacement_mm
     strain = largest_strain(problem.elastomer, moved, traction, grid.step_mm)
     friction = np.hypot(traction[0], traction[1])
-    fields = [np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (moved, traction)]
+    fields = [np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (moved, young_mpa * traction)]
     found = Contact(
         x_mm=grid.x_mm,
         y_mm=grid.y_mm,
@@ -30,8 +33,8 @@ def report(problem: Problem, state: State) -> Contact:
         traction_mpa=fields[1],
         in_contact=state.in_contact,
         slipping=state.in_contact & (friction >= (1 - 1e-9) * state.limit_mpa),
-        force_n=traction.sum(axis=(1, 2)) * grid.step_mm**2,
-        moment_nmm=_moment(problem, state),
+        force_n=young_mpa * traction.sum(axis=(1, 2)) * grid.step_mm**2,
+        moment_nmm=young_mpa * _moment(problem, state),
         largest_strain=strain,
         warnings=tuple(_warnings(problem, state, strain)),
         iterations=state.iterations,
@@ -55,7 +58,10 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
     step, thickness = problem.grid.step_mm, problem.elastomer.thickness_mm
     if not state.in_contact.any():
         if state.motion.press_mm > 0:
-            yield "the object touches nothing in the solved area; move centre_mm or take a larger size_mm"
+            yield (
+                "the object touches nothing in the solved area; move centre_mm, take a larger size_mm or a finer grid, "
+                "or press more"
+            )
         return
     if strain > LINEAR_UP_TO:
         yield (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def solve(
         way += [motion.part(1.0, i / tangential) for i in range(1, tangential + 1)]
     problem = _problem(elastomer, indenter, friction, size_mm, grid)
     *_, last = _states(problem, way)
-    return report(problem, last)
+    return report(problem, last, elastomer.young_mpa)
 
 
 def solve_path(
@@ -66,14 +67,16 @@ def solve_path(
     """
     problem = _problem(elastomer, indenter, friction, size_mm, grid)
     for state in _states(problem, motions):
-        yield report(problem, state)
+        yield report(problem, state, elastomer.young_mpa)
 
 
 def _problem(
     elastomer: Elastomer, indenter: Indenter, friction: float, size_mm: tuple[float, float], grid: int
 ) -> Problem:
     require(friction >= 0, "friction", friction, "0 or more (math.inf sticks)")
-    return Problem(elastomer, indenter, float(friction), make_grid(size_mm, grid))
+    # Young's modulus scales forces and nothing else: solved with 1 MPa, whatever it is.
+    layer = replace(elastomer, young_mpa=1.0)
+    return Problem(layer, indenter, float(friction), make_grid(size_mm, grid))
 
 
 def _states(problem: Problem, motions: Sequence[Motion]) -> Iterator[State]:

@@ -45,6 +45,7 @@ class Folds:
         share: of the pattern's area that turns away.
         place_mm: (2,) where, in the layout.
         tolerance_mm: depths that differ by less count as the same sheet.
+        origin_mm: (2,) the centre of the flat picture's first texel, in the layout.
         texel_mm: of the flat picture.
     """
 
@@ -55,11 +56,12 @@ class Folds:
     share: float
     place_mm: Points
     tolerance_mm: float
+    origin_mm: Points
     texel_mm: float
 
     def texels_from_layout(self, xy_mm: Points) -> Points:
         """(..., 2) mm to texels of the flat picture; (0, 0) is the centre of its first."""
-        return np.asarray((xy_mm - self.corners_mm.min(axis=(0, 1))) / self.texel_mm)
+        return np.asarray((xy_mm - self.origin_mm) / self.texel_mm)
 
     @property
     def texture_size(self) -> tuple[int, int]:
@@ -106,7 +108,8 @@ def find_folds(
     around = ground[_touching(coarse, tiles)]
     xyd = _mapped(around, seen, FINE)
     corners_mm = _nodes(around, FINE).reshape(-1, 3, 2)
-    span_mm = float(np.ptp(corners_mm, axis=(0, 1)).max())
+    origin_mm = corners_mm.min(axis=(0, 1))
+    span_mm = float((corners_mm.max(axis=(0, 1)) - origin_mm).max())
     return Folds(
         xyd=xyd.reshape(-1, 3, 3),
         corners_mm=corners_mm,
@@ -115,6 +118,7 @@ def find_folds(
         share=share,
         place_mm=place,
         tolerance_mm=DEPTH_SHARE * pitch_mm(layout),
+        origin_mm=origin_mm,
         texel_mm=max(pitch_mm(layout) / TEXELS, span_mm / LARGEST_TEXTURE),
     )
 
@@ -145,7 +149,9 @@ def _tiles(away: Points, area_size: tuple[int, int]) -> NDArray[np.int64]:
     low = np.floor((away[..., :2].min(axis=1) + 0.5) / TILE_PX).astype(np.int64)
     high = np.floor((away[..., :2].max(axis=1) + 0.5) / TILE_PX).astype(np.int64)
     touched = np.zeros((last[1] + 1, last[0] + 1), dtype=np.bool_)
-    for (left, top), (right, bottom) in zip(np.maximum(low, 0), np.minimum(high, last), strict=True):
+    for left, top, right, bottom in np.unique(
+        np.hstack([np.maximum(low, 0), np.minimum(high, last)]), axis=0
+    ):
         touched[top : bottom + 1, left : right + 1] = True
     rows, columns = np.nonzero(touched)
     return np.stack([columns, rows], axis=-1) * TILE_PX
@@ -153,7 +159,8 @@ def _tiles(away: Points, area_size: tuple[int, int]) -> NDArray[np.int64]:
 
 def _touching(coarse: Points, tiles: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(P,) which patches, as far as their coarse nodes tell, reach into or near one of the tiles."""
-    low, high = coarse[..., :2].min(axis=(1, 2)), coarse[..., :2].max(axis=(1, 2))
+    flat = np.ascontiguousarray(np.moveaxis(coarse[..., :2], -1, 0)).reshape(2, len(coarse), -1)
+    low, high = flat.min(axis=2).T, flat.max(axis=2).T
     margin = 0.25 * (high - low).max(axis=1, initial=0.0, keepdims=True) + 2
     found = np.zeros(len(coarse), dtype=np.bool_)
     for tile in tiles:
@@ -176,12 +183,21 @@ def add_hidden_parts(planes: Planes, folds: Folds, texture: Planes, blur_px: flo
     height, width = planes.shape[1:]
     reach = int(np.ceil(REACH_SIGMA * blur_px + 1)) if blur_px else 0
     offset = (np.arange(TILE_PX * SAMPLES) + 0.5) / SAMPLES - 0.5
+    x, y = (np.ascontiguousarray(folds.xyd[..., axis].T) for axis in (0, 1))
+    low_x, high_x, low_y, high_y = x.min(axis=0), x.max(axis=0), y.min(axis=0), y.max(axis=0)
     for left, top in folds.tiles:
-        missing = sample_tile(folds.xyd, uv, folds.facing, texture, left, top, TILE_PX, SAMPLES)
-        rows = np.arange(max(top - reach, 0), min(top + TILE_PX + reach, height))
-        columns = np.arange(max(left - reach, 0), min(left + TILE_PX + reach, width))
-        down = _response(rows[:, None] - (top + offset), blur_px)
-        across = _response(columns[:, None] - (left + offset), blur_px)
+        near = (high_x >= left - 0.5) & (low_x <= left + TILE_PX - 0.5)
+        near &= (high_y >= top - 0.5) & (low_y <= top + TILE_PX - 0.5)
+        row, column, missing = sample_tile(
+            folds.xyd[near], uv[near], folds.facing[near], texture, left, top, TILE_PX, SAMPLES
+        )
+        if not missing.size:
+            continue
+        _, tall, wide = missing.shape
+        y, x = top + offset[row : row + tall], left + offset[column : column + wide]
+        rows = np.arange(max(int(y[0]) - reach, 0), min(int(y[-1]) + 2 + reach, height))
+        columns = np.arange(max(int(x[0]) - reach, 0), min(int(x[-1]) + 2 + reach, width))
+        down, across = _response(rows[:, None] - y, blur_px), _response(columns[:, None] - x, blur_px)
         window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         planes[:, *window] += (down @ missing @ across.T).astype(np.float32)
 
@@ -200,6 +216,7 @@ def hidden(folds: Folds, xyd: Points, facing: NDArray[np.bool_]) -> NDArray[np.b
     tile = np.floor((xyd[:, :2] + 0.5) / TILE_PX) * TILE_PX
     asked = (tile[:, None] == folds.tiles).all(axis=2).any(axis=1)
     behind = ~facing
-    nearest = nearest_depth(folds.xyd, np.ascontiguousarray(xyd[asked]))
-    behind[asked] |= xyd[asked, 2] > nearest + folds.tolerance_mm
+    rising = np.flatnonzero(asked)[np.argsort(xyd[asked, 0], kind="stable")]
+    nearest = nearest_depth(folds.xyd, xyd[rising])
+    behind[rising] |= xyd[rising, 2] > nearest + folds.tolerance_mm
     return behind

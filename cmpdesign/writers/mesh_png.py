@@ -85,7 +85,7 @@ def draw_meshes(meshes: Sequence[Mesh], view: View, size_px: tuple[int, int]) ->
     picture = np.full((height, width, 3), 255.0)
     hit = number >= 0
     picture[hit] = colors[number[hit]] * shades[number[hit]][:, None]
-    lines = _outlines(depth, number, shades)
+    lines = _outlines(depth, number, shades, _slopes(scaled))
     picture[lines] *= OUTLINE
     small = cv2.resize(picture.astype(np.float32), size_px, interpolation=cv2.INTER_AREA)
     return np.clip(np.rint(small), 0, 255).astype(np.uint8)
@@ -103,15 +103,24 @@ def _shades(corners: Floats, view: View) -> Floats:
     return np.asarray(AMBIENT + (1 - AMBIENT) * np.clip(normals @ light, 0, 1))
 
 
-def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats) -> NDArray[np.bool_]:
-    """Pixels where depth or shade jumps to the right or lower neighbour."""
+def _slopes(corners: Floats) -> Floats:
+    """(T, 2) how much a triangle's depth changes from a pixel to the lower and to the right one."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.abs(normals[:, 1::-1]) / np.maximum(np.abs(normals[:, 2:]), 1e-9)
+
+
+def _outlines(depth: Floats, number: NDArray[np.int64], shades: Floats, slopes: Floats) -> NDArray[np.bool_]:
+    """Pixels where depth or shade jumps to the right or lower neighbour, by more than the face goes on by."""
     shade = np.where(number >= 0, shades[number], 2.0)
     far = np.where(np.isfinite(depth), depth, -1e6)
     step = DEPTH_STEP * depth.shape[0]
     lines = np.zeros(depth.shape, dtype=np.bool_)
     for axis in (0, 1):
-        jump = (np.abs(np.diff(far, axis=axis)) > step) | (np.abs(np.diff(shade, axis=axis)) > SHADE_STEP)
+        slope = np.where(number >= 0, slopes[number, axis], 0.0)
         index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+        after = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
+        jump = np.abs(np.diff(far, axis=axis)) > step + np.minimum(slope[index], slope[after])
+        jump |= np.abs(np.diff(shade, axis=axis)) > SHADE_STEP
         lines[index] |= jump
     return lines
 

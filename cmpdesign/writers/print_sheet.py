@@ -18,7 +18,9 @@ FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
 # Free for the printer's grip, and for the key at the left and the bottom.
 MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
-CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 1.0, 0.1
+CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
+# Corners that turn by less than 30 degrees (or more than 150) have no marks of their own.
+SHARP = 0.5 - 1e-9
 PATCH_MM, FRAME_MM = 6.0, 0.2
 Points = NDArray[np.float64]
 
@@ -42,7 +44,8 @@ def print_page(design: Design, layout: Layout) -> tuple[Page, int]:
     # A transparent page becomes black in many a viewer, and its code unreadable.
     items: list[Shapes | Text] = [Shapes([box(0, 0, width, height)], PAPER, "paper")]
     for place in places:
-        items += _pad(layout, place, design.sheet.bleed_mm, design.print_mirror)
+        items += _pad(layout, place, design)
+    items.append(Shapes([mark for place in places for mark in _marks(layout, place, design)], INK, "crop"))
     items += _key(layout, height)
     items += _patches(layout, width, height)
     return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(
@@ -52,8 +55,10 @@ def print_page(design: Design, layout: Layout) -> tuple[Page, int]:
 
 def _places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
     """Upper left corner of each pad's bounding box, row by row."""
-    around = 2 * (max(option.bleed_mm, CROP_APART_MM) + CROP_MM)
-    step = np.array(layout.size_mm) + around
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    printed = np.concatenate([_bleed(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)])
+    around = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
+    step = np.array(layout.size_mm) + 2 * around
     left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM
     room = np.array([width - left - MARGIN_MM, height - MARGIN_MM - bottom])
     columns, rows = (int(n) for n in np.floor(room / step + 1e-9))
@@ -71,43 +76,83 @@ def _places(option: SheetOptions, layout: Layout, width: float, height: float) -
             "choose a larger page"
         )
     # In the middle of the room across.
-    corner = np.array([left + (room[0] - columns * step[0]) / 2, MARGIN_MM]) + around / 2
+    corner = np.array([left + (room[0] - columns * step[0]) / 2, MARGIN_MM]) + around
     return [corner + step * (n % columns, n // columns) for n in range(wanted)]
 
 
-def _pad(layout: Layout, place: Points, bleed_mm: float, mirror: bool) -> list[Shapes | Text]:
-    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-
-    def on_page(xy: Points) -> Points:
-        x = high[0] - xy[..., 0] if mirror else xy[..., 0] - low[0]
-        return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
-
-    bleed = layout.outline_mm + bleed_mm * mitres(layout.outline_mm)
-    items: list[Shapes | Text] = [Shapes([on_page(bleed)], layout.palette[COLORS[BLACK]])]
+def _pad(layout: Layout, place: Points, design: Design) -> list[Shapes | Text]:
+    ground = _on_page(_bleed(layout, design.sheet), layout, place, design)
+    items: list[Shapes | Text] = [Shapes([ground], layout.palette[COLORS[BLACK]])]
     for color, name in enumerate(COLORS):
         cells = layout.cell_corners[layout.cell_color == color]
         if color != BLACK and len(cells):
-            items.append(Shapes(list(on_page(layout.marker_xy_mm[cells])), layout.palette[name]))
-    items.append(Shapes(_crop_marks(place, layout.size_mm, max(bleed_mm, CROP_APART_MM)), INK))
+            corners = _on_page(layout.marker_xy_mm[cells], layout, place, design)
+            items.append(Shapes(list(corners), layout.palette[name]))
     return items
 
 
-def _crop_marks(place: Points, size_mm: tuple[float, float], away: float) -> list[Points]:
-    """Two hairlines at each corner of the pad's bounding box, beginning outside the bleed."""
-    (left, top), (right, bottom) = place, place + size_mm
-    half = HAIRLINE_MM / 2
+def _bleed(layout: Layout, option: SheetOptions) -> Points:
+    bleed: Points = layout.outline_mm + option.bleed_mm * mitres(layout.outline_mm)
+    return bleed
+
+
+def _marks(layout: Layout, place: Points, design: Design) -> list[Points]:
+    marks = crop_marks(layout.outline_mm, design.sheet.bleed_mm)
+    return [_on_page(mark, layout, place, design) for mark in marks]
+
+
+def _on_page(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
+    """From the layout to the page, the upper left corner of the pad's bounding box at ``place``."""
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    x = high[0] - xy[..., 0] if design.print_mirror else xy[..., 0] - low[0]
+    return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
+
+
+def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
+    """Hairlines that continue the pad's sides beyond its corners: a ruler laid on two of them shows the cut.
+
+    An outline that is round or not convex has no such sides: it gets the marks of its bounding box.
+
+    Args:
+        outline_mm: (N, 2) counter-clockwise.
+        bleed_mm: the marks begin ``CROP_APART_MM`` outside it.
+
+    Returns:
+        Two (4, 2) outlines for each corner.
+    """
+    corners, sine = outline_mm, _turns(outline_mm)
+    if (sine < SHARP).any():
+        (left, low), (right, high) = outline_mm.min(axis=0), outline_mm.max(axis=0)
+        corners = np.array([(left, low), (right, low), (right, high), (left, high)])
+        sine = np.ones(4)
+    before, after = (
+        _along(np.roll(corners, 1, axis=0), corners),
+        _along(np.roll(corners, -1, axis=0), corners),
+    )
     marks = []
-    for x in (left, right):
-        marks += [
-            box(x - half, top - away - CROP_MM, 2 * half, CROP_MM),
-            box(x - half, bottom + away, 2 * half, CROP_MM),
-        ]
-    for y in (top, bottom):
-        marks += [
-            box(left - away - CROP_MM, y - half, CROP_MM, 2 * half),
-            box(right + away, y - half, CROP_MM, 2 * half),
-        ]
+    for corner, away, *ways in zip(corners, (bleed_mm + CROP_APART_MM) / sine, before, after, strict=True):
+        # Where a side goes on, it leaves the next one's bleed at this distance from the corner.
+        marks += [_hairline(corner + away * way, way) for way in ways]
     return marks
+
+
+def _turns(outline: Points) -> Points:
+    """(N,) sine of the angle by which the outline turns to the left at each corner."""
+    first, then = _along(np.roll(outline, 1, axis=0), outline), _along(outline, np.roll(outline, -1, axis=0))
+    turns: Points = first[:, 0] * then[:, 1] - first[:, 1] * then[:, 0]
+    return turns
+
+
+def _along(start: Points, end: Points) -> Points:
+    """(N, 2) directions of length one."""
+    way: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
+    return way
+
+
+def _hairline(start: Points, way: Points) -> Points:
+    half = HAIRLINE_MM / 2 * np.array([-way[1], way[0]])
+    end = start + CROP_MM * way
+    return np.array([start - half, end - half, end + half, start + half])
 
 
 def _key(layout: Layout, height: float) -> list[Shapes | Text]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-# Files carry no date of their own: that of the format's edition stands for it.
-TIME_STAMP = b"2014-12-01T00:00:00"
+from cmpdesign.writers.step_shape import add_solid
+from cmpdesign.writers.step_text import Entities, add_context, add_product, real
+
+PART = "ADVANCED_BREP_SHAPE_REPRESENTATION"
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Solid:
     """A named, colored solid.
 
     Attributes:
-        name: the product's name.
+        name: the product's name, ASCII.
         color: "#rrggbb".
         shape: TopoDS_Solid, mm.
     """
@@ -29,73 +30,35 @@ class Solid:
 
 
 def solid_to_step(solid: Solid) -> bytes:
-    """A part's file."""
-    document, shapes, colors = _document()
-    _add_solid(solid, shapes, colors)
-    return _written(document, solid.name)
+    """A part's file.
+
+    Raises:
+        RuntimeError: a solid that ``add_solid`` cannot write.
+    """
+    entities = Entities()
+    body = add_solid(solid.shape, entities)
+    context = add_context(entities)
+    _add_color(solid.color, body, context, entities)
+    add_product(solid.name, PART, (body,), context, entities)
+    return entities.file(solid.name)
 
 
-def _document() -> tuple[Any, Any, Any]:
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
-
-    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    main = document.Main()
-    return document, XCAFDoc_DocumentTool.ShapeTool_s(main), XCAFDoc_DocumentTool.ColorTool_s(main)
-
-
-def _add_solid(solid: Solid, shapes: Any, colors: Any) -> Any:
-    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
-    from OCP.XCAFDoc import XCAFDoc_ColorType
-
-    label = shapes.AddShape(solid.shape, False)
-    _name(label, solid.name)
-    rgb = [int(solid.color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    color = Quantity_Color(*rgb, Quantity_TypeOfColor.Quantity_TOC_sRGB)
-    colors.SetColor(label, color, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
-    return label
-
-
-def _name(label: Any, name: str) -> None:
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-
-
-def _written(document: Any, name: str) -> bytes:
-    from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.Interface import Interface_Static
-    from OCP.STEPCAFControl import STEPCAFControl_Writer
-    from OCP.STEPControl import STEPControl_StepModelType
-
-    with _silent(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
-        writer = STEPCAFControl_Writer()
-        writer.SetColorMode(True)
-        writer.SetNameMode(True)
-        # Curves in the parameter plane only repeat what surfaces and edges say, and double the file.
-        Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
-        Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")
-        Interface_Static.SetCVal_s("write.step.unit", "MM")
-        path = Path(folder) / "part.step"
-        if not writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs):
-            raise RuntimeError(f"{name}: the STEP translator refused the solid")
-        if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-            raise RuntimeError(f"{name}: the STEP writer failed")
-        return _canonical(path.read_bytes(), name)
-
-
-def _canonical(data: bytes, name: str) -> bytes:
-    """The file under its own name, and without the time of its writing."""
-    head, mark, body = data.partition(b"ENDSEC;")
-    head = re.sub(rb"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'", b"'%s'" % TIME_STAMP, head)
-    return head.replace(b"'Open CASCADE Shape Model'", f"'{name}.step'".encode(), 1) + mark + body
+def _add_color(color: str, body: int, context: int, entities: Entities) -> None:
+    red, green, blue = (real(int(color[i : i + 2], 16) / 255) for i in (1, 3, 5))
+    number = entities.add(f"COLOUR_RGB('',{red},{green},{blue})")
+    number = entities.add(f"FILL_AREA_STYLE_COLOUR('',#{number})")
+    number = entities.add(f"FILL_AREA_STYLE('',(#{number}))")
+    number = entities.add(f"SURFACE_STYLE_FILL_AREA(#{number})")
+    number = entities.add(f"SURFACE_SIDE_STYLE('',(#{number}))")
+    number = entities.add(f"SURFACE_STYLE_USAGE(.BOTH.,#{number})")
+    number = entities.add(f"PRESENTATION_STYLE_ASSIGNMENT((#{number}))")
+    number = entities.add(f"STYLED_ITEM('color',(#{number}),#{body})")
+    entities.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#{number}),#{context})")
 
 
 @contextmanager
 def _silent() -> Any:
-    """The translator reports every file on standard output; it must not."""
+    """The kernel's reader reports every file on standard output; it must not."""
     from OCP.Message import Message
 
     messenger = Message.DefaultMessenger_s()
@@ -110,7 +73,7 @@ def _silent() -> Any:
 
 
 def read_step(data: bytes) -> Any:
-    """The file's shape (TopoDS_Shape), mm."""
+    """The file's shape (TopoDS_Shape), mm, as the kernel's own reader finds it."""
     from OCP.STEPControl import STEPControl_Reader
 
     with _silent(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
