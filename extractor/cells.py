@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
+from .near import bucketed, nearest
 from .regions import Seeds
 from .triangles import Triangles
 
@@ -42,15 +44,31 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     Args:
         scale: full-scale pixels per pixel of the seeds.
     """
-    from scipy.spatial import cKDTree
-
     corners = np.full((len(seeds.ink), 3, 2), np.nan)
     corners[triangles.region] = triangles.corner_px
     center = (seeds.center + 0.5) * scale - 0.5
     center[triangles.region] = triangles.corner_px.mean(axis=1)
     area = seeds.area_px.astype(np.float64)
-    keep = np.ones(len(center), np.bool_)
-    if len(center) > NEIGHBOURS and area.min() < MIN_AREA_SHARE * area.max():
-        _, near = cKDTree(center).query(center, NEIGHBOURS)
-        keep = area >= MIN_AREA_SHARE * np.sort(area[near], axis=1)[:, NEIGHBOURS // 2]
+    keep = _large(center, area)
     return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])
+
+
+@compiled
+def _large(center, area):  # type: ignore[no-untyped-def]
+    """(N,) bool, the domains that are not small beside the ones around them."""
+    keep = np.ones(area.shape[0], np.bool_)
+    if area.shape[0] <= NEIGHBOURS:
+        return keep
+    limit = MIN_AREA_SHARE * area.max()
+    if area.min() >= limit:
+        return keep
+    grid = bucketed(center)
+    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
+    for i in range(area.shape[0]):
+        if area[i] < limit:
+            nearest(center, grid, center[i, 0], center[i, 1], index, square)
+            larger = 0
+            for j in index:
+                larger += area[i] < MIN_AREA_SHARE * area[j]
+            keep[i] = larger < NEIGHBOURS // 2
+    return keep

@@ -128,9 +128,11 @@ class Extractor:
 
     def _whole(self, bgr: NDArray[np.uint8], found: Found, stages: Stages) -> bool:
         """Whether a finer scale would number no more cells than have been numbered."""
-        loose = int((found.numbering.cell < 0).sum())
-        count = loose + missed(bgr, found.cells, found.numbering, self._lattice)
-        return int(stages.done("missed", count)) <= MAX_MISSED * len(self._lattice.ink)
+        cell, all_cells = found.numbering.cell, len(self._lattice.ink)
+        loose = int((cell < 0).sum())
+        places = all_cells - (len(cell) - loose)  # what is left of the layout: around it anything may lie
+        count = min(loose, places) + missed(bgr, found.cells, found.numbering, self._lattice)
+        return int(stages.done("missed", count)) <= MAX_MISSED * all_cells
 
     def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
         """Stages 1 to 5; None where an ink is absent, or the cells are too small for a reduced scale."""
