@@ -52,7 +52,9 @@ def _attached(center_px, ink, area_px, whole, candidates, cell, free, center_mm,
     cell, free = cell.copy(), free.copy()
     loose = np.flatnonzero(candidates)
     claim = np.full(loose.shape[0], -1, np.int32)  # the place of the layout that a loose cell would take
-    reach2 = np.full(loose.shape[0], np.inf)  # the squared distance of its farthest witness: a nearer one changes it
+    reach2 = np.full(
+        loose.shape[0], np.inf
+    )  # the squared distance of its farthest witness: a nearer one changes it
     fresh = np.flatnonzero((cell >= 0) & whole)
     claims = np.zeros(free.shape[0], np.int32)
     index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
@@ -138,14 +140,19 @@ def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: i
         middle += center_mm[cell[near[k]]] / count
     rows, offset, closeness = np.empty((count, TERMS)), np.empty((count, 2)), np.empty(count)
     for k in range(count):
-        x, y = (center_px[near[k], 0] - center_px[i, 0]) / scale, (center_px[near[k], 1] - center_px[i, 1]) / scale
+        x, y = (
+            (center_px[near[k], 0] - center_px[i, 0]) / scale,
+            (center_px[near[k], 1] - center_px[i, 1]) / scale,
+        )
         rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
         rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
         offset[k] = center_mm[cell[near[k]]] - middle
         closeness[k] = 1.0 / (0.3 + square[k] / scale**2)
     terms, variance, leverage = _robust(rows, offset, closeness, (EXACT * size) ** 2)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) / scale
-    sure = np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
+    sure = (
+        np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
+    )
     if not sure:
         return np.nan, np.nan, size
     return middle[0] + terms[0, 0], middle[1] + terms[1, 0], size

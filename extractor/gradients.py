@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
-from .lattice import layer_of, marker_id
-from .numbering import SIX
+from .lattice import SIX, layer_of, marker_id
 from .tables import Lattice
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from .cells import Cells
 from .engine import compiled
 from .gradients import gradients
-from .lattice import layer_of, marker_id
-from .numbering import SIX, Numbering
+from .lattice import SIX, layer_of, marker_id
+from .numbering import Numbering
 from .sampling import sample_patch
 from .tables import Lattice
 
