@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import cholesky_solve
-from .cells import Cells
+from .cells import Cells, undamaged
 from .engine import compiled
 from .near import bucketed, nearest
 from .numbering import Numbering
@@ -16,7 +16,6 @@ from .tables import Lattice
 ROUNDS = 12
 WITNESSES = 20  # numbered cells through which a quadratic map to the layout is laid
 MIN_WITNESSES = 8
-SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, and its center is no witness
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
 MAX_MISFIT = 0.3  # in cells, between where the map puts a cell and the layout's place for it
 MAX_SIGMA = 0.12  # of the map there, in cells
@@ -33,9 +32,6 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     The numbered cells around must map the cell near a free place of the layout that holds its ink, with little doubt,
     and no other cell may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice.
     """
-    whole = np.isfinite(cells.corner_px[:, 0, 0])
-    if whole.mean() < SHARP_SHARE:
-        whole[:] = True
     free = np.ones(len(lattice.ink), np.bool_)
     free[numbering.cell[numbering.cell >= 0]] = False
     candidates = (numbering.cell < 0) & np.isin(cells.ink, lattice.ink[free])
@@ -43,7 +39,9 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
         return numbering
     seen = cells.center_px, cells.ink, cells.area_px
     layout = lattice.center_mm, lattice.ink, lattice.size_mm
-    return replace(numbering, cell=_attached(*seen, whole, candidates, numbering.cell, free, *layout))
+    return replace(
+        numbering, cell=_attached(*seen, undamaged(cells), candidates, numbering.cell, free, *layout)
+    )
 
 
 @compiled

@@ -14,6 +14,10 @@ from .triangles import Triangles
 
 NEIGHBOURS = 8
 MIN_AREA_SHARE = 0.2  # of the median around it; smaller domains are dirt
+WHOLE_SHARE = (
+    0.7  # of the upper quartile around it; smaller cells have lost a part, and their centers lie aside
+)
+SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,3 +76,28 @@ def _large(center, area):  # type: ignore[no-untyped-def]
                 larger += area[i] < MIN_AREA_SHARE * area[j]
             keep[i] = larger < NEIGHBOURS // 2
     return keep
+
+
+def undamaged(cells: Cells) -> NDArray[np.bool_]:
+    """(N,) bool, the cells whose centers are to be believed: triangles, if most are, as large as those around them."""
+    whole = np.isfinite(cells.corner_px[:, 0, 0])
+    if whole.mean() < SHARP_SHARE:
+        whole[:] = True
+    return np.asarray(whole & _entire(cells.center_px, cells.area_px))
+
+
+@compiled
+def _entire(center, area):  # type: ignore[no-untyped-def]
+    """(N,) bool, the cells that are about as large as the ones around them."""
+    entire = np.ones(area.shape[0], np.bool_)
+    if area.shape[0] <= NEIGHBOURS:
+        return entire
+    grid = bucketed(center)
+    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
+    for i in range(area.shape[0]):
+        nearest(center, grid, center[i, 0], center[i, 1], index, square)
+        larger = 0
+        for j in index:
+            larger += area[i] < WHOLE_SHARE * area[j]
+        entire[i] = larger <= NEIGHBOURS // 4
+    return entire

@@ -10,6 +10,7 @@ and one blue cell, and these have their places.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,8 @@ from .tables import UNKNOWN, Lattice
 from .types import Origin
 from .white import Way, ways_from_white
 
-MIN_LEAD = 2  # cells by which the best reference must explain more than the next
+MIN_LEAD = 2  # cells by which the best reference must explain more than the next in its part of the mesh
+WHITER = 0.75  # of the whitest: what is less white is none, whatever it explains
 # A part of the mesh is this pattern when it shows at least this share of its cells and puts hardly any outside.
 MIN_EVIDENCE = 0.06
 MIN_CELLS = 9  # or all, in a layout that has fewer
@@ -32,6 +34,8 @@ MIN_CELLS = 9  # or all, in a layout that has fewer
 MIN_SHARE = 0.4
 SURE_CELLS = 30
 MAX_ROUNDS = 8
+MAX_PARTS = 12
+MIN_FACES = 5  # of a part whose white cell tells against another's
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,17 @@ class Numbering:
     conflicts: int
     ambiguous: bool = False
     origin: Origin = Origin.WHITE
+
+
+class _Candidate(NamedTuple):
+    """A numbering with what speaks for it: cells inside the layout, those less what speaks against it, how white the
+    white cell is, and which part of the mesh it is."""
+
+    inside: int
+    score: int
+    white: float
+    part: int
+    numbering: Numbering
 
 
 @compiled
@@ -109,7 +124,12 @@ def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignor
     return at, bad
 
 
-def _number_part(
+def reach_of(lattice: Lattice) -> int:
+    """How far from its first cell a walk may lead: across the whole layout."""
+    return 2 * lattice.layers + 2
+
+
+def walk_part(
     cells: Cells, mesh: Mesh, part: NDArray[np.intp], front: int, reach: int
 ) -> tuple[NDArray[np.int32], int]:
     """Walk a part of the mesh from its middle; cells that are contradicted are left out and it is walked again."""
@@ -127,37 +147,45 @@ def _number_part(
 
 
 def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice) -> Numbering | None:
-    """Stage 7: number the largest part of the mesh that holds a white cell or shows the whole outline; else None.
+    """Stage 7: number the part of the mesh that holds the white cell or shows the whole outline; else None.
 
-    Where several cells are as bright as white, the one that puts the most cells inside the layout and the fewest
-    outside is the reference, unless two do so equally well: then nothing is reported.
+    Where several cells of a part could be the white one, the one that puts the most cells inside the layout and the
+    fewest outside is the reference, unless two do so equally well. Where parts disagree, the whiter cell is, unless
+    one is as white as the other. What is not settled so is ambiguous.
     """
-    found: list[tuple[int, Numbering]] = []
+    found: list[_Candidate] = []
     no_white: list[tuple[NDArray[np.int32], int, int]] = []
-    least, reach = _least_cells(mesh, lattice), 2 * lattice.layers + 2
+    least, reach = _least_cells(mesh, lattice), reach_of(lattice)
     for front in fronts(image, cells, mesh):
-        for part in largest_parts(mesh):
-            if len(part) + 2 < _of_note(found):  # so many faces have two cells more at most
-                continue
-            at, conflicts = _number_part(cells, mesh, part, front, reach)
+        for number_of, part in enumerate(largest_parts(mesh, MAX_PARTS)):
+            if len(part) < MIN_FACES:
+                break
+            at, conflicts = walk_part(cells, mesh, part, front, reach)
             ways = ways_from_white(image, cells, lattice, at)
-            found += [scored for way in ways if (scored := _scored(way, front, conflicts, least))]
-            if not found:
+            own = [_candidate(way, front, conflicts, front * (number_of + 1)) for way in ways]
+            found += own
+            if not any(one.inside >= least for one in own):
                 no_white.append((at, front, conflicts))
+    best = _settled(found, least, 0.5 * cells.edge_px)
     for walked in no_white:
-        found += _with_outline(cells, lattice, *walked, _of_note(found))
-    if not found:
+        # with more cells than the white cell's part has, the outline tells more
+        if best is None or np.count_nonzero(walked[0][:, 0] != UNKNOWN) > best.inside:
+            best = _with_outline(cells, lattice, *walked) or best
+    return best.numbering if best else None
+
+
+def _settled(found: list[_Candidate], least: float, apart_px: float) -> _Candidate | None:
+    """The best candidate that explains the least number of cells; ambiguous where any that puts the white cell
+    elsewhere is nearly as good."""
+    white = WHITER * max((one.white for one in found), default=0.0)
+    found = [one for one in found if one.white >= white]
+    best = max((one for one in found if one.inside >= least), key=lambda one: one.score, default=None)
+    if best is None:
         return None
-    found.sort(key=lambda pair: -pair[0])
-    score, best = found[0]
-    apart = 0.5 * cells.edge_px
-    rivals = [other for other, way in found if np.hypot(*(way.white_px - best.white_px)) > apart]
-    return replace(best, ambiguous=bool(rivals) and score - max(rivals) < MIN_LEAD)
-
-
-def _of_note(found: list[tuple[int, Numbering]]) -> int:
-    """How many cells a part must have to win against what has been found, or to make it doubtful."""
-    return max((score for score, _ in found), default=MIN_LEAD) - MIN_LEAD
+    middle = best.numbering.white_px
+    rivals = [one for one in found if np.hypot(*(one.numbering.white_px - middle)) > apart_px]
+    doubt = any(one.part != best.part or best.score - one.score < MIN_LEAD for one in rivals)
+    return best._replace(numbering=replace(best.numbering, ambiguous=doubt))
 
 
 def _least_cells(mesh: Mesh, lattice: Lattice) -> float:
@@ -167,23 +195,22 @@ def _least_cells(mesh: Mesh, lattice: Lattice) -> float:
     return max(of_layout, min(MIN_SHARE * meshed, SURE_CELLS))
 
 
-def _scored(way: Way, front: int, conflicts: int, least: float) -> tuple[int, Numbering] | None:
-    """A way with what speaks for it, if it explains the least number of cells."""
+def _candidate(way: Way, front: int, conflicts: int, part: int) -> _Candidate:
     inside = int((way.cell >= 0).sum())
-    if inside < least:
-        return None
-    return inside - 3 * way.outside - conflicts, Numbering(way.cell, front < 0, way.white_px, conflicts)
+    score = inside - 3 * way.outside - conflicts
+    return _Candidate(inside, score, way.white, part, Numbering(way.cell, front < 0, way.white_px, conflicts))
 
 
 def _with_outline(
-    cells: Cells, lattice: Lattice, at: NDArray[np.int32], front: int, conflicts: int, of_note: int
-) -> list[tuple[int, Numbering]]:
+    cells: Cells, lattice: Lattice, at: NDArray[np.int32], front: int, conflicts: int
+) -> _Candidate | None:
     """The way that the outline leaves, if it leaves only one."""
     known = np.flatnonzero(at[:, 0] != UNKNOWN)
-    settled = settle(at[known], lattice) if len(known) >= of_note else None
+    settled = settle(at[known], lattice)
     if settled is None:
-        return []
+        return None
     cell = np.full(len(at), -1, np.int32)
     cell[known] = settled
-    middle = cells.center_px[known].mean(axis=0)
-    return [(int((settled >= 0).sum()), Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE))]
+    inside, middle = int((settled >= 0).sum()), cells.center_px[known].mean(axis=0)
+    numbering = Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE)
+    return _Candidate(inside, inside, 0.0, 0, numbering)

@@ -10,7 +10,6 @@ from .engine import compiled
 from .mesh import Mesh
 from .sampling import sample_patch
 
-MAX_PARTS = 4
 WITNESSES = 80  # faces that say which turn is that of the markers
 
 
@@ -38,11 +37,11 @@ def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
     return part
 
 
-def largest_parts(mesh: Mesh) -> list[NDArray[np.intp]]:
-    """The faces of each of the largest connected parts of the mesh."""
+def largest_parts(mesh: Mesh, count: int) -> list[NDArray[np.intp]]:
+    """The faces of each of the largest connected parts of the mesh, the largest first."""
     part = _parts(mesh.neighbours, mesh.turn)
     sizes = np.bincount(part[part >= 0])
-    return [np.flatnonzero(part == i) for i in np.argsort(-sizes, kind="stable")[:MAX_PARTS]]
+    return [np.flatnonzero(part == i) for i in np.argsort(-sizes, kind="stable")[:count]]
 
 
 @compiled

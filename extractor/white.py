@@ -24,6 +24,10 @@ WHITE_RATIO = 0.75
 BLACK_RATIO = 0.95
 BLACK_SHARE = 0.8  # of the places between inks; the white cell and glare are among them
 SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
+# White is, in light of any color, about as strong in every channel as the ink that has most of it; no dirt of one
+# color is. The weakest channel so, and against the strongest.
+MIN_WEAKEST = 0.5
+MIN_BALANCE = 0.4
 MAX_WHITES = 8
 MAX_OUTSIDE = 0.02  # of a part's cells, where it is put into the layout
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
@@ -43,11 +47,13 @@ class Way(NamedTuple):
         cell: (N,) int32, the layout's cell of each cell of the image, or -1.
         outside: how many of the walked ones have no place in it.
         white_px: (2,) the middle of what would be the white cell.
+        white: how white that is: its weakest channel, against the ink that has most of it.
     """
 
     cell: NDArray[np.int32]
     outside: int
     white_px: NDArray[np.float64]
+    white: float
 
 
 def ways_from_white(
@@ -70,12 +76,15 @@ def ways_from_white(
         steps = (low < DISTANCES) & (high >= DISTANCES)
         far = low >= WHITE_REACHES[0]
         tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
-        places, where, mean = _whiteness(image, *tables, far)
+        places, where, mean, white = _whiteness(image, *tables, far)
         if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
             return []
-        bright = np.flatnonzero(mean > max(WHITE_RATIO, SAME_WHITE * mean.max(initial=0.0)))
-        if len(bright):
+        mean[white < MIN_WEAKEST] = 0.0
+        bright = np.flatnonzero(mean > SAME_WHITE * mean.max(initial=0.0))
+        if mean.max(initial=0.0) > WHITE_RATIO:
             break
+    else:
+        return []
     found = []
     for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
         moved = np.full_like(at, UNKNOWN)
@@ -83,7 +92,7 @@ def ways_from_white(
         cell = cells_at(moved, lattice)
         outside = len(known) - int((cell >= 0).sum())
         if outside <= MAX_OUTSIDE * len(known):
-            found.append(Way(cell, outside, where[place]))
+            found.append(Way(cell, outside, where[place], float(white[place])))
     return found
 
 
@@ -126,10 +135,10 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
 
 @compiled
 def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, and brightness against the inks.
+    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, and how
+    white, 0 where it is colored.
 
-    Far from the next cell a prediction may hit a colored cell. So there all three channels must be as strong as in
-    the ink that has most of each: white is, in light of any color, and no ink is.
+    Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     low_q, low_r, high_q, high_r = 1 << 20, 1 << 20, -(1 << 20), -(1 << 20)
@@ -161,7 +170,8 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             if count[c] > 0:
                 strongest[channel] = max(strongest[channel], np.median(colors[c, : count[c], channel]))
     found = int((sums[:, :, 4] > 0.0).sum())
-    places, where, ratio = np.empty((found, 2), np.int32), np.empty((found, 2)), np.zeros(found)
+    places, where = np.empty((found, 2), np.int32), np.empty((found, 2))
+    ratio, white = np.zeros(found), np.zeros(found)
     found = 0
     for q in range(rows):
         for r in range(columns):
@@ -172,12 +182,13 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             places[found, 0], places[found, 1] = q + low_q, r + low_r
             where[found, 0], where[found, 1] = x, y
             if sample_patch(flat, height, width, x, y, radius, own):
-                if far:
-                    ratio[found] = np.min(own / np.maximum(strongest, 1.0))
-                else:
-                    ratio[found] = own.sum() / max(level, 1.0)
+                brightness = own.sum() / max(level, 1.0)
+                own /= np.maximum(strongest, 1.0)
+                if own.min() > MIN_BALANCE * own.max():
+                    white[found] = own.min()
+                ratio[found] = white[found] if far else brightness
             found += 1
-    return places, where, ratio
+    return places, where, ratio, white
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
