@@ -22,7 +22,8 @@ from .tables import UNKNOWN, Lattice, cells_at
 WHITE_RATIO = 0.75
 # Between the inks it must be darker than they are, even in haze: in pictures of anything else it is not.
 BLACK_RATIO = 0.95
-BLACK_SHARE = 0.8  # of the places between inks; the white cell and glare are among them
+BLACK_SHARE = 0.8  # of the places between three cells; the white cell and glare are among them
+MIN_BETWEEN = 6  # such places; where they are fewer, those beside one or two cells count, too
 SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled stays below
 # White is, in light of any color, about as strong in every channel as the ink that has most of it; no dirt of one
 # color is. The weakest channel so, and against the strongest.
@@ -76,8 +77,8 @@ def ways_from_white(
         steps = (low < DISTANCES) & (high >= DISTANCES)
         far = low >= WHITE_REACHES[0]
         tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
-        places, where, mean, white = _whiteness(image, *tables, far)
-        if low == 0.0 and np.mean(mean < BLACK_RATIO) < BLACK_SHARE:
+        places, where, mean, white, votes = _whiteness(image, *tables, far)
+        if low == 0.0 and not _dark(mean, votes):
             return []
         mean[white < MIN_WEAKEST] = 0.0
         bright = np.flatnonzero(mean > SAME_WHITE * mean.max(initial=0.0))
@@ -94,6 +95,14 @@ def ways_from_white(
         if outside <= MAX_OUTSIDE * len(known):
             found.append(Way(cell, outside, where[place], float(white[place])))
     return found
+
+
+def _dark(brightness: NDArray[np.float64], votes: NDArray[np.int64]) -> bool:
+    """Whether it is dark between the inks, as in the pattern; what lies beside a part of it may be anything."""
+    between = brightness[votes == 3]
+    if len(between) < MIN_BETWEEN:
+        between = brightness
+    return float(np.mean(between < BLACK_RATIO)) >= BLACK_SHARE
 
 
 @compiled
@@ -135,8 +144,8 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
 
 @compiled
 def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, and how
-    white, 0 where it is colored.
+    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, how
+    white, 0 where it is colored, and how many cells tell.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
@@ -171,13 +180,14 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 strongest[channel] = max(strongest[channel], np.median(colors[c, : count[c], channel]))
     found = int((sums[:, :, 4] > 0.0).sum())
     places, where = np.empty((found, 2), np.int32), np.empty((found, 2))
-    ratio, white = np.zeros(found), np.zeros(found)
+    ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
     found = 0
     for q in range(rows):
         for r in range(columns):
             votes = sums[q, r, 4]
             if votes == 0.0:
                 continue
+            seen_by[found] = int(votes)
             x, y, radius, level = sums[q, r, :4] / votes
             places[found, 0], places[found, 1] = q + low_q, r + low_r
             where[found, 0], where[found, 1] = x, y
@@ -188,7 +198,7 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
             found += 1
-    return places, where, ratio, white
+    return places, where, ratio, white, seen_by
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
