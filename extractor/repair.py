@@ -19,7 +19,7 @@ from .placing import Places
 from .tables import Lattice
 from .types import Status
 
-ROUNDS = 4
+ROUNDS = 40  # at most; each drops the worst of every neighbourhood, until none is left
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.32  # in edges, of a marker of the outermost layer from where the others put it, and
