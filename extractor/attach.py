@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import cholesky_solve
+from .bridge import unbridged
 from .cells import Cells, undamaged
 from .engine import compiled
 from .near import bucketed, nearest
@@ -37,11 +38,11 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     candidates = (numbering.cell < 0) & np.isin(cells.ink, lattice.ink[free])
     if not candidates.any():
         return numbering
-    seen = cells.center_px, cells.ink, cells.area_px
+    seen, whole = (cells.center_px, cells.ink, cells.area_px), undamaged(cells)
     layout = lattice.center_mm, lattice.ink, lattice.size_mm
-    return replace(
-        numbering, cell=_attached(*seen, undamaged(cells), candidates, numbering.cell, free, *layout)
-    )
+    cell = _attached(*seen, whole, candidates, numbering.cell, free, *layout)
+    cell[unbridged(cells, whole, numbering.cell, cell, lattice)] = -1
+    return replace(numbering, cell=cell)
 
 
 @compiled
