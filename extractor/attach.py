@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
-from .bridge import unbridged
-from .cells import Cells, undamaged
+from .bridge import MESHED, PREDICTED, unbridged
+from .cells import Cells
 from .engine import compiled
+from .mesh import Mesh, among
 from .near import bucketed, nearest
 from .numbering import Numbering
+from .parts import largest_parts
 from .tables import Lattice
 
 ROUNDS = 12
@@ -27,22 +30,37 @@ MIN_PIVOT = 1e-7  # of the normal matrix against its largest entry: below, they 
 TERMS = 6  # 1, x, y, xx, xy, yy
 
 
-def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
+def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> Numbering:
     """Number what is not connected with the reference by any face of the mesh.
 
     The numbered cells around must map the cell near a free place of the layout that holds its ink, with little doubt,
-    and no other cell may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice.
+    and no other cell may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What
+    does not fit across the gap, or across damaged cells by which the mesh hung together, loses its number.
     """
-    free = np.ones(len(lattice.ink), np.bool_)
-    free[numbering.cell[numbering.cell >= 0]] = False
-    candidates = (numbering.cell < 0) & np.isin(cells.ink, lattice.ink[free])
-    if not candidates.any():
+    if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    seen, whole = (cells.center_px, cells.ink, cells.area_px), undamaged(cells)
-    layout = lattice.center_mm, lattice.ink, lattice.size_mm
-    cell = _attached(*seen, whole, candidates, numbering.cell, free, *layout)
-    cell[unbridged(cells, whole, numbering.cell, cell, lattice)] = -1
+    core = np.where(_core(mesh, cells, numbering.cell), numbering.cell, -1).astype(np.int32)
+    meshed = numbering.cell.copy()
+    meshed[unbridged(cells, core, meshed, lattice, MESHED)] = -1
+    cell = meshed
+    free = np.ones(len(lattice.ink), np.bool_)
+    free[cell[cell >= 0]] = False
+    candidates = (cell < 0) & np.isin(cells.ink, lattice.ink[free])
+    if candidates.any():
+        seen = cells.center_px, cells.ink, cells.area_px
+        layout = lattice.center_mm, lattice.ink, lattice.size_mm
+        cell = _attached(*seen, cells.whole, candidates, cell, free, *layout)
+        cell[unbridged(cells, meshed, cell, lattice, PREDICTED)] = -1
     return replace(numbering, cell=cell)
+
+
+def _core(mesh: Mesh, cells: Cells, cell: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(N,) bool, the numbered cells in the largest part of the mesh that hangs together without damaged ones."""
+    parts = largest_parts(among(mesh, cells.whole & (cell >= 0)), 1)
+    core = np.zeros(len(cell), np.bool_)
+    for part in parts:
+        core[mesh.faces[part]] = True
+    return core
 
 
 @compiled

@@ -6,6 +6,8 @@ in itself and is wrong as a whole. But the way across the gap must be as long as
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,30 +18,42 @@ from .lattice import SIX, layer_of, marker_id
 from .near import bucketed, nearest
 from .tables import Lattice
 
-# In cells, between the way by the numbers and by the pattern's slopes; a wrong step makes 1.7. Of a cell, of a group.
-MAX_JUMP = 0.9, 0.6
+
+class Limits(NamedTuple):
+    """In cells, between the way by the numbers and by the pattern's slopes; a wrong step makes 1.7.
+
+    Attributes:
+        cell: of a single cell.
+        group: the median of a group, of which at least
+        members: so many can be judged.
+    """
+
+    cell: float
+    group: float
+    members: int
+
+
+PREDICTED = Limits(0.9, 0.6, 1)  # cells numbered by prediction
+MESHED = Limits(
+    np.inf, 1.2, 8
+)  # cells that hang together with the rest by damaged ones: sharp bends look so, too
 REACH = 5.0  # how far apart the two sides may be, in cells
 PAIRS = 3  # cells on the near side that each beyond is compared with
 
 
 def unbridged(
-    cells: Cells,
-    whole: NDArray[np.bool_],
-    before: NDArray[np.int32],
-    after: NDArray[np.int32],
-    lattice: Lattice,
+    cells: Cells, before: NDArray[np.int32], after: NDArray[np.int32], lattice: Lattice, limits: Limits
 ) -> NDArray[np.bool_]:
     """(N,) bool, the cells beyond gaps whose numbers make the way across longer or shorter than the pattern is.
 
     Cells that hang together fall together when most of them do; what has no whole neighbours is not judged.
 
     Args:
-        whole: (N,) bool, the cells whose centers are to be believed.
         before, after: (N,) the layout's cell of each cell of the image, or -1, without and with those beyond gaps.
     """
     tables = lattice.axial, lattice.cell_of, lattice.layers
     slope = gradients(cells.center_px, after, lattice)
-    group, sure = _groups(before, after, whole, slope, len(lattice.ink), tables)
+    group, sure = _groups(before, after, cells.whole, slope, len(lattice.ink), tables)
     here = np.flatnonzero(sure & (before >= 0))
     there = np.flatnonzero(sure & (group >= 0))
     bad = np.zeros(len(after), np.bool_)
@@ -47,10 +61,10 @@ def unbridged(
         return bad
     layout = lattice.center_mm, lattice.size_mm
     jump = _jumps(cells.center_px, slope, after, here, there, *layout)
-    bad[there] = jump > MAX_JUMP[0]
+    bad[there] = jump > limits.cell
     for one in np.unique(group[there]):
         known = jump[(group[there] == one) & np.isfinite(jump)]
-        if len(known) and np.median(known) > MAX_JUMP[1]:
+        if len(known) >= limits.members and np.median(known) > limits.group:
             bad[group == one] = True
     return bad
 

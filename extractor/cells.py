@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,14 @@ class Cells:
         """The median edge of an equilateral triangle of the cells' areas; 0 without cells."""
         return float(np.sqrt(np.median(self.area_px) * 4 / np.sqrt(3))) if len(self.area_px) else 0.0
 
+    @cached_property
+    def whole(self) -> NDArray[np.bool_]:
+        """(N,) bool, whose centers are to be believed: triangles, if most are, as large as those around them."""
+        shaped = np.isfinite(self.corner_px[:, 0, 0])
+        if shaped.mean() < SHARP_SHARE:
+            shaped[:] = True
+        return np.asarray(shaped & _entire(self.center_px, self.area_px))
+
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     """The domains that are large enough for cells, at full scale.
@@ -76,14 +85,6 @@ def _large(center, area):  # type: ignore[no-untyped-def]
                 larger += area[i] < MIN_AREA_SHARE * area[j]
             keep[i] = larger < NEIGHBOURS // 2
     return keep
-
-
-def undamaged(cells: Cells) -> NDArray[np.bool_]:
-    """(N,) bool, the cells whose centers are to be believed: triangles, if most are, as large as those around them."""
-    whole = np.isfinite(cells.corner_px[:, 0, 0])
-    if whole.mean() < SHARP_SHARE:
-        whole[:] = True
-    return np.asarray(whole & _entire(cells.center_px, cells.area_px))
 
 
 @compiled
