@@ -158,7 +158,7 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     least, reach = _least_cells(mesh, lattice), reach_of(lattice)
     for front in fronts(image, cells, mesh):
         for number_of, part in enumerate(largest_parts(mesh, MAX_PARTS)):
-            if len(part) < MIN_FACES:
+            if len(part) < MIN_FACES and len(part) + 2 < least:  # so many faces have two cells more at most
                 break
             at, conflicts = walk_part(cells, mesh, part, front, reach)
             ways = ways_from_white(image, cells, lattice, at)
