@@ -36,6 +36,7 @@ MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a q
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
+UNSEEN = 0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
@@ -162,10 +163,12 @@ def _by_neighbours(
     nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
     with np.errstate(invalid="ignore"):
         # where the inner ring alone says something else, the surface is too bent for either to be believed
-        doubt = ((place - nearer) ** 2).sum(axis=1) / 4
+        alone = np.isnan(nearer[:, 0])
+        doubt = np.where(alone, (UNSEEN * edge) ** 2, ((place - nearer) ** 2).sum(axis=1) / 4)
         at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
         safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
-    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance
+    hidden = np.where(alone, 0.25 * (UNSEEN * edge) ** 2, 0.0)
+    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance + hidden
 
 
 def _by_cells(
