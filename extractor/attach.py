@@ -7,97 +7,210 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .algebra import cholesky_solve
+from .bridge import MESHED, PREDICTED, unbridged
 from .cells import Cells
+from .engine import compiled
+from .mesh import Mesh, among
+from .near import bucketed, nearest
 from .numbering import Numbering
+from .parts import largest_parts
 from .tables import Lattice
 
 ROUNDS = 12
 WITNESSES = 20  # numbered cells through which a quadratic map to the layout is laid
 MIN_WITNESSES = 8
-SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, and its center is no witness
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
 MAX_MISFIT = 0.3  # in cells, between where the map puts a cell and the layout's place for it
 MAX_SIGMA = 0.12  # of the map there, in cells
 ROBUST_ROUNDS = 4  # what dirt has cut is among the witnesses, too
 EXACT = 0.02  # of a cell: witnesses that fit so well are not judged
 RIDGE = 1e-3  # holds the curvature of the map where the witnesses lie in a row
+MIN_PIVOT = 1e-7  # of the normal matrix against its largest entry: below, they do lie in a row
+TERMS = 6  # 1, x, y, xx, xy, yy
 
 
-def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
+def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> Numbering:
     """Number what is not connected with the reference by any face of the mesh.
 
-    The numbered cells around must map the cell near a place of the layout that holds its ink, with little doubt,
-    and nothing else may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice.
+    The numbered cells around must map the cell near a free place of the layout that holds its ink, with little doubt,
+    and no other cell may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What
+    does not fit across the gap, or across damaged cells by which the mesh hung together, loses its number.
     """
-    from scipy.spatial import cKDTree
-
-    if (numbering.cell >= 0).all():
+    if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    members = [np.flatnonzero(lattice.ink == ink) for ink in (1, 2, 3)]
-    trees = [cKDTree(lattice.center_mm[mine]) for mine in members]
-    cell = numbering.cell.copy()
-    whole = np.isfinite(cells.corner_px[:, 0, 0])
-    if whole.mean() < SHARP_SHARE:
-        whole[:] = True
-    for _ in range(ROUNDS):
-        known, loose = np.flatnonzero((cell >= 0) & whole), np.flatnonzero(cell < 0)
-        if len(known) < MIN_WITNESSES or len(loose) == 0:
-            break
-        predicted, size = _predicted_mm(cells.center_px, cell, lattice, known, loose)
-        place = np.full(len(loose), -1, np.int32)
-        for ink in (1, 2, 3):
-            mine = (cells.ink[loose] == ink) & np.isfinite(predicted[:, 0])
-            misfit, nearest = trees[ink - 1].query(predicted[mine])
-            place[mine] = np.where(misfit < MAX_MISFIT * size[mine], members[ink - 1][nearest], -1)
-        place[_claimed(place, cell)] = -1
-        if not (place >= 0).any():
-            break
-        cell[loose] = place
+    core = np.where(_core(mesh, cells, numbering.cell), numbering.cell, -1).astype(np.int32)
+    meshed = numbering.cell.copy()
+    meshed[unbridged(cells, core, meshed, lattice, MESHED)] = -1
+    cell = meshed
+    free = np.ones(len(lattice.ink), np.bool_)
+    free[cell[cell >= 0]] = False
+    candidates = (cell < 0) & np.isin(cells.ink, lattice.ink[free])
+    if candidates.any():
+        seen = cells.center_px, cells.ink, cells.area_px
+        layout = lattice.center_mm, lattice.ink, lattice.size_mm
+        cell = _attached(*seen, cells.whole, candidates, cell, free, *layout)
+        cell[unbridged(cells, meshed, cell, lattice, PREDICTED)] = -1
     return replace(numbering, cell=cell)
 
 
-def _predicted_mm(
-    center_px: NDArray[np.float64],
-    cell: NDArray[np.int32],
-    lattice: Lattice,
-    known: NDArray[np.intp],
-    loose: NDArray[np.intp],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(L, 2) where each loose cell lies in the layout, NaN where that is doubtful; (L,) a cell's size there, mm."""
-    from scipy.spatial import cKDTree
+def _core(mesh: Mesh, cells: Cells, cell: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(N,) bool, the numbered cells in the largest part of the mesh that hangs together without damaged ones."""
+    parts = largest_parts(among(mesh, cells.whole & (cell >= 0)), 1)
+    core = np.zeros(len(cell), np.bool_)
+    for part in parts:
+        core[mesh.faces[part]] = True
+    return core
 
-    count = min(WITNESSES, len(known))
-    distance, near = cKDTree(center_px[known]).query(center_px[loose], count)
-    witness = known[near]
-    target = lattice.center_mm[cell[witness]]
-    corners = lattice.marker_mm[lattice.corner_ids[cell[witness]]]
-    size = np.linalg.norm(corners - np.roll(corners, 1, axis=2), axis=3).mean(axis=(1, 2))
-    # in units of the spread of the witnesses, with the loose cell at the origin
-    scale = distance.mean(axis=1)
-    x, y = np.moveaxis((center_px[witness] - center_px[loose, None]) / scale[:, None, None], 2, 0)
-    rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
-    near_weight = 1.0 / (0.3 + (distance / scale[:, None]) ** 2)
-    weight, offset = near_weight, target - target.mean(axis=1, keepdims=True)
+
+@compiled
+def _attached(center_px, ink, area_px, whole, candidates, cell, free, center_mm, ink_of, size_mm):  # type: ignore[no-untyped-def]
+    """The numbers of the cells with those of the candidates, round by round outward from the numbered ones."""
+    cell, free = cell.copy(), free.copy()
+    loose = np.flatnonzero(candidates)
+    claim = np.full(loose.shape[0], -1, np.int32)  # the place of the layout that a loose cell would take
+    reach2 = np.full(
+        loose.shape[0], np.inf
+    )  # the squared distance of its farthest witness: a nearer one changes it
+    fresh = np.flatnonzero((cell >= 0) & whole)
+    claims = np.zeros(free.shape[0], np.int32)
+    index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
+    for _ in range(ROUNDS):
+        known = np.flatnonzero((cell >= 0) & whole)
+        if known.shape[0] < MIN_WITNESSES:
+            break
+        xy = center_px[known]
+        grid = bucketed(xy)
+        claims[:] = 0
+        for n in range(loose.shape[0]):
+            i = loose[n]
+            if cell[i] >= 0:
+                continue
+            if _touched(center_px, i, fresh, reach2[n]):
+                count = nearest(xy, grid, center_px[i, 0], center_px[i, 1], index, square)
+                reach2[n] = square[count - 1] if count == WITNESSES else np.inf
+                near = known[index[:count]]
+                claim[n] = -1
+                # far beyond reach, whatever the map
+                if square[0] < 4.0 * REACH**2 * 4.0 / np.sqrt(3.0) * area_px[near[0]]:
+                    x, y, size = _predicted(center_px, i, near, square, cell, center_mm, size_mm)
+                    claim[n] = _nearest_free(x, y, MAX_MISFIT * size, ink[i], center_mm, ink_of, free)
+            if claim[n] >= 0:
+                claims[claim[n]] += 1
+        fresh = _numbered(loose, claim, claims, cell, free)
+        if fresh.shape[0] == 0:
+            break
+        fresh = fresh[whole[fresh]]
+    return cell
+
+
+@compiled
+def _touched(center_px, i, fresh, reach2):  # type: ignore[no-untyped-def]
+    """Whether one of the fresh cells lies within reach of cell i."""
+    for j in fresh:
+        if (center_px[j, 0] - center_px[i, 0]) ** 2 + (center_px[j, 1] - center_px[i, 1]) ** 2 < reach2:
+            return True
+    return False
+
+
+@compiled
+def _numbered(loose, claim, claims, cell, free):  # type: ignore[no-untyped-def]
+    """Number the loose cells that alone claim a place, in place; the cells that were."""
+    fresh, count = np.empty(loose.shape[0], np.int64), 0
+    for n in range(loose.shape[0]):
+        i, place = loose[n], claim[n]
+        if cell[i] < 0 and place >= 0 and claims[place] == 1:
+            cell[i] = place
+            free[place] = False
+            fresh[count] = i
+            count += 1
+    for n in range(loose.shape[0]):
+        if claim[n] >= 0 and not free[claim[n]]:
+            claim[n] = -1
+    return fresh[:count]
+
+
+@compiled
+def _nearest_free(x, y, limit, ink, center_mm, ink_of, free):  # type: ignore[no-untyped-def]
+    """The free place of the layout that holds this ink within the limit of (x, y), or -1."""
+    best, least = -1, limit * limit
+    for u in range(free.shape[0]):
+        if free[u] and ink_of[u] == ink:
+            apart = (center_mm[u, 0] - x) ** 2 + (center_mm[u, 1] - y) ** 2
+            if apart < least:
+                best, least = u, apart
+    return best
+
+
+@compiled
+def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: ignore[no-untyped-def]
+    """Where cell i lies in the layout by its witnesses (the nearest first), NaN where that is doubtful, and the size of
+    a cell there, mm.
+
+    In units of the witnesses' mean distance, with the cell at the origin, so that the map's first term is the place.
+    """
+    count = near.shape[0]
+    scale, size, middle = 0.0, 0.0, np.zeros(2)
+    for k in range(count):
+        scale += np.sqrt(square[k]) / count
+        size += size_mm[cell[near[k]]] / count
+        middle += center_mm[cell[near[k]]] / count
+    rows, offset, closeness = np.empty((count, TERMS)), np.empty((count, 2)), np.empty(count)
+    for k in range(count):
+        x, y = (
+            (center_px[near[k], 0] - center_px[i, 0]) / scale,
+            (center_px[near[k], 1] - center_px[i, 1]) / scale,
+        )
+        rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
+        rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
+        offset[k] = center_mm[cell[near[k]]] - middle
+        closeness[k] = 1.0 / (0.3 + square[k] / scale**2)
+    terms, variance, leverage = _robust(rows, offset, closeness, (EXACT * size) ** 2)
+    slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) / scale
+    sure = (
+        np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
+    )
+    if not sure:
+        return np.nan, np.nan, size
+    return middle[0] + terms[0, 0], middle[1] + terms[1, 0], size
+
+
+@compiled
+def _robust(rows, offset, closeness, exact2):  # type: ignore[no-untyped-def]
+    """(2, 6) the map's terms by robust least squares, the variance about it, and the leverage at the origin; infinite
+    where the witnesses lie in a row."""
+    count = rows.shape[0]
+    weight, squares = closeness.copy(), np.zeros(count)
+    normal, right = np.empty((TERMS, TERMS)), np.empty((3, TERMS))
     for _ in range(ROBUST_ROUNDS):
-        normal = np.einsum("lwi,lw,lwj->lij", rows, weight, rows) + RIDGE * np.diag([0, 0, 0, 1, 1, 1])
-        sides = np.einsum("lwi,lw,lwk->lik", rows, weight, offset)
-        sound = np.linalg.cond(normal) < 1e8
-        normal[~sound] = np.eye(6)
-        terms = np.linalg.solve(normal, sides)
-        squares = ((rows @ terms - offset) ** 2).sum(axis=2)
-        usual = 2 * np.median(squares, axis=1) + (EXACT * size) ** 2
-        weight = near_weight / (1 + squares / usual[:, None])
-    variance = (weight * squares).sum(axis=1) / (2 * weight.sum(axis=1))
-    leverage = np.linalg.inv(normal)[:, 0, 0] * weight.mean(axis=1)
-    # the image's size of a cell, from the map's slope
-    slope = np.abs(np.linalg.det(terms[:, 1:3])) ** 0.5 / scale
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sound &= distance[:, 0] * slope < REACH * size
-        sound &= np.sqrt(variance * (1 + leverage)) < MAX_SIGMA * size
-    return np.where(sound[:, None], target.mean(axis=1) + terms[:, 0], np.nan), size
-
-
-def _claimed(place: NDArray[np.int32], cell: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Places that a numbered cell holds, or that two loose cells claim."""
-    claims = np.bincount(np.concatenate([place, cell]) + 1)
-    return np.asarray(claims[place + 1] > 1)
+        normal[:], right[:] = 0.0, 0.0
+        right[2, 0] = 1.0
+        for k in range(count):
+            for a in range(TERMS):
+                moment = weight[k] * rows[k, a]
+                right[0, a] += moment * offset[k, 0]
+                right[1, a] += moment * offset[k, 1]
+                for b in range(a + 1):
+                    normal[a, b] += moment * rows[k, b]
+        for a in range(3, TERMS):
+            normal[a, a] += RIDGE
+        largest = 0.0
+        for a in range(TERMS):
+            largest = max(largest, normal[a, a])
+        cholesky_solve(normal, right, TERMS)
+        for a in range(TERMS):
+            if not normal[a, a] ** 2 > MIN_PIVOT * largest:
+                return right[:2], np.inf, np.inf
+        for k in range(count):
+            u, v = -offset[k, 0], -offset[k, 1]
+            for a in range(TERMS):
+                u += rows[k, a] * right[0, a]
+                v += rows[k, a] * right[1, a]
+            squares[k] = u * u + v * v
+        usual, total, about = 2.0 * np.median(squares) + exact2, 0.0, 0.0
+        leverage = right[2, 0] * weight.mean()
+        for k in range(count):
+            weight[k] = closeness[k] / (1.0 + squares[k] / usual)
+            total += weight[k]
+            about += weight[k] * squares[k]
+    return right[:2], about / (2.0 * total), leverage

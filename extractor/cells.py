@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .engine import compiled
+from .near import bucketed, nearest
 from .regions import Seeds
 from .triangles import Triangles
 
 NEIGHBOURS = 8
 MIN_AREA_SHARE = 0.2  # of the median around it; smaller domains are dirt
+WHOLE_SHARE = (
+    0.7  # of the upper quartile around it; smaller cells have lost a part, and their centers lie aside
+)
+SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +42,14 @@ class Cells:
         """The median edge of an equilateral triangle of the cells' areas; 0 without cells."""
         return float(np.sqrt(np.median(self.area_px) * 4 / np.sqrt(3))) if len(self.area_px) else 0.0
 
+    @cached_property
+    def whole(self) -> NDArray[np.bool_]:
+        """(N,) bool, whose centers are to be believed: triangles, if most are, as large as those around them."""
+        shaped = np.isfinite(self.corner_px[:, 0, 0])
+        if shaped.mean() < SHARP_SHARE:
+            shaped[:] = True
+        return np.asarray(shaped & _entire(self.center_px, self.area_px))
+
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     """The domains that are large enough for cells, at full scale.
@@ -42,15 +57,48 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     Args:
         scale: full-scale pixels per pixel of the seeds.
     """
-    from scipy.spatial import cKDTree
-
     corners = np.full((len(seeds.ink), 3, 2), np.nan)
     corners[triangles.region] = triangles.corner_px
     center = (seeds.center + 0.5) * scale - 0.5
     center[triangles.region] = triangles.corner_px.mean(axis=1)
     area = seeds.area_px.astype(np.float64)
-    keep = np.ones(len(center), np.bool_)
-    if len(center) > NEIGHBOURS and area.min() < MIN_AREA_SHARE * area.max():
-        _, near = cKDTree(center).query(center, NEIGHBOURS)
-        keep = area >= MIN_AREA_SHARE * np.sort(area[near], axis=1)[:, NEIGHBOURS // 2]
+    keep = _large(center, area)
     return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])
+
+
+@compiled
+def _large(center, area):  # type: ignore[no-untyped-def]
+    """(N,) bool, the domains that are not small beside the ones around them."""
+    keep = np.ones(area.shape[0], np.bool_)
+    if area.shape[0] <= NEIGHBOURS:
+        return keep
+    limit = MIN_AREA_SHARE * area.max()
+    if area.min() >= limit:
+        return keep
+    grid = bucketed(center)
+    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
+    for i in range(area.shape[0]):
+        if area[i] < limit:
+            nearest(center, grid, center[i, 0], center[i, 1], index, square)
+            larger = 0
+            for j in index:
+                larger += area[i] < MIN_AREA_SHARE * area[j]
+            keep[i] = larger < NEIGHBOURS // 2
+    return keep
+
+
+@compiled
+def _entire(center, area):  # type: ignore[no-untyped-def]
+    """(N,) bool, the cells that are about as large as the ones around them."""
+    entire = np.ones(area.shape[0], np.bool_)
+    if area.shape[0] <= NEIGHBOURS:
+        return entire
+    grid = bucketed(center)
+    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
+    for i in range(area.shape[0]):
+        nearest(center, grid, center[i, 0], center[i, 1], index, square)
+        larger = 0
+        for j in index:
+            larger += area[i] < WHOLE_SHARE * area[j]
+        entire[i] = larger <= NEIGHBOURS // 4
+    return entire

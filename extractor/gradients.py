@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import Cells
 from .engine import compiled
-from .lattice import layer_of, marker_id
-from .numbering import SIX
+from .lattice import SIX, layer_of, marker_id
 from .tables import Lattice
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing
+MAX_MISFIT = 0.3  # of the way to a neighbour, between its center and where a cell's own triangle puts it
+MIN_RIVAL = 0.8  # the same for the triangle turned by a third, which puts it 1.7 ways off
 
 
 @compiled
@@ -56,8 +58,73 @@ def gradients(
 
     The layout's own shape is in its millimetres, so a round pattern is no more curved than a honeycomb.
     """
+    tables = lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
+    return np.asarray(_gradients(center_px, cell, *tables, _seen_as(cell, lattice)))
+
+
+@compiled
+def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-def]
+    """Write the linear map that carries a cell's corners 0 and 1 to those of a triangle, counted from ``shift``."""
+    a, b = arms[0], arms[1]
+    p, q = seen[shift] - middle, seen[(shift + step) % 3] - middle
+    area = a[0] * b[1] - a[1] * b[0]
+    out[:, 0] = (p * b[1] - q * a[1]) / area
+    out[:, 1] = (q * a[0] - p * b[0]) / area
+
+
+@compiled
+def _add_from_triangles(center_px, corner_px, mirrored, cell, seen_as, tables, out):  # type: ignore[no-untyped-def]
+    """Write the map of every numbered cell that has none, but a triangle, and a neighbour that tells its turn."""
+    arms_mm, center_mm, axial, cell_of, layers = tables
+    maps, misfit = np.empty((3, 2, 2)), np.empty(3)
+    step = (
+        1 if mirrored else 2
+    )  # clockwise in the image a cell's corners run 0, 2, 1, seen from the back 0, 1, 2
+    for i in range(cell.shape[0]):
+        u = cell[i]
+        if u < 0 or not np.isnan(out[i, 0, 0]) or np.isnan(corner_px[i, 0, 0]):
+            continue
+        for shift in range(3):
+            _spanned(arms_mm[u], corner_px[i], center_px[i], shift, step, maps[shift])
+        misfit[:] = 0.0
+        for k in range(6):
+            q, r = axial[u, 0] + SIX[k, 0], axial[u, 1] + SIX[k, 1]
+            if layer_of(q, r) > layers:
+                continue
+            v = cell_of[marker_id(q, r)]
+            if v < 0 or seen_as[v] < 0:
+                continue
+            x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
+            px, py = center_px[seen_as[v], 0] - center_px[i, 0], center_px[seen_as[v], 1] - center_px[i, 1]
+            for shift in range(3):
+                m = maps[shift]
+                apart = np.hypot(px - m[0, 0] * x - m[0, 1] * y, py - m[1, 0] * x - m[1, 1] * y)
+                misfit[shift] = max(misfit[shift], apart / np.hypot(px, py))
+        best = misfit.argmin()
+        # without a neighbour all are 0
+        if misfit[best] < MAX_MISFIT and min(misfit[best - 1], misfit[best - 2]) > MIN_RIVAL:
+            out[i] = maps[best]
+
+
+def whole_gradients(
+    cells: Cells, cell: NDArray[np.int32], lattice: Lattice, mirrored: bool
+) -> NDArray[np.float64]:
+    """``gradients``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle says
+    if one of them tells which of its corners is which.
+
+    Args:
+        cell: (N,) the layout's cell of each cell of the image, or -1.
+        mirrored: the pattern is seen from its back.
+    """
+    slope, seen_as = gradients(cells.center_px, cell, lattice), _seen_as(cell, lattice)
+    tables = lattice.arms_mm, lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
+    _add_from_triangles(cells.center_px, cells.corner_px, mirrored, cell, seen_as, tables, slope)
+    return slope
+
+
+def _seen_as(cell: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
+    """(U,) int32, which cell of the image each of the layout's cells is, or -1."""
     seen_as = np.full(len(lattice.ink), -1, np.int32)
     numbered = np.flatnonzero(cell >= 0)
     seen_as[cell[numbered]] = numbered
-    tables = lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
-    return np.asarray(_gradients(center_px, cell, *tables, seen_as))
+    return seen_as

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 
+SIX = np.array([[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32)  # steps to the neighbours
+
 
 @compiled
 def layer_of(q, r):  # type: ignore[no-untyped-def]

@@ -8,30 +8,40 @@ from numpy.typing import NDArray
 from .cells import Cells
 from .engine import compiled
 from .gradients import gradients
-from .lattice import layer_of, marker_id
-from .numbering import SIX, Numbering
+from .lattice import SIX, layer_of, marker_id
+from .numbering import Numbering
 from .sampling import sample_patch
 from .tables import Lattice
 
+SMALL_AREA_PX = 30  # of a cell at the reduced scale; larger ones show all that they are
 MIN_COSINE = 0.9  # between a color and the ink that should be there, grey taken off
 MIN_STRENGTH = 0.4  # of the ink's strength
 RADIUS = 0.12  # of the square root of a cell's area, over which colors are averaged
 
 
-def missed(image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice) -> int:
-    """How many cells beside numbered ones are not numbered though their ink shows where they must be.
+def missed(image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice, scale: int) -> int:
+    """How many cells are not numbered, but might be at a finer scale, because they are small at this one.
+
+    These are the places beside numbered cells where the ink shows that must be there, and cells without a number
+    for which the layout has places left, should most be small.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
+        scale: by which it was reduced.
     """
     seen_as = np.full(len(lattice.ink), -1, np.int32)
     numbered = np.flatnonzero(numbering.cell >= 0)
     seen_as[numbering.cell[numbered]] = numbered
-    if (seen_as >= 0).all():
+    free, loose = int((seen_as < 0).sum()), len(cells.ink) - len(numbered)
+    small_px = float(SMALL_AREA_PX * scale * scale)
+    if free == 0:
         return 0
+    if np.median(cells.area_px[numbered]) > small_px:
+        loose = 0
     slope = gradients(cells.center_px, numbering.cell, lattice)
     tables = lattice.ink, lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
-    return int(_missed(image, cells.center_px, cells.area_px, slope, seen_as, *tables))
+    shown = _missed(image, cells.center_px, cells.area_px, slope, seen_as, *tables, small_px)
+    return min(loose, free) + int(shown)
 
 
 @compiled
@@ -42,7 +52,7 @@ def _saturated(color):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _missed(image, center_px, area_px, slope, seen_as, ink, center_mm, axial, cell_of, layers):  # type: ignore[no-untyped-def]
+def _missed(image, center_px, area_px, slope, seen_as, ink, center_mm, axial, cell_of, layers, small_px):  # type: ignore[no-untyped-def]
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     usual, color, own = np.zeros((4, 3)), np.zeros(3), np.zeros(4)
     for u in range(ink.shape[0]):
@@ -74,7 +84,7 @@ def _missed(image, center_px, area_px, slope, seen_as, ink, center_mm, axial, ce
             y += center_px[i, 1] + slope[i, 1, 0] * dx + slope[i, 1, 1] * dy
             size += area_px[i]
             witnesses += 1
-        if witnesses == 0:
+        if witnesses == 0 or size > small_px * witnesses:
             continue
         radius = RADIUS * np.sqrt(size / witnesses)
         if not sample_patch(flat, height, width, x / witnesses, y / witnesses, radius, color):

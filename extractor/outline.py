@@ -24,7 +24,8 @@ def settle(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
     Args:
         at: (K, 2) axial coordinates of the connected cells, up to such a turn and shift.
     """
-    if len(at) < MIN_SHARE * len(lattice.ink):
+    stray = MAX_STRAY * len(at)
+    if len(at) < MIN_SHARE * len(lattice.ink) or len(at) - len(lattice.ink) > stray:
         return None
     outside: list[int] = []
     ways: list[NDArray[np.int32]] = []
@@ -37,7 +38,7 @@ def settle(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
         if len(ways) > MAX_PLACES:
             return None
     order = np.argsort(outside, kind="stable")
-    if len(order) < 2 or outside[order[0]] > MAX_STRAY * len(at):
+    if len(order) < 2 or outside[order[0]] > stray:
         return None
     if outside[order[1]] - outside[order[0]] < max(MIN_MISFITS, MIN_MISFIT * len(at)):
         return None

@@ -105,7 +105,7 @@ class Extractor:
         reason, sights = Reason.NO_COLOR, Sights(bgr)
         for scale in _scales(bgr):
             found = self._number(sights, scale, stages)
-            if isinstance(found, Found) and (scale == 1 or self._whole(bgr, found, stages)):
+            if isinstance(found, Found) and (scale == 1 or self._whole(bgr, found, scale, stages)):
                 return self._measure(sights, found, stages)
             reason = found if isinstance(found, Reason) else reason
         return self._nothing(reason, stages)
@@ -124,13 +124,12 @@ class Extractor:
             return Reason.REFERENCE_LOST
         if numbering.ambiguous:
             return Reason.AMBIGUOUS
-        return Found(cells, stages.done("attach", attach(cells, numbering, self._lattice)))
+        return Found(cells, stages.done("attach", attach(cells, mesh, numbering, self._lattice)))
 
-    def _whole(self, bgr: NDArray[np.uint8], found: Found, stages: Stages) -> bool:
+    def _whole(self, bgr: NDArray[np.uint8], found: Found, scale: int, stages: Stages) -> bool:
         """Whether a finer scale would number no more cells than have been numbered."""
-        loose = int((found.numbering.cell < 0).sum())
-        count = loose + missed(bgr, found.cells, found.numbering, self._lattice)
-        return int(stages.done("missed", count)) <= MAX_MISSED * len(self._lattice.ink)
+        count = stages.done("missed", missed(bgr, found.cells, found.numbering, self._lattice, scale))
+        return int(count) <= MAX_MISSED * len(self._lattice.ink)
 
     def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
         """Stages 1 to 5; None where an ink is absent, or the cells are too small for a reduced scale."""

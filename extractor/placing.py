@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .gradients import gradients
+from .gradients import whole_gradients
 from .numbering import Numbering
 from .tables import Lattice
 
@@ -52,7 +52,7 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     Args:
         size: width and height of the image.
     """
-    slope = gradients(cells.center_px, numbering.cell, lattice)
+    slope = whole_gradients(cells, numbering.cell, lattice, numbering.mirrored)
     here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
     cell = numbering.cell[here]
     ids = lattice.corner_ids[cell]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arcs import by_layer
 from .engine import compiled
 from .fit import Refined
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
@@ -19,7 +20,7 @@ from .placing import Places
 from .tables import Lattice
 from .types import Status
 
-ROUNDS = 4
+ROUNDS = 40  # at most; each drops the worst of every neighbourhood, until none is left
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
@@ -36,8 +37,7 @@ MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a q
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
-UNSEEN = 3.0  # variances more, where the inner ring alone says nothing
-MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
+UNSEEN = 0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
@@ -184,11 +184,12 @@ def _by_neighbours(
     nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
     with np.errstate(invalid="ignore"):
         # where the inner ring alone says something else, the surface is too bent for either to be believed
-        usual = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2
-        doubt = ((place - nearer) ** 2).sum(axis=1) / 4
-        at_most = usual + np.where(np.isfinite(doubt), doubt, UNSEEN * usual)
+        alone = np.isnan(nearer[:, 0])
+        doubt = np.where(alone, (UNSEEN * edge) ** 2, ((place - nearer) ** 2).sum(axis=1) / 4)
+        at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
         safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
-    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance
+    hidden = np.where(alone, 0.25 * (UNSEEN * edge) ** 2, 0.0)
+    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance + hidden
 
 
 def _by_cells(
@@ -218,43 +219,8 @@ def _by_cells(
 def _by_layer(
     xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) places on the quadratic through each lost marker's layer and sextant, between known markers.
-
-    NaN where that is not safe; and their (M,) variances.
-    """
-    place, variance = np.full_like(xy, np.nan), np.full(len(xy), np.nan)
-    for layer in np.unique(lattice.layer[np.isnan(xy[:, 0]) & (lattice.layer > 0)]):
-        first = 3 * layer * (layer - 1) + 1
-        for sextant in range(6):
-            index = np.arange(sextant * layer, (sextant + 1) * layer + 1)
-            ids = first + index % (6 * layer)
-            known = np.isfinite(xy[ids, 0])
-            if known.all() or known.sum() < MIN_LAYER_MARKERS:
-                continue
-            _interpolate(xy, edge, ids, known, place, variance)
-    return place, variance
-
-
-def _interpolate(
-    xy: NDArray[np.float64],
-    edge: NDArray[np.float64],
-    ids: NDArray[np.intp],
-    known: NDArray[np.bool_],
-    place: NDArray[np.float64],
-    variance: NDArray[np.float64],
-) -> None:
-    """Fit x and y as quadratics of the place within the sextant and read them at the lost places in between."""
-    step = np.linspace(-1.0, 1.0, len(ids))
-    rows = np.vander(step, 3)
-    inverse = np.linalg.pinv(rows[known])
-    terms = inverse @ xy[ids[known]]
-    residual = xy[ids[known]] - rows[known] @ terms
-    left = (residual**2).sum() / (2 * (known.sum() - 3))
-    of_place = left * (1 + ((rows @ inverse) ** 2).sum(axis=1))
-    between = np.flatnonzero(known)
-    lost = ~known
-    lost[: between[0]] = False
-    lost[between[-1] + 1 :] = False
-    lost &= of_place + (3 * MODEL_SIGMA * edge[ids]) ** 2 < (MAX_SIGMA * edge[ids]) ** 2
-    place[ids[lost]] = (rows @ terms)[lost]
-    variance[ids[lost]] = HEAVY_ERROR * of_place[lost] + (MODEL_SIGMA * edge[ids[lost]]) ** 2
+    """(M, 2) places by the markers of each lost marker's layer, NaN where not safe, and their (M,) variances."""
+    place, variance = by_layer(xy, lattice.layers)
+    with np.errstate(invalid="ignore"):
+        safe = variance + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_SIGMA * edge) ** 2
+    return np.where(safe[:, None], place, np.nan), HEAVY_ERROR * variance + (MODEL_SIGMA * edge) ** 2

@@ -54,6 +54,13 @@ class Lattice:
         return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
 
     @cached_property
+    def size_mm(self) -> NDArray[np.float64]:
+        """(U,) the mean side of the colored cells."""
+        corners = self.marker_mm[self.corner_ids]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        return np.asarray(sides.mean(axis=1))
+
+    @cached_property
     def meeting(self) -> NDArray[np.int64]:
         """(M,) how many colored cells meet at each marker."""
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))

@@ -1,0 +1,135 @@
+"""Whether cells that were numbered across a gap stand where the pattern goes on.
+
+Cells of one ink are 1.7 cells apart. A part of the pattern beyond a scratch, numbered one such step aside, looks right
+in itself and is wrong as a whole. But the way across the gap must be as long as the pattern on both sides says.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import Cells
+from .engine import compiled
+from .gradients import gradients
+from .lattice import SIX, layer_of, marker_id
+from .near import bucketed, nearest
+from .tables import Lattice
+
+
+class Limits(NamedTuple):
+    """In cells, between the way by the numbers and by the pattern's slopes; a wrong step makes 1.7.
+
+    Attributes:
+        cell: of a single cell.
+        group: the median of a group, of which at least
+        members: so many can be judged.
+    """
+
+    cell: float
+    group: float
+    members: int
+
+
+PREDICTED = Limits(0.9, 0.6, 1)  # cells numbered by prediction
+MESHED = Limits(
+    np.inf, 1.2, 8
+)  # cells that hang together with the rest by damaged ones: sharp bends look so, too
+REACH = 5.0  # how far apart the two sides may be, in cells
+PAIRS = 3  # cells on the near side that each beyond is compared with
+
+
+def unbridged(
+    cells: Cells, before: NDArray[np.int32], after: NDArray[np.int32], lattice: Lattice, limits: Limits
+) -> NDArray[np.bool_]:
+    """(N,) bool, the cells beyond gaps whose numbers make the way across longer or shorter than the pattern is.
+
+    Cells that hang together fall together when most of them do; what has no whole neighbours is not judged.
+
+    Args:
+        before, after: (N,) the layout's cell of each cell of the image, or -1, without and with those beyond gaps.
+    """
+    tables = lattice.axial, lattice.cell_of, lattice.layers
+    slope = gradients(cells.center_px, after, lattice)
+    group, sure = _groups(before, after, cells.whole, slope, len(lattice.ink), tables)
+    here = np.flatnonzero(sure & (before >= 0))
+    there = np.flatnonzero(sure & (group >= 0))
+    bad = np.zeros(len(after), np.bool_)
+    if len(here) < PAIRS or len(there) == 0:
+        return bad
+    layout = lattice.center_mm, lattice.size_mm
+    jump = _jumps(cells.center_px, slope, after, here, there, *layout)
+    bad[there] = jump > limits.cell
+    for one in np.unique(group[there]):
+        known = jump[(group[there] == one) & np.isfinite(jump)]
+        if len(known) >= limits.members and np.median(known) > limits.group:
+            bad[group == one] = True
+    return bad
+
+
+@compiled
+def _groups(before, after, whole, slope, count, tables):  # type: ignore[no-untyped-def]
+    """(N,) int32 the group of neighbouring cells beyond gaps that each belongs to, or -1; and (N,) bool, the numbered
+    cells with a slope that are whole and amid whole ones."""
+    axial, cell_of, layers = tables
+    seen_as = np.full(count, -1, np.int32)
+    for i in range(after.shape[0]):
+        if after[i] >= 0:
+            seen_as[after[i]] = i
+    group, sure = np.full(after.shape[0], -1, np.int32), np.zeros(after.shape[0], np.bool_)
+    beside = np.full((after.shape[0], 6), -1, np.int32)
+    for i in range(after.shape[0]):
+        if after[i] < 0:
+            continue
+        sure[i] = whole[i] and np.isfinite(slope[i, 0, 0])
+        for k in range(6):
+            q, r = axial[after[i], 0] + SIX[k, 0], axial[after[i], 1] + SIX[k, 1]
+            if layer_of(q, r) <= layers and cell_of[marker_id(q, r)] >= 0:
+                j = seen_as[cell_of[marker_id(q, r)]]
+                beside[i, k] = j
+                sure[i] = sure[i] and (j < 0 or whole[j])
+    stack, found = np.empty(after.shape[0], np.int32), 0
+    for first in range(after.shape[0]):
+        if after[first] < 0 or before[first] >= 0 or group[first] >= 0:
+            continue
+        group[first] = found
+        stack[0], height = first, 1
+        while height > 0:
+            height -= 1
+            i = stack[height]
+            for k in range(6):
+                j = beside[i, k]
+                if j >= 0 and before[j] < 0 and group[j] < 0:
+                    group[j] = found
+                    stack[height] = j
+                    height += 1
+        found += 1
+    return group, sure
+
+
+@compiled
+def _jumps(center_px, slope, cell, here, there, center_mm, size_mm):  # type: ignore[no-untyped-def]
+    """(T,) how far, in cells, each cell there is from where its numbers put it, by the slopes on both sides; NaN where
+    nothing here is in reach."""
+    out, apart = np.full(there.shape[0], np.nan), np.empty(PAIRS)
+    index, square = np.empty(PAIRS, np.int32), np.empty(PAIRS)
+    xy = center_px[here]
+    grid = bucketed(xy)
+    for n in range(there.shape[0]):
+        j = there[n]
+        nearest(xy, grid, center_px[j, 0], center_px[j, 1], index, square)
+        for k in range(PAIRS):
+            i = here[index[k]]
+            a, b = 0.5 * (slope[i, 0, 0] + slope[j, 0, 0]), 0.5 * (slope[i, 0, 1] + slope[j, 0, 1])
+            c, d = 0.5 * (slope[i, 1, 0] + slope[j, 1, 0]), 0.5 * (slope[i, 1, 1] + slope[j, 1, 1])
+            determinant = a * d - b * c
+            x, y = center_px[j, 0] - center_px[i, 0], center_px[j, 1] - center_px[i, 1]
+            dx = (d * x - b * y) / determinant - center_mm[cell[j], 0] + center_mm[cell[i], 0]
+            dy = (a * y - c * x) / determinant - center_mm[cell[j], 1] + center_mm[cell[i], 1]
+            apart[k] = np.hypot(dx, dy) / size_mm[cell[j]]
+        size = np.sqrt(abs(determinant)) * size_mm[cell[j]]  # of a cell there, px
+        if square[0] < (REACH * size) ** 2:
+            out[n] = np.median(apart)
+    return out

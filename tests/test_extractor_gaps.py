@@ -1,0 +1,120 @@
+"""Across gaps and beside dirt: what is numbered there is right, and no dirt is the white cell."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from benchmarks.stress_suite.damage import one_hole, scratches
+from benchmarks.stress_suite.frames import PATTERNS, RGB, Frame, plain
+from benchmarks.stress_suite.reading import extractor_of
+from benchmarks.stress_suite.score import Score, score
+from extractor.arcs import by_layer
+from extractor.bridge import MESHED, PREDICTED, unbridged
+from extractor.cells import Cells
+from extractor.near import bucketed, nearest
+from extractor.tables import Lattice, cells_at, lattice_of
+
+
+def read(frame: Frame) -> Score:
+    shot = frame.shoot()
+    return score(extractor_of(frame.layout.pattern, 11).extract(shot.image), shot, promised=True)
+
+
+@cache
+def lattice(pattern: str) -> Lattice:
+    return lattice_of(extractor_of(pattern, 11).layout)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 999),
+    count=st.integers(1, 300),
+    shape=st.sampled_from([(1, 1), (200, 1), (0, 1), (0, 0)]),
+)
+def test_the_nearest_are_those_of_a_tree(seed: int, count: int, shape: tuple[float, float]) -> None:
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-50, 50, (count, 2)) * shape
+    grid, wanted = bucketed(xy), min(8, count)
+    for query in rng.uniform(-80, 80, (5, 2)) * shape:
+        index, square = np.empty(8, np.int32), np.empty(8)
+        found = nearest(xy, grid, query[0], query[1], index, square)
+        distance = cKDTree(xy).query(query, [*range(1, wanted + 1)])[0]
+        assert found == wanted
+        np.testing.assert_allclose(np.sqrt(square[:found]), distance, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(xy[index[:found]] - query, axis=1), distance, atol=1e-9)
+
+
+def test_a_layers_quadratic_is_numpys() -> None:
+    """In layer 8, sextant 2: markers off a quadratic by noise, three of them lost; the others as polyfit has them."""
+    rng = np.random.default_rng(1)
+    ids, step = 3 * 8 * 7 + 1 + np.arange(16, 25), np.linspace(-1, 1, 9)
+    xy = np.full((397, 2), np.nan)
+    rows = np.vander(step, 3)
+    xy[ids] = rows @ rng.uniform(-40, 40, (3, 2)) + rng.normal(0, 0.2, (9, 2))
+    known = np.ones(9, np.bool_)
+    known[[2, 5, 6]] = False
+    xy[ids[~known]] = np.nan
+    place, variance = by_layer(xy, 11)
+    terms = np.polyfit(step[known], xy[ids[known]], 2)
+    left = ((xy[ids[known]] - rows[known] @ terms) ** 2).sum() / (2 * 3)
+    leverage = np.diag(rows @ np.linalg.inv(rows[known].T @ rows[known]) @ rows.T)
+    np.testing.assert_allclose(place[ids[~known]], (rows @ terms)[~known])
+    np.testing.assert_allclose(variance[ids[~known]], (left * (1 + leverage))[~known])
+    assert np.isnan(place[np.setdiff1d(np.arange(397), ids[~known])]).all()
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_part_numbered_one_step_aside_is_refused(pattern: str) -> None:
+    """The cells right of a gap, numbered as those of their ink one step farther, fit each other, but not the rest."""
+    table = lattice(pattern)
+    corners = table.marker_mm[table.corner_ids] * (20.0, -20.0)
+    center = corners.mean(axis=1)
+    cells = Cells(center, table.ink, np.full(len(center), 170.0), corners)
+    right = np.arange(len(center), dtype=np.int32)
+    gap, beyond = np.abs(center[:, 0] - 45) < 25, center[:, 0] >= 70
+    before = np.where(gap | beyond, -1, right).astype(np.int32)
+    after = np.where(gap, -1, right).astype(np.int32)
+    assert not unbridged(cells, before, after, table, PREDICTED).any()
+    aside = cells_at(table.axial + np.array([1, 1], np.int32), table)
+    shifted = np.where(beyond, aside, before).astype(np.int32)
+    for limits in (PREDICTED, MESHED):
+        refused = unbridged(cells, before, shifted, table, limits)
+        assert refused[beyond & (shifted >= 0)].mean() > 0.9
+        assert not refused[~beyond].any()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "seed", "count", "width_mm", "rgb", "aside"),
+    [
+        ("honeycomb", 1374, 2, 0.49, (32.0, 76.0, 160.0), 1.08),
+        ("elliptical", 1028, 3, 0.86, (46.0, 183.0, 143.0), 1.03),
+        ("round", 1099, 3, 0.6, (191.0, 93.0, 131.0), 2.49),
+        ("elliptical", 1160, 2, 0.86, (167.0, 153.0, 178.0), 1.3),
+        ("honeycomb", 1308, 3, 0.39, (82.0, 138.0, 45.0), 1.37),
+        ("elliptical", 1466, 3, 0.22, (168.0, 49.0, 83.0), 1.22),
+    ],
+)
+def test_dirt_of_any_color_is_not_the_white_cell(
+    pattern: str, seed: int, count: int, width_mm: float, rgb: RGB, aside: float
+) -> None:
+    """Scratches that cross black cells, and cut the pattern into parts that have no white cell of their own."""
+    figures = read(scratches(plain(pattern, seed), count, width_mm, rgb, aside))
+    assert figures.wrong == 0
+    assert figures.kept >= 0.96 * figures.sure
+
+
+def test_a_block_beyond_a_scratch_is_numbered() -> None:
+    figures = read(scratches(plain("honeycomb", 0), 5, 0.3))
+    assert figures.wrong == 0 and figures.kept >= 0.99 * figures.sure
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_cells_in_a_row_beside_a_hole_have_corners(pattern: str) -> None:
+    figures = read(one_hole(plain(pattern, 0), 0.3))
+    assert figures.wrong == 0 and figures.kept >= 0.98 * figures.sure
