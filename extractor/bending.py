@@ -42,6 +42,7 @@ from .synthesis import (
 # are smooth, and at most; and what is left to move a gridline's ends, in deviations of b and s.
 SMOOTH, FREE = 0.015, 0.25
 HIDDEN = 0.08
+MAX_FREE = 0.06  # in units of the gridline's length
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
 OF_NOISE = 2 * 20 * 2.0
 OF_MEDIAN = 2.0  # a mean of squares against their median
@@ -105,7 +106,7 @@ def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def freedom(sums, to_a, to_b, off, bend, rough, use, edges, variance):  # type: ignore[no-untyped-def]
+def freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
     """(E,) px^2, the variance of b and s, by what the gridlines around show, as far as they are in use (E,), and by how
     rough (M,) their ends are."""
     count = rough.shape[0]
@@ -132,7 +133,8 @@ def freedom(sums, to_a, to_b, off, bend, rough, use, edges, variance):  # type: 
         if square > 0.0 and seen > 0.0:
             noise = (of_noise[i] + of_noise[j]) / seen
             shown = (total[i] + total[j]) / seen - noise * (1.0 + SURE * np.sqrt(2.0 / seen))
-            out[e] = min(max(shown, SMOOTH**2 * square), FREE**2 * square)
+            most = min(FREE**2 * square, (MAX_FREE * lines[e, LENGTH]) ** 2)
+            out[e] = min(max(shown, SMOOTH**2 * square), most)
     return out
 
 

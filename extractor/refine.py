@@ -173,7 +173,7 @@ class Refiner:
             view.image, lines, across.weights, across.room, fit.sigma, self._loose(fit), stations
         )
         to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
-        fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
+        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off)
         use = (sums[:, AA] > 0).astype(np.float64)
         if judged:
             pardon = PARDON**2 * across.room[:, 3]
@@ -204,7 +204,7 @@ class Refiner:
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, self._loose(fit))
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        fit, kept = self._eliminated(fit, sums, to_a, to_b, off)
+        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off)
         use, noise = trust(sums, to_a, to_b, hidden_misfit(fit.loose, contrasts, sigma), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
@@ -236,6 +236,7 @@ class Refiner:
     def _eliminated(
         self,
         fit: Fit,
+        lines: NDArray[np.float64],
         sums: NDArray[np.float64],
         to_a: NDArray[np.float64],
         to_b: NDArray[np.float64],
@@ -244,7 +245,7 @@ class Refiner:
         """How freely gridlines bend, and what their bending is, taken out of their sums and votes."""
         variance = fit.noise**2
         use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
-        loose = freedom(sums, to_a, to_b, off, fit.bend, fit.rough, use, self._mesh.edges, variance)
+        loose = freedom(sums, to_a, to_b, off, fit.bend, fit.rough, use, lines, self._mesh.edges, variance)
         return fit._replace(loose=loose), eliminate(sums, to_a, to_b, off, fit.bend, loose, variance)
 
     def _moved(

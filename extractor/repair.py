@@ -37,6 +37,7 @@ MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a q
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
+RIM_LEVERAGE = 2.0  # the same for what cells imply, too
 UNSEEN = 0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
 MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
@@ -211,7 +212,12 @@ def _by_cells(
     with np.errstate(invalid="ignore"):
         deep = np.minimum(places.xy_px, np.array(size) - 1 - places.xy_px).min(axis=1) > BORDER * edge
         use = lost & deep & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
-        use &= spread * (1 + leverage) < (MAX_IMPLIED * edge) ** 2
+        known = spread * (1 + leverage)
+        use &= (
+            (leverage < RIM_LEVERAGE)
+            & (known < (MAX_IMPLIED * edge) ** 2)
+            & (squares < 4 * (known + (IMPLIED_SIGMA * edge) ** 2))
+        )
     variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
     return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
 

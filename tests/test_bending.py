@@ -124,9 +124,11 @@ def test_freedom_is_what_gridlines_show(b: float, least: float, most: float) -> 
     sums = np.repeat(read(b * t * (1 - t)), len(own.edges), axis=0)
     rough = np.full(len(layout().marker_xy_mm), 100.0)
     given_ = sums, sums[:, A], sums[:, B], np.zeros(len(sums)), np.zeros((len(sums), 2)), rough
-    loose = freedom(*given_, np.ones(len(sums)), own.edges, 4.0)
+    lines = np.zeros((len(sums), 8))
+    lines[:, LENGTH] = 20.0
+    loose = freedom(*given_, np.ones(len(sums)), lines, own.edges, 4.0)
     assert (least <= np.sqrt(loose)).all() and (np.sqrt(loose) <= max(most, 0.015 * 10 + 1e-9)).all()
-    tight = freedom(*given_[:-1], 1e-4 * rough, np.ones(len(sums)), own.edges, 4.0)
+    tight = freedom(*given_[:-1], 1e-4 * rough, np.ones(len(sums)), lines, own.edges, 4.0)
     assert (np.sqrt(tight) <= FREE * 0.1 + 1e-9).all()
 
 
