@@ -40,7 +40,7 @@ from .synthesis import (
 
 # From the surfaces under balls that press, shear and twist: b and s over the differences around them (RMS) where these
 # are smooth, and at most; and what is left to move a gridline's ends, in deviations of b and s.
-SMOOTH, FREE = 0.015, 0.25
+SMOOTH, FREE = 0.01, 0.25
 HIDDEN = 0.08
 MAX_FREE = 0.06  # in units of the gridline's length
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
@@ -48,7 +48,7 @@ OF_NOISE = 2 * 20 * 2.0
 OF_MEDIAN = 2.0  # a mean of squares against their median
 PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
 MAX_PARDON = 0.1
-SURE = 2.0  # standard deviations that bending must exceed its noise by
+SURE = 3.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 

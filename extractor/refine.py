@@ -173,7 +173,7 @@ class Refiner:
             view.image, lines, across.weights, across.room, fit.sigma, self._loose(fit), stations
         )
         to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
-        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off)
+        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off, JUDGED_BY_SAMPLES)
         use = (sums[:, AA] > 0).astype(np.float64)
         if judged:
             pardon = PARDON**2 * across.room[:, 3]
@@ -204,7 +204,7 @@ class Refiner:
         sums = read_gridlines(image, model, lines, contrasts, black, sigma, box, self._loose(fit))
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         to_a, to_b, off = votes(sums, contrasts, mesh.edge_cells, *changes, middle, *frame)
-        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off)
+        fit, kept = self._eliminated(fit, lines, sums, to_a, to_b, off, JUDGED_BY_PIXELS)
         use, noise = trust(sums, to_a, to_b, hidden_misfit(fit.loose, contrasts, sigma), *JUDGED_BY_PIXELS)
         now = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         widen = float(
@@ -241,9 +241,15 @@ class Refiner:
         to_a: NDArray[np.float64],
         to_b: NDArray[np.float64],
         off: NDArray[np.float64],
+        judged_by: tuple[int, int, float],
     ) -> tuple[Fit, NDArray[np.float64]]:
         """How freely gridlines bend, and what their bending is, taken out of their sums and votes."""
-        variance = fit.noise**2
+        if not fit.rough.any() and not fit.bend.any():
+            stiff = np.zeros(len(sums))
+            return fit._replace(loose=stiff), eliminate(sums, to_a, to_b, off, fit.bend, stiff, 1.0)
+        # what the drawing misses everywhere is no bending either
+        usual = trust(sums, to_a, to_b, np.zeros(len(sums)), *judged_by)[1]
+        variance = max(fit.noise, usual) ** 2 if np.isfinite(usual) else fit.noise**2
         use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
         loose = freedom(sums, to_a, to_b, off, fit.bend, fit.rough, use, lines, self._mesh.edges, variance)
         return fit._replace(loose=loose), eliminate(sums, to_a, to_b, off, fit.bend, loose, variance)

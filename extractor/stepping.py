@@ -25,7 +25,7 @@ from .synthesis import (
 
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
-WEAK = 0.03  # of the usual information, below which a marker does not guide its neighbours' gridlines
+WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines
 TRUSTED = 0.4  # of a gridline, for its places to be measured
 BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
