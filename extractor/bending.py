@@ -64,16 +64,17 @@ def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near):  # type: i
     noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
     out, seen = np.zeros(xy.shape[0]), np.empty(spokes.shape[1] * (1 + FIRST_RING))
     for m in range(xy.shape[0]):
-        count = 0
+        count, above = 0, 0
         for k in range(-1, FIRST_RING):
             n = m if k < 0 else near[m, k]
             if n < 0:
                 continue
             for e in spokes[n]:
-                if e >= 0 and np.isfinite(square[e]):
+                if e >= 0 and square[e] >= 0.0:  # not where it is not known
                     seen[count] = square[e]
                     count += 1
-        if count > 0:
+                    above += OF_MEDIAN * square[e] > noise
+        if 2 * above > count:
             out[m] = max(OF_MEDIAN * np.median(seen[:count]) - noise, 0.0)
     return out
 

@@ -132,8 +132,8 @@ class Refiner:
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted, places)
         start = fit
-        for _ in range(steps.synthesis):
-            fit = self._synthesis_step(view, fit)
+        for step in range(steps.synthesis):
+            fit = self._synthesis_step(view, fit, last=step + 1 == steps.synthesis)
             if fit.moved < steps.enough:
                 break
         return self._result(view, fit, start, across, places)
@@ -165,7 +165,7 @@ class Refiner:
     ) -> tuple[Fit, NDArray[np.bool_]]:
         """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should.
 
-        Gridlines are ``judged`` only where they are already close: farther off, the best of them look wrong.
+        Gridlines are ``judged`` in the last round only, where they are already close: farther off, the best look wrong.
         """
         mesh = self._mesh
         lines = self._lines(fit)
@@ -183,7 +183,8 @@ class Refiner:
         foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
         fit = fit._replace(reading=reading)
-        return self._moved(fit, sums, lines, shift, information), trusted_markers(use, mesh.spokes)
+        fit = self._moved(fit, sums, lines, shift, information, last=judged)
+        return fit, trusted_markers(use, mesh.spokes)
 
     def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
         """The blur that some of the gridlines show, px."""
@@ -191,7 +192,7 @@ class Refiner:
         sigma = profile_blur(view.image, lines, across.weights, across.room, every)
         return max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else BLIND_SIGMA_PX
 
-    def _synthesis_step(self, view: Sight, fit: Fit) -> Fit:
+    def _synthesis_step(self, view: Sight, fit: Fit, *, last: bool) -> Fit:
         image, frame = view.image, view.frame
         mesh, levels, sigma = self._mesh, fit.levels, fit.sigma
         box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
@@ -216,7 +217,7 @@ class Refiner:
         foot = foot_of(contrasts, black, off)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
         fit = fit._replace(sigma=max(sigma + widen, MIN_SIGMA_PX), reading=reading)
-        return self._moved(fit, sums, lines, shift, information)
+        return self._moved(fit, sums, lines, shift, information, last=last)
 
     def _drawn(
         self, fit: Fit, lines: NDArray[np.float64], box: NDArray[np.int64], shape: tuple[int, ...]
@@ -261,18 +262,22 @@ class Refiner:
         lines: NDArray[np.float64],
         shift: NDArray[np.float64],
         information: Information,
+        *,
+        last: bool,
     ) -> Fit:
-        """The fit after a step."""
+        """The fit after a step; after the ``last`` one nothing is drawn."""
         assert fit.reading is not None
         least = shown(sums, fit.reading.use, lines, self._mesh.edges, fit.noise**2, len(fit.xy))
         measured, guiding, steps = moved(fit.xy, shift, information.diagonal, least, fit.beyond)
+        fit = fit._replace(measured=measured, information=information, moved=float(steps))
+        if last:
+            return fit
         xy, beyond, maps = self._completed(guiding)
         mesh = self._mesh
         rough = roughness(
             guiding, maps, information.diagonal, mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near
         )
-        fit = fit._replace(xy=xy, measured=measured, beyond=beyond, maps=maps, moved=float(steps))
-        return fit._replace(information=information, rough=rough)
+        return fit._replace(xy=xy, beyond=beyond, maps=maps, rough=rough)
 
     def _level_step(self, view: Sight, model: NDArray[np.float32], fit: Fit) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
