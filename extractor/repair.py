@@ -69,8 +69,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     edge_px = places.edge_px
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
-    around = lattice.neighbours[:, INNER]
-    _drop_slid(xy, cov, refined.free_px, places.xy_px, edge_px, around, lattice.present)
+    _drop_slid(xy, cov, refined.free_px, places, lattice)
     measured, edge = xy.copy(), _filled(edge_px, lattice)
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
@@ -151,12 +150,36 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
         xy[bad], cov[bad] = np.nan, np.nan
 
 
-@compiled
-def _drop_slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-untyped-def]
-    """Set to NaN the markers of the pattern's rim that lie far from their ``start`` and are not sure, in place.
+def _drop_slid(
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    free_px: NDArray[np.float64],
+    places: Places,
+    lattice: Lattice,
+) -> None:
+    """Set to NaN the markers of the pattern's rim that refinement took far from their triangles and is not sure of,
+    unless it took them nearer to where the neighbours put them.
 
-    Where two gridlines end that may bend (``free``, px), the corner between them slides along both.
+    Where two gridlines end that may bend, the corner between them slides along both.
     """
+    slid = _slid(
+        xy, cov, free_px, places.xy_px, places.edge_px, lattice.neighbours[:, INNER], lattice.present
+    )
+    if not slid.any():
+        return
+    place, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
+    after, before = (np.hypot(*(start - place).T) for start in (xy, places.xy_px))
+    with np.errstate(invalid="ignore"):
+        nearer = (after < before) & (after < MAX_DEVIATION * places.edge_px) & (support >= MIN_QUADRATIC)
+    bad = slid & ~nearer
+    xy[bad], cov[bad] = np.nan, np.nan
+
+
+@compiled
+def _slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-untyped-def]
+    """(M,) bool: markers of the rim that lie far from their ``start`` and are not sure, or their gridlines bend
+    (``free``, px)."""
+    out = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
         inside = True
         for n in around[m]:
@@ -164,8 +187,8 @@ def _drop_slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-
         limit = VAGUE * edge[m]
         if not inside and (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
             dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-            if dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2:
-                xy[m], cov[m] = np.nan, np.nan
+            out[m] = dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+    return out
 
 
 def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
