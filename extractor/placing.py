@@ -21,6 +21,7 @@ AGREED_SPREAD = 0.2  # of those that agree, in the triangle's shortest edge
 SHARP_SHARE = 0.6
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
+AGREED = 0.04  # standard deviation in edges of corners on which triangles agree, where gridlines bend
 X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
 
 

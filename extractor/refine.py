@@ -22,7 +22,7 @@ from .image import estimate_noise
 from .information import Information, assemble, covariances, gradient, solve
 from .levels import Levels, black_at, cell_means, smooth_levels
 from .offsets import Reading, foot_of, measure
-from .placing import Places
+from .placing import AGREED, Places
 from .presets import STEPS, Preset
 from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
@@ -55,7 +55,6 @@ MARGIN_SIGMA = 4.0
 # profiles may lie apart, in units of the edges around the marker.
 UNEXPLAINED = 0.015
 MAX_APART = 0.1
-AGREED = 0.04  # standard deviation of triangles' corners where gridlines bend too much for anything else
 MAX_WIDEN = 0.3  # of the blur, in one step
 # how a gridline is judged by its misfit: values that each place adds, places needed, and trust in one with fewer
 JUDGED_BY_PIXELS = 3, 8, 0.0

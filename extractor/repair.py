@@ -16,7 +16,7 @@ from .arcs import by_layer
 from .engine import compiled
 from .fit import Refined
 from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
-from .placing import Places
+from .placing import AGREED, Places
 from .tables import Lattice
 from .types import Status
 
@@ -157,8 +157,9 @@ def _drop_slid(
     places: Places,
     lattice: Lattice,
 ) -> None:
-    """Set to NaN the markers of the pattern's rim that refinement took far from their triangles and is not sure of,
-    unless it took them nearer to where the neighbours put them.
+    """The markers of the pattern's rim that refinement took far from their triangles and is not sure of stay only where
+    it took them nearer to where the neighbours put them; else they return to their triangles, or are NaN where the
+    neighbours say something else.
 
     Where two gridlines end that may bend, the corner between them slides along both.
     """
@@ -167,12 +168,16 @@ def _drop_slid(
     )
     if not slid.any():
         return
-    place, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
-    after, before = (np.hypot(*(start - place).T) for start in (xy, places.xy_px))
+    expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
+    after, before = (np.hypot(*(start - expected).T) for start in (xy, places.xy_px))
     with np.errstate(invalid="ignore"):
-        nearer = (after < before) & (after < MAX_DEVIATION * places.edge_px) & (support >= MIN_QUADRATIC)
-    bad = slid & ~nearer
+        near, known = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
+        stays = (after < before) & (after < near) & known
+        back = slid & ~stays & (before < near) & known & places.agreed
+    bad = slid & ~stays & ~back
     xy[bad], cov[bad] = np.nan, np.nan
+    xy[back] = places.xy_px[back]
+    cov[back] = ((AGREED * places.edge_px[back]) ** 2)[:, None, None] * np.eye(2)
 
 
 @compiled
