@@ -33,6 +33,6 @@ class Steps(NamedTuple):
 
 STEPS: dict[Preset, Steps] = {
     "fast": Steps((2, 64), 0.5, 0.085, np.inf, 1, 0.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 4, 10.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 4, 8.5),
     "accurate": Steps((8, 8), 1.2, 0.0, 1, 10, 0.7),
 }
