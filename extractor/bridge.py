@@ -16,6 +16,7 @@ from .engine import compiled
 from .gradients import gradients
 from .lattice import SIX, layer_of, marker_id
 from .near import bucketed, nearest
+from .parts import connected
 from .tables import Lattice
 
 
@@ -78,7 +79,7 @@ def _groups(before, after, whole, slope, count, tables):  # type: ignore[no-unty
     for i in range(after.shape[0]):
         if after[i] >= 0:
             seen_as[after[i]] = i
-    group, sure = np.full(after.shape[0], -1, np.int32), np.zeros(after.shape[0], np.bool_)
+    sure = np.zeros(after.shape[0], np.bool_)
     beside = np.full((after.shape[0], 6), -1, np.int32)
     for i in range(after.shape[0]):
         if after[i] < 0:
@@ -90,23 +91,7 @@ def _groups(before, after, whole, slope, count, tables):  # type: ignore[no-unty
                 j = seen_as[cell_of[marker_id(q, r)]]
                 beside[i, k] = j
                 sure[i] = sure[i] and (j < 0 or whole[j])
-    stack, found = np.empty(after.shape[0], np.int32), 0
-    for first in range(after.shape[0]):
-        if after[first] < 0 or before[first] >= 0 or group[first] >= 0:
-            continue
-        group[first] = found
-        stack[0], height = first, 1
-        while height > 0:
-            height -= 1
-            i = stack[height]
-            for k in range(6):
-                j = beside[i, k]
-                if j >= 0 and before[j] < 0 and group[j] < 0:
-                    group[j] = found
-                    stack[height] = j
-                    height += 1
-        found += 1
-    return group, sure
+    return connected(beside, (after >= 0) & (before < 0)), sure
 
 
 @compiled

@@ -14,24 +14,25 @@ WITNESSES = 80  # faces that say which turn is that of the markers
 
 
 @compiled
-def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
-    """(F,) the connected part of the mesh that each face belongs to, counted from 0; -1 for no face."""
-    part = np.full(turn.shape[0], -1, np.int32)
-    stack = np.empty(turn.shape[0], np.int32)
+def connected(neighbours, member):  # type: ignore[no-untyped-def]
+    """(N,) int32, counted from 0, the connected part that each ``member`` (N,) bool belongs to, by its ``neighbours``
+    (N, K), -1 for none; -1 for what is no member."""
+    part = np.full(member.shape[0], -1, np.int32)
+    stack = np.empty(member.shape[0], np.int32)
     count = 0
-    for first in range(turn.shape[0]):
-        if turn[first] == 0 or part[first] >= 0:
+    for first in range(member.shape[0]):
+        if not member[first] or part[first] >= 0:
             continue
         part[first] = count
         stack[0], height = first, 1
         while height > 0:
             height -= 1
-            f = stack[height]
-            for k in range(3):
-                g = neighbours[f, k]
-                if g >= 0 and part[g] < 0:
-                    part[g] = count
-                    stack[height] = g
+            i = stack[height]
+            for k in range(neighbours.shape[1]):
+                j = neighbours[i, k]
+                if j >= 0 and member[j] and part[j] < 0:
+                    part[j] = count
+                    stack[height] = j
                     height += 1
         count += 1
     return part
@@ -39,7 +40,7 @@ def _parts(neighbours, turn):  # type: ignore[no-untyped-def]
 
 def largest_parts(mesh: Mesh, count: int) -> list[NDArray[np.intp]]:
     """The faces of each of the largest connected parts of the mesh, the largest first."""
-    part = _parts(mesh.neighbours, mesh.turn)
+    part = connected(mesh.neighbours, mesh.turn != 0)
     sizes = np.bincount(part[part >= 0])
     return [np.flatnonzero(part == i) for i in np.argsort(-sizes, kind="stable")[:count]]
 

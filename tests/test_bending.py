@@ -17,9 +17,12 @@ from cmpdesign.scene import Camera, Rendered, render
 from cmpdesign.scene.standard import standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
-from extractor.bending import FREE, bent, eliminate, freedom, roughness
+from extractor.bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
 from extractor.gridlines import KNOWN, LENGTH, UX, local_maps
+from extractor.placing import Places
+from extractor.repair import _drop_slid
 from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, SUMS, A, B, C, D
+from extractor.tables import lattice_of
 from extractor.topology import Topology, topology_of
 
 Array = NDArray[np.float64]
@@ -128,8 +131,47 @@ def test_freedom_is_what_gridlines_show(b: float, least: float, most: float) -> 
     lines[:, LENGTH] = 20.0
     loose = freedom(*given_, np.ones(len(sums)), lines, own.edges, 4.0)
     assert (least <= np.sqrt(loose)).all() and (np.sqrt(loose) <= max(most, 0.015 * 10 + 1e-9)).all()
+    short = lines.copy()
+    short[:, LENGTH] = 2.0
+    held = freedom(*given_, np.ones(len(sums)), short, own.edges, 4.0)
+    assert (np.sqrt(held) <= MAX_FREE * 2.0 + 1e-9).all()
     tight = freedom(*given_[:-1], 1e-4 * rough, np.ones(len(sums)), lines, own.edges, 4.0)
     assert (np.sqrt(tight) <= FREE * 0.1 + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("refined_off", "found_off", "agreed", "free_px", "expected"),
+    [
+        ((4.0, 0.0), (0.0, 0.0), True, 1.0, "found"),  # it slid: back to where its triangle is
+        ((4.0, 0.0), (0.0, 0.0), False, 1.0, "lost"),
+        ((4.0, 0.0), (0.0, 0.0), True, 0.0, "refined"),  # its gridlines do not bend: refinement is believed
+        ((0.0, 0.0), (4.0, 0.0), True, 1.0, "refined"),  # refinement is where the neighbours say
+        ((9.0, 0.0), (5.0, 0.0), True, 1.0, "lost"),  # neither is
+    ],
+)
+def test_a_corner_of_the_rim_that_slid_is_not_believed(
+    refined_off: tuple[float, float],
+    found_off: tuple[float, float],
+    agreed: bool,
+    free_px: float,
+    expected: str,
+) -> None:
+    lattice = lattice_of(parse_layout(layout_to_json(layout())))
+    flat = 20 * layout().marker_xy_mm + 200
+    count, corner = len(flat), int(np.flatnonzero(lattice.layer == LAYERS)[LAYERS // 2])  # amid a side
+    xy, found = flat.copy(), flat.copy()
+    xy[corner] += refined_off
+    found[corner] += found_off
+    cov = np.tile(1e-4 * np.eye(2), (count, 1, 1))
+    all_agree = np.full(count, agreed)
+    places = Places(found, np.full(count, 20.0), np.empty((0, 3), np.int32), all_agree, all_agree)
+    after = xy.copy()
+    _drop_slid(after, cov, np.full(count, free_px), places, lattice)
+    others = np.arange(count) != corner
+    np.testing.assert_array_equal(after[others], flat[others])
+    wanted = {"found": found[corner], "refined": xy[corner], "lost": [np.nan, np.nan]}[expected]
+    np.testing.assert_array_equal(after[corner], wanted)
+    assert (cov[corner, 0, 0] == pytest.approx(0.8**2)) == (expected == "found")
 
 
 LOADS = {"press": Motion(1.0), "shear": Motion(1.0, (0.5, 0.0)), "twist": Motion(1.0, twist_deg=10.0)}

@@ -11,6 +11,8 @@ from test_verify import markers_at, picture
 
 from cmpdesign import demo
 
+README = Path(__file__).parent.parent / "README.md"
+
 
 def test_the_demo_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -21,7 +23,9 @@ def test_the_demo_runs(
     table = words[words.index("against") :]
     for row, expected in (("visible", "331"), ("measured", "331"), ("lost", "0"), ("ids", "0")):
         assert table[table.index(row) + 1] == expected
-    assert 0 < float(table[table.index("axis") + 1]) < 0.05
+    error = table[table.index("axis") + 1]
+    assert 0 < float(error) < 0.05
+    assert f"{error} px RMS error per axis" in README.read_text(encoding="utf-8")
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert written >= {
         "pattern.svg",
