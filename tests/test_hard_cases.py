@@ -36,6 +36,7 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
 from extractor.color import Segmentation
+from extractor.drawing import Draughtsman
 from extractor.fit import Refined
 from extractor.information import covariances, overlap, solve
 from extractor.mesh import build_mesh
@@ -240,7 +241,8 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    monkeypatch.setattr(type(double._refine), "_buffer", lambda self, shape: np.zeros(shape))
+    kept: dict[tuple[int, ...], NDArray[np.float64]] = {}
+    monkeypatch.setattr(Draughtsman, "picture", lambda self, shape: kept.setdefault(shape, np.zeros(shape)))
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))
