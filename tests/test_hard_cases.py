@@ -38,7 +38,8 @@ from extractor.cells import Cells
 from extractor.color import Segmentation
 from extractor.drawing import Draughtsman
 from extractor.fit import Refined
-from extractor.information import covariances, overlap, solve
+from extractor.information import covariances, solve
+from extractor.meeting import overlap
 from extractor.mesh import build_mesh
 from extractor.neighbourhood import predict
 from extractor.placing import Places
@@ -200,7 +201,7 @@ def test_gridlines_seen_nearly_parallel(tilt_deg: float) -> None:
 
 def test_two_gridlines_on_one_line_overlap_finitely() -> None:
     for cosine in (1.0, 1.0 - 1e-15, -1.0, -1.0 + 1e-15, 1.0 + 1e-15, -1.0 - 1e-15):
-        assert np.isfinite(overlap(cosine, 20.0, 20.0, 1.0)).all()
+        assert np.isfinite(overlap(cosine, 0.05, 0.05, 1.0)).all()
 
 
 @pytest.mark.parametrize("preset", PRESETS)
