@@ -66,6 +66,11 @@ class Lattice:
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
 
     @cached_property
+    def slope_tables(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], int]:
+        """What a local map from the layout to the image needs of the layout."""
+        return self.center_mm, self.axial, self.cell_of, self.layers
+
+    @cached_property
     def ring(self) -> NDArray[np.int32]:
         """(M, 6) the markers around each, -1 beyond the pattern."""
         return np.ascontiguousarray(self.neighbours[:, INNER])
