@@ -91,7 +91,7 @@ def innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
 def _front(image, center, faces, turn):  # type: ignore[no-untyped-def]
     """The turn of the brighter faces; 0 where too few are seen."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    every = max(1, np.count_nonzero(turn) // WITNESSES)
+    every = max(1, int(np.count_nonzero(turn)) // WITNESSES)
     brightness, color = np.empty((2, turn.shape[0] // every + 1)), np.zeros(3)
     number_of, count = 0, [0, 0]
     for f in range(turn.shape[0]):

@@ -62,8 +62,8 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
         lattice.slope_tables,
     )
     seen = cells.center_px, cells.corner_px, slope, numbering.cell
-    ids, *corners, sharp = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
-    xy, around, there, kept = _merged(ids, *corners, sharp, len(lattice.marker_mm))
+    corners = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
+    xy, around, there, kept = _merged(corners, len(lattice.marker_mm))
     return Places(xy, around, kept, *agreement(there, lattice.meeting))
 
 
@@ -122,10 +122,11 @@ def _square(a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
+def _merged(corners, count):  # type: ignore[no-untyped-def]
     """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
     triangles agree there; (C, 3) the ids of the cells whose corners are all known, where most are sharp only of those
-    ``kept``."""
+    ``kept``. ``corners`` as ``_corners`` gives them."""
+    ids, corner, edge, fitted, kept, sharp = corners
     sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
