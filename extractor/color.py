@@ -21,6 +21,8 @@ OPENCV_HUE_DEG = 2.0
 HUE_WIDTH_DEG = 40.0  # pixels farther from every center tell nothing about it
 ROUNDS = 8
 STRONG_SHARE = 0.98  # of the colored pixels are less saturated than what counts as strong
+PALE_SHARE = 8  # times less chroma than that is pale
+DRY_RANK, DRY_SHARE = 0.95, 0.15  # tiles with less than this share of the chroma of that rank have no color
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,50 +58,102 @@ def nominal_hues_deg(palette: dict[str, str]) -> NDArray[np.float64]:
 
 
 @compiled
-def _chroma(hsv):  # type: ignore[no-untyped-def]
-    """(H, W) uint8: max - min of B, G, R, which is S V / 255."""
+def _planes(hsv):  # type: ignore[no-untyped-def]
+    """(H, W) uint8 each: the hue, and the chroma max - min of B, G, R, which is S V / 255."""
     height, width = hsv.shape[:2]
     flat = hsv.reshape(-1)
-    out = np.empty(height * width, np.uint8)
+    hue, chroma = np.empty(height * width, np.uint8), np.empty(height * width, np.uint8)
     for i in range(height * width):
-        out[i] = (
+        hue[i] = flat[3 * i]
+        chroma[i] = (
             np.int32(flat[3 * i + 1]) * np.int32(flat[3 * i + 2]) * np.int32(257) + np.int32(32768)
         ) >> 16
-    return out.reshape(height, width)
+    return hue.reshape(height, width), chroma.reshape(height, width)
 
 
 @compiled
-def _survey(hsv, chroma, step):  # type: ignore[no-untyped-def]
-    """Histogram (180 hues, 256 chromas) over every ``step``-th pixel of every ``step``-th row."""
-    histogram = np.zeros((HUES, 256), np.int32)
-    for y in range(0, hsv.shape[0], step):
-        for x in range(0, hsv.shape[1], step):
-            if chroma[y, x] >= MIN_CHROMA:
-                histogram[hsv[y, x, 0], chroma[y, x]] += 1
-    return histogram
+def _every_other(plane):  # type: ignore[no-untyped-def]
+    """Every other pixel of every other row."""
+    out = np.empty(((plane.shape[0] + 1) // 2, (plane.shape[1] + 1) // 2), np.uint8)
+    for y in range(out.shape[0]):
+        row, line = plane[2 * y], out[y]
+        for x in range(line.shape[0]):
+            line[x] = row[2 * x]
+    return out
 
 
 @compiled
-def _tile_levels(hsv, chroma, ink_of_hue, tile, step):  # type: ignore[no-untyped-def]
+def hue_weights(hue, chroma):  # type: ignore[no-untyped-def]
+    """(180,) the chroma of the pixels of each hue, summed over those that are not pale; zeros without any."""
+    of_chroma, rest = np.zeros(256, np.int64), np.zeros(HUES, np.int64)
+    lower = np.zeros((HUES, 256 // PALE_SHARE), np.int32)  # what may turn out to be pale, by hue and chroma
+    for y in range(hue.shape[0]):
+        for x in range(hue.shape[1]):
+            much = chroma[y, x]
+            if much < MIN_CHROMA:
+                continue
+            of_chroma[much] += 1
+            if much < lower.shape[1]:
+                lower[hue[y, x], much] += 1
+            else:
+                rest[hue[y, x]] += much
+    limit, below, strong = STRONG_SHARE * of_chroma.sum(), 0, 0
+    while strong < 255 and below + of_chroma[strong] < limit:
+        below += of_chroma[strong]
+        strong += 1
+    for much in range(max(MIN_CHROMA, strong // PALE_SHARE), lower.shape[1]):
+        for one in range(HUES):
+            rest[one] += much * lower[one, much]
+    return rest.astype(np.float64)
+
+
+@compiled
+def _arcs(ink_of_hue):  # type: ignore[no-untyped-def]
+    """(3, 2) uint8: of each ink's hues, which lie side by side, the first and their number."""
+    arcs = np.zeros((3, 2), np.uint8)
+    for hue in range(HUES):
+        ink = ink_of_hue[hue]
+        if ink > 0:
+            arcs[ink - 1, 1] += 1
+            if ink_of_hue[hue - 1] != ink:
+                arcs[ink - 1, 0] = hue
+    return arcs
+
+
+@compiled
+def _within(hue, arc):  # type: ignore[no-untyped-def]
+    """Whether a hue is among those of an arc."""
+    first, count = arc
+    past = np.uint8(hue - first) if hue >= first else np.uint8(hue + np.uint8(HUES) - first)
+    return past < count
+
+
+@compiled
+def _tile_levels(hue, chroma, arcs, tile):  # type: ignore[no-untyped-def]
     """(3, rows, columns) the largest chroma of each ink in every tile; 0 where it is below ``MIN_CHROMA``."""
-    rows = (hsv.shape[0] + tile - 1) // tile
-    columns = (hsv.shape[1] + tile - 1) // tile
+    height, width = hue.shape
+    rows, columns = (height + tile - 1) // tile, (width + tile - 1) // tile
     level = np.zeros((3, rows, columns), np.float32)
-    strongest = np.zeros((columns, 4), np.uint8)
+    strongest = np.empty((3, width), np.uint8)
     for row in range(rows):
         strongest[:] = 0
-        for y in range(row * tile, min((row + 1) * tile, hsv.shape[0]), step):
-            line, colors = chroma[y], hsv[y]
-            for column in range(columns):
-                largest = strongest[column]
-                for x in range(column * tile, min((column + 1) * tile, hsv.shape[1]), step):
-                    ink = ink_of_hue[colors[x, 0]]
-                    largest[ink] = max(largest[ink], line[x])
-        for column in range(columns):
+        for y in range(row * tile, min((row + 1) * tile, height)):
             for ink in range(3):
-                if strongest[column, ink + 1] >= MIN_CHROMA:
-                    level[ink, row, column] = strongest[column, ink + 1]
+                _keep_strongest(hue[y], chroma[y], arcs[ink], strongest[ink])
+        for ink in range(3):
+            for column in range(columns):
+                largest = strongest[ink, column * tile : (column + 1) * tile].max()
+                if largest >= MIN_CHROMA:
+                    level[ink, row, column] = largest
     return level
+
+
+@compiled
+def _keep_strongest(hue, chroma, arc, strongest):  # type: ignore[no-untyped-def]
+    """Let ``strongest`` be the larger of itself and the chroma where the hue is of an arc."""
+    for x in range(hue.shape[0]):
+        much = chroma[x] if _within(hue[x], arc) else np.uint8(0)
+        strongest[x] = max(strongest[x], much)
 
 
 @compiled
@@ -135,28 +189,33 @@ def _thresholds(level):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _label(hsv, chroma, ink_of_hue, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
+def _label(hue, chroma, arcs, threshold, tile, target, shrink):  # type: ignore[no-untyped-def]
     """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
     height, width = chroma.shape
-    columns = threshold.shape[2]
-    label = np.zeros((height, width), np.uint8)
-    # what a hue must exceed in each tile of a row of tiles; without an ink it cannot
-    limit = np.empty((columns, HUES), np.uint8)
+    label = np.empty((height, width), np.uint8)
+    inside, limit = np.empty(width, np.uint8), np.empty((3, width), np.uint8)  # of a row's pixels
     for y in range(height):
+        if y % shrink == 0:
+            for column in range(target.shape[1]):
+                inside[column * shrink : (column + 1) * shrink] = target[y // shrink, column]
         if y % tile == 0:
-            for column in range(columns):
-                for hue in range(HUES):
-                    ink = ink_of_hue[hue]
-                    limit[column, hue] = threshold[ink - 1, y // tile, column] if ink > 0 else 255
-        row, colors, out = chroma[y], hsv[y], label[y]
-        for start in range(0, width, shrink):
-            if target[y // shrink, start // shrink] == 0:
-                continue
-            least = limit[start // tile]
-            for x in range(start, min(start + shrink, width)):
-                hue = colors[x, 0]
-                out[x] = ink_of_hue[hue] * (row[x] > least[hue])
+            for ink in range(3):
+                for column in range(threshold.shape[2]):
+                    limit[ink, column * tile : (column + 1) * tile] = threshold[ink, y // tile, column]
+        _label_row(hue[y], chroma[y], arcs, limit, inside, label[y])
     return label
+
+
+@compiled
+def _label_row(hue, chroma, arcs, limit, inside, out):  # type: ignore[no-untyped-def]
+    """One row of ``_label``."""
+    red, green, blue = arcs
+    red_limit, green_limit, blue_limit = limit
+    for x in range(hue.shape[0]):
+        one = np.uint8(_within(hue[x], red) & (chroma[x] > red_limit[x]))
+        two = np.uint8(_within(hue[x], green) & (chroma[x] > green_limit[x]))
+        three = np.uint8(_within(hue[x], blue) & (chroma[x] > blue_limit[x]))
+        out[x] = np.uint8(inside[x] * np.uint8(one + np.uint8(2) * two + np.uint8(3) * three))
 
 
 @compiled
@@ -182,17 +241,19 @@ class Colors:
 
     Attributes:
         hsv: (H, W, 3) uint8, OpenCV's scale: H 0..179 (2 degrees a step), S and V 0..255.
+        hue: (H, W) uint8, the first of these.
         chroma: (H, W) uint8, max - min of B, G, R: 0 for black, grey and white in any light.
     """
 
     hsv: NDArray[np.uint8]
+    hue: NDArray[np.uint8]
     chroma: NDArray[np.uint8]
 
 
 def to_colors(image: NDArray[np.uint8]) -> Colors:
     """HSV and chroma of an 8-bit BGR image."""
     hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-    return Colors(hsv=hsv, chroma=_chroma(hsv))  # type: ignore[arg-type]
+    return Colors(hsv, *_planes(hsv))  # type: ignore[arg-type]
 
 
 def find_target(colors: Colors) -> Target:
@@ -201,14 +262,59 @@ def find_target(colors: Colors) -> Target:
     Tiles without color are water; closing seals the gaps between cells first, so that the flood stops at the
     pattern's rim while its black cells stay dry.
     """
-    chroma = _tile_chroma(colors.chroma, SHRINK)
-    strong_at = int(0.95 * (chroma.size - 1))
-    strong = np.partition(chroma, strong_at, axis=None)[strong_at]
-    threshold = max(MIN_CHROMA, 0.15 * float(strong))
-    dry = cv2.morphologyEx((chroma > threshold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    water = cv2.copyMakeBorder(dry, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
-    cv2.floodFill(water, None, (0, 0), 2)
-    return Target(mask=(water[1:-1, 1:-1] != 2).astype(np.uint8), shrink=SHRINK)
+    return Target(mask=_dry(_tile_chroma(colors.chroma, SHRINK)), shrink=SHRINK)
+
+
+@compiled
+def _dry(chroma):  # type: ignore[no-untyped-def]
+    """(rows, columns) uint8, which tiles the flood does not reach."""
+    counts = np.zeros(256, np.int64)
+    for much in chroma.ravel():
+        counts[much] += 1
+    rank, below, strong = int(DRY_RANK * (chroma.size - 1)), counts[0], 0
+    while below <= rank:
+        strong += 1
+        below += counts[strong]
+    colored = (chroma > max(float(MIN_CHROMA), DRY_SHARE * strong)).astype(np.uint8)
+    closed = _spread(_spread(colored, 1), 0)
+    return 1 - _flooded(closed)
+
+
+@compiled
+def _spread(mask, value):  # type: ignore[no-untyped-def]
+    """The mask with ``value`` in the eight tiles around each that has it, too."""
+    rows, columns = mask.shape
+    out = mask.copy()
+    for row in range(rows):
+        for column in range(columns):
+            if mask[row, column] == value:
+                out[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = value
+    return out
+
+
+@compiled
+def _flooded(dry):  # type: ignore[no-untyped-def]
+    """The tiles that are not dry and hang together with the image's border by their sides."""
+    rows, columns = dry.shape
+    wet = np.zeros((rows, columns), np.uint8)
+    stack, height = np.empty((4 * rows * columns + 2 * (rows + columns), 2), np.int32), 0
+    for row in range(rows):
+        for column in range(columns):
+            if row == 0 or column == 0 or row == rows - 1 or column == columns - 1:
+                stack[height, 0], stack[height, 1] = row, column
+                height += 1
+    while height > 0:
+        height -= 1
+        row, column = stack[height]
+        if row < 0 or column < 0 or row == rows or column == columns:
+            continue
+        if dry[row, column] or wet[row, column]:
+            continue
+        wet[row, column] = 1
+        for dy, dx in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+            stack[height, 0], stack[height, 1] = row + dy, column + dx
+            height += 1
+    return wet
 
 
 @compiled
@@ -237,33 +343,12 @@ def _centers(weight, nominal_deg):  # type: ignore[no-untyped-def]
     return shift, True
 
 
-@compiled
-def _hue_weights(histogram):  # type: ignore[no-untyped-def]
-    """(180,) the chroma of the pixels of each hue, summed over those that are not pale; zeros without any."""
-    of_chroma = np.zeros(256, np.int64)
-    for hue in range(HUES):
-        of_chroma += histogram[hue]
-    of_chroma[:MIN_CHROMA] = 0
-    limit, below, strong = STRONG_SHARE * of_chroma.sum(), 0, 0
-    while strong < 255 and below + of_chroma[strong] < limit:
-        below += of_chroma[strong]
-        strong += 1
-    weight = np.zeros(HUES)
-    for hue in range(HUES):
-        total, row = np.int64(0), histogram[hue]
-        for chroma in range(max(MIN_CHROMA, strong // 8), 256):
-            total += np.int64(chroma) * row[chroma]
-        weight[hue] = total
-    return weight
-
-
-def find_hues(histogram: NDArray[np.int32], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def find_hues(weight: NDArray[np.float64], nominal_deg: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """(3,) hues in degrees around which the image's saturated pixels gather, or None without such pixels.
 
-    Circular 3-means from the nominal hues on the chroma-weighted histogram. White balance and colored light move
-    hues; a shift past ``HUE_REACH_DEG`` could rename the inks and is refused.
+    Circular 3-means from the nominal hues on the weights (180,) of hues in steps of 2 degrees. White balance and
+    colored light move hues; a shift past ``HUE_REACH_DEG`` could rename the inks and is refused.
     """
-    weight = _hue_weights(histogram)
     if not weight.any():
         return None
     shift, found = _centers(weight, nominal_deg)
@@ -287,13 +372,15 @@ def _ink_of_hue(hues_deg):  # type: ignore[no-untyped-def]
 
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:
     """Stage 2: label every pixel of the target area with its ink; None when one of the three inks is absent."""
-    hsv, chroma = colors.hsv, colors.chroma
-    step = 2 if chroma.size > SURVEY_PIXELS else 1
-    hues = find_hues(_survey(hsv, chroma, step), nominal_deg)
+    hue, chroma = colors.hue, colors.chroma
+    tile = max(TILE_PX, min(chroma.shape) // 12 // SHRINK * SHRINK)
+    few, few_tile = (hue, chroma), tile
+    if chroma.size > SURVEY_PIXELS:
+        few, few_tile = (_every_other(hue), _every_other(chroma)), tile // 2
+    hues = find_hues(hue_weights(*few), nominal_deg)
     if hues is None:
         return None
-    ink_of_hue = _ink_of_hue(hues)
-    tile = max(TILE_PX, min(chroma.shape) // 12 // SHRINK * SHRINK)
-    threshold, typical = _thresholds(_tile_levels(hsv, chroma, ink_of_hue, tile, step))
-    label = _label(hsv, chroma, ink_of_hue, threshold, tile, target.mask, target.shrink)
-    return Segmentation(hsv=hsv, label=label, hues_deg=hues, chroma=typical)
+    arcs = _arcs(_ink_of_hue(hues))
+    threshold, typical = _thresholds(_tile_levels(*few, arcs, few_tile))
+    label = _label(hue, chroma, arcs, threshold, tile, target.mask, target.shrink)
+    return Segmentation(hsv=colors.hsv, label=label, hues_deg=hues, chroma=typical)
