@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import HUES, Segmentation
+from .color import HUES
 from .engine import compiled, vectorized
+from .segmentation import Segmentation
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
 MIN_DOMAIN_PX = 4

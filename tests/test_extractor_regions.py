@@ -14,18 +14,11 @@ from numpy.typing import NDArray
 from pictures import picture
 
 from extractor import parse_layout
-from extractor.color import (
-    Segmentation,
-    Target,
-    find_hues,
-    find_target,
-    hue_weights,
-    nominal_hues_deg,
-    segment,
-    to_colors,
-)
+from extractor.color import find_hues, hue_weights, nominal_hues_deg, to_colors
 from extractor.image import estimate_noise
 from extractor.regions import GROW_THRESHOLD, find_seeds, grow
+from extractor.segmentation import Segmentation, segment
+from extractor.target import Target, find_target
 
 Image = NDArray[np.uint8]
 NOMINAL_DEG = nominal_hues_deg(dict(small_layout().palette))
