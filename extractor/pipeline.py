@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .attach import attach
 from .cells import Cells, find_cells
-from .color import find_target, nominal_hues_deg, segment, to_colors
+from .color import nominal_hues_deg, to_colors
 from .errors import LayoutError
 from .image import prepare
 from .mesh import build_mesh
@@ -23,8 +23,10 @@ from .reference import Reference
 from .refine import Refiner
 from .regions import find_seeds, grow, large_enough
 from .repair import repair
+from .segmentation import segment
 from .sight import Sights
 from .tables import lattice_of
+from .target import find_target
 from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason

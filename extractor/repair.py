@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from .arcs import by_layer
 from .engine import compiled
 from .fit import Refined
-from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
+from .neighbourhood import MIN_QUADRATIC, deviant, predict, predicted, strays
 from .placing import AGREED, Places
+from .sampling import clamp
 from .tables import Lattice
 from .types import Status
 
@@ -66,11 +67,15 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    edge_px = places.edge_px
-    _drop_outliers(xy, cov, places, refined.explained, lattice)
+    edge_px, believed = places.edge_px, refined.explained | places.agreed
+    slide = cov, refined.free_px, places.xy_px, edge_px, lattice.rim
+    rings = lattice.ring_weights, lattice.neighbours
+    if _sound(xy, believed, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
+        return Repaired(xy, cov, np.isfinite(xy[:, 0]) * np.uint8(Status.MEASURED))
+    _drop_outliers(xy, cov, edge_px, believed, places.whole, *rings, lattice.marker_mm)
     _drop_frayed(xy, cov, places, lattice)
-    _drop_slid(xy, cov, refined.free_px, places, lattice)
-    measured, edge = xy.copy(), _filled(edge_px, lattice)
+    _drop_slid(xy, cov, _slid(xy, *slide), places, lattice)
+    measured, edge = xy.copy(), _filled(edge_px, lattice.neighbours)
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
     status = np.where(outside, Status.LOST, Status.MEASURED).astype(np.uint8)
@@ -88,48 +93,72 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     return Repaired(xy, cov, status)
 
 
+@compiled
+def _sound(xy, believed, slide, rings, inner_rings, present, size):  # type: ignore[no-untyped-def]
+    """Whether every marker of the pattern is known and none of the rules below could drop it: as a rule, all are."""
+    cov, free, start, edge, rim = slide
+    weights, table = rings
+    inner_weights, inner = inner_rings
+    for m in range(xy.shape[0]):
+        x, y = xy[m]
+        if np.isnan(x):
+            if present[m]:
+                return False
+            continue
+        if not (x >= -0.5 and y >= -0.5 and x <= size[0] - 0.5 and y <= size[1] - 0.5):
+            return False
+        if strays(xy, m, MAX_DEVIATION * edge[m] if believed[m] else 0.0, weights, table):
+            return False
+        if inner[m, 0] >= 0 and strays(xy, m, FRAYED[0] * edge[m], inner_weights, inner):
+            return False
+        if rim[m] and _slides(xy, m, cov, free, start, edge):
+            return False
+    return True
+
+
 def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Places within the image, out to the edges of its pixels; NaN not."""
     return np.asarray((xy >= -0.5).all(axis=1) & (xy <= np.array(size) - 0.5).all(axis=1))
 
 
-def _drop_outliers(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    places: Places,
-    explained: NDArray[np.bool_],
-    lattice: Lattice,
-) -> None:
+@compiled
+def _drop_outliers(xy, cov, edge, believed, whole, weights, table, marker_mm):  # type: ignore[no-untyped-def]
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
 
     What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
     lie farther off.
     """
-    table, edge, believed = lattice.neighbours, places.edge_px, explained | places.agreed
+    near = np.where(believed, MAX_DEVIATION * edge, 0.0)
+    excess = np.empty(edge.shape[0])
     for _ in range(ROUNDS):
-        known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
-        doubtful = deviant(xy, MAX_DEVIATION * edge * believed, lattice.ring_weights, table)
+        doubtful = deviant(xy, near, weights, table)
         if not doubtful.any():
             break
-        place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
-        sigma = np.sqrt(variance * (1 + leverage))
-        apart = xy - place
-        deviation = np.hypot(apart[:, 0], apart[:, 1])
-        with np.errstate(invalid="ignore"):
-            allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
-            usual = np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE)
-            allowed = np.where(believed, usual, MAX_UNEXPLAINED)
-            allowed = np.where(places.whole, MAX_AGREED, allowed)
-            excess = deviation / (edge * allowed)
-        excess[~np.isfinite(excess)] = 0.0
-        excess[known & ~believed & ~np.isfinite(place[:, 0])] = np.inf
+        place, variance, leverage, support = predicted(xy, doubtful, marker_mm, table)
+        for m in range(edge.shape[0]):
+            allowed = MAX_DEVIATION
+            if whole[m]:
+                allowed = MAX_AGREED
+            elif not believed[m]:
+                allowed = MAX_UNEXPLAINED
+            elif support[m] >= MILD_SUPPORT:
+                sigma = np.sqrt(variance[m] * (1 + leverage[m]))
+                allowed = clamp(SIGMAS * sigma / edge[m], MAX_DEVIATION, MAX_TOLERANCE)
+            apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+            excess[m] = apart / (edge[m] * allowed)
+            if not np.isfinite(excess[m]):
+                excess[m] = 0.0
+            if not (np.isnan(xy[m, 0]) or believed[m] or np.isfinite(place[m, 0])):
+                excess[m] = np.inf
         if not (excess > 1.0).any():
             break
-        around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
-        bad = (excess > 1.0) & (excess >= around)
-        xy[bad] = np.nan
-        cov[bad] = np.nan
+        for m in range(edge.shape[0]):
+            worst = excess[m] > 1.0
+            for n in table[m]:
+                worst = worst and (n < 0 or excess[m] >= excess[n])
+            if worst:
+                xy[m], cov[m] = np.nan, np.nan
 
 
 def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
@@ -153,7 +182,7 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
 def _drop_slid(
     xy: NDArray[np.float64],
     cov: NDArray[np.float64],
-    free_px: NDArray[np.float64],
+    slid: NDArray[np.bool_],
     places: Places,
     lattice: Lattice,
 ) -> None:
@@ -163,9 +192,6 @@ def _drop_slid(
 
     Where two gridlines end that may bend, the corner between them slides along both.
     """
-    slid = _slid(
-        xy, cov, free_px, places.xy_px, places.edge_px, lattice.neighbours[:, INNER], lattice.present
-    )
     if not slid.any():
         return
     expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
@@ -181,27 +207,36 @@ def _drop_slid(
 
 
 @compiled
-def _slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-untyped-def]
-    """(M,) bool: markers of the rim that lie far from their ``start`` and are not sure, or their gridlines bend
-    (``free``, px)."""
+def _slides(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
+    """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
+    limit = VAGUE * edge[m]
+    if not (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
+        return False
+    dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+    return dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+
+
+@compiled
+def _slid(xy, cov, free, start, edge, rim):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers of the rim that slide."""
     out = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
-        inside = True
-        for n in around[m]:
-            inside = inside and n >= 0 and present[n]
-        limit = VAGUE * edge[m]
-        if not inside and (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
-            dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-            out[m] = dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+        out[m] = rim[m] and _slides(xy, m, cov, free, start, edge)
     return out
 
 
-def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
-    """The edges at each marker; where none was seen, the mean of its neighbours'."""
-    around = np.where(lattice.neighbours >= 0, edge[lattice.neighbours], np.nan)
-    count = np.isfinite(around).sum(axis=1)
-    mean = np.nansum(around, axis=1) / np.maximum(count, 1)
-    return np.where(np.isfinite(edge), edge, np.where(count > 0, mean, np.nan))
+@compiled
+def _filled(edge, table):  # type: ignore[no-untyped-def]
+    """(M,) the edges at each marker; where none was seen, the mean of its neighbours', or NaN."""
+    out = edge.copy()
+    for m in np.flatnonzero(np.isnan(edge)):
+        total, count = 0.0, 0
+        for n in table[m]:
+            if n >= 0 and not np.isnan(edge[n]):
+                total += edge[n]
+                count += 1
+        out[m] = total / count if count > 0 else np.nan
+    return out
 
 
 def _by_neighbours(
@@ -210,7 +245,7 @@ def _by_neighbours(
     """(M, 2) places by the two rings around each lost marker, NaN where not safe, and their (M,) variances."""
     lost = np.isnan(xy[:, 0])
     place, variance, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
-    nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
+    nearer = predict(xy, lost, lattice.marker_mm, lattice.ring)[0]
     with np.errstate(invalid="ignore"):
         # where the inner ring alone says something else, the surface is too bent for either to be believed
         alone = np.isnan(nearer[:, 0])

@@ -35,7 +35,6 @@ from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
-from extractor.color import Segmentation
 from extractor.drawing import Draughtsman
 from extractor.fit import Refined
 from extractor.information import covariances, solve
@@ -46,6 +45,7 @@ from extractor.placing import Places
 from extractor.presets import PRESETS
 from extractor.regions import find_seeds, grow
 from extractor.repair import repair
+from extractor.segmentation import Segmentation
 from extractor.tables import lattice_of
 from extractor.topology import topology_of
 from extractor.triangles import fit_triangles
