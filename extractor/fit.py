@@ -13,6 +13,16 @@ from .levels import Levels
 from .offsets import Reading
 
 
+class Seen(NamedTuple):
+    """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
+    and the inks' levels."""
+
+    scale: int
+    sigma: float
+    noise: float
+    levels: Levels
+
+
 @dataclass(frozen=True, eq=False)
 class Refined:
     """Markers after refinement.
@@ -25,6 +35,7 @@ class Refined:
         free_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
+        seen: how the image looks, where the pattern was drawn.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
     """
 
@@ -34,6 +45,7 @@ class Refined:
     free_px: NDArray[np.float64]
     blur_px: float
     noise: float
+    seen: Seen | None
     points: NDArray[np.float64]
 
 

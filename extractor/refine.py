@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .bending import HIDDEN, around
 from .drawing import MIN_SIGMA_PX, Draughtsman, neighbours
 from .engine import compiled
-from .fit import Across, Fit, Refined
+from .fit import Across, Fit, Refined, Seen
 from .image import estimate_noise
 from .information import Information, covariances
 from .levels import cell_means, smooth_levels
@@ -55,16 +55,21 @@ class Refiner:
         self._steps = STEPS[preset]
         self._draughtsman = Draughtsman(mesh)
 
-    def __call__(self, sights: Sights, places: Places) -> Refined:
+    def __call__(self, sights: Sights, places: Places, before: Seen | None = None) -> Refined:
         """Solve all markers together.
 
         Args:
             sights: the image.
             places: where the markers were found, to about a pixel.
+            before: how the image before it looked, in a sequence.
 
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
         edge = short_edge(places.xy_px, self._mesh.edges)
+        if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
+            view = sights.at(before.scale)
+            fit, across = self._begin(view, places, before)
+            return self._finish(view, fit, across, _in(view, places), edge / view.scale)
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
         scale = self._scale(view.scale * fit.sigma, edge)
@@ -78,31 +83,31 @@ class Refiner:
         """By how much to reduce an image with this blur and edges."""
         return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
 
-    def _begin(self, view: Sight, places: Places) -> tuple[Fit, Across]:
+    def _begin(self, view: Sight, places: Places, before: Seen | None = None) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
         mesh = self._mesh
         xy, beyond, maps = completed(mesh, view.reduced(places.xy_px))
-        noise = max(estimate_noise(view.image, xy, mesh.cells), MIN_NOISE)
-        usual = USUAL_SIGMA_PX / view.scale
-        levels = smooth_levels(
-            cell_means(view.image, NO_MODEL, xy, mesh.cells, usual),
-            cell_means(view.image, NO_MODEL, xy, mesh.black, usual),
-            xy,
-            mesh,
-            noise,
-            view.frame,
-        )
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
-        fit = Fit(
-            xy, xy, xy, beyond, maps, 0.0, noise, levels, nothing, smooth, stiff, straight, smooth, None
-        )
+        seen = before or self._look(view, xy)
+        about = seen.sigma, seen.noise, seen.levels, nothing, smooth, stiff, straight, smooth, None
+        fit = Fit(xy, xy, xy, beyond, maps, *about)
         lines = lines_of(mesh, fit)
         across = self._across(view, fit, lines)
-        fit = fit._replace(sigma=self._blur(view, lines, across))
+        if before is None:
+            fit = fit._replace(sigma=self._blur(view, lines, across))
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
         return fit, across
+
+    def _look(self, view: Sight, xy: NDArray[np.float64]) -> Seen:
+        """The noise and the levels in the middles of the cells; the blur is not known yet."""
+        mesh = self._mesh
+        noise = max(estimate_noise(view.image, xy, mesh.cells), MIN_NOISE)
+        usual = USUAL_SIGMA_PX / view.scale
+        drawn = cell_means(view.image, NO_MODEL, xy, mesh.cells, usual)
+        black = cell_means(view.image, NO_MODEL, xy, mesh.black, usual)
+        return Seen(view.scale, 0.0, noise, smooth_levels(drawn, black, xy, mesh, noise, view.frame))
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it."""
@@ -195,7 +200,8 @@ class Refiner:
         )
         free = scale * np.sqrt(around(fit.loose, self._mesh.spokes))
         blur, noise = scale * fit.sigma, scale * fit.noise
-        return Refined(view.full(xy), scale**2 * cov, explained, free, blur, noise, points)
+        seen = Seen(scale, fit.sigma, fit.noise, fit.levels) if reading.drawn else None
+        return Refined(view.full(xy), scale**2 * cov, explained, free, blur, noise, seen, points)
 
     def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit, NaN where it is far from the places or not sure."""

@@ -219,7 +219,14 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 
 def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
     return Refined(
-        xy_px, cov_px2, np.ones(len(xy_px), np.bool_), np.zeros(len(xy_px)), 1.0, 2.0, np.empty((0, 0, 3))
+        xy_px,
+        cov_px2,
+        np.ones(len(xy_px), np.bool_),
+        np.zeros(len(xy_px)),
+        1.0,
+        2.0,
+        None,
+        np.empty((0, 0, 3)),
     )
 
 
