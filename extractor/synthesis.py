@@ -17,15 +17,16 @@ import numpy as np
 from .engine import compiled, vectorized
 from .gaussian import REACH, normal, side_of_wedge
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
+from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur
-CHUNK = 1024  # pixels that vote at once, at most
 
 # columns of what is read along a gridline: sums over its pixels
 AA, AB, BB, A, B, SHARE_A, SHARE_B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(11)
 AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
 SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
 SUMS = 24
+KEEP, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # weights of pixels
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -250,17 +251,35 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
 
 
 @vectorized
-def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums):  # type: ignore[no-untyped-def]
-    """Add ``count`` pixels to a gridline's sums: their places along and aside of its chord, their residuals.
+def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
+    """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
-    The votes' weights are polynomials close to the derivative of the drawing, the normal density by its distance and
-    the blurred ends of 1 - t and t: any weights give unbiased votes, and loops without branches and tables are fast.
+    They are polynomials close to the derivative of the drawing, the normal density by its distance and the blurred
+    ends of 1 - t and t: any weights give unbiased votes, and loops without branches and tables are fast.
     """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    for j in range(wide):
+        out, step = weights[j * lanes :], np.float32(j)
+        for i in range(lanes):
+            along, aside = rows[ALONG + i] + step * du, rows[ASIDE + i] + step * dv
+            within = (step >= rows[FROM + i]) & (step <= rows[TO + i])
+            keep = one if within & (along >= -reach) & (along <= length + reach) else zero
+            z, g, to_a, to_b = _weights(along, aside, inverse, short, slack, length, leave, arrive)
+            ga, gb = keep * g * to_a, keep * g * to_b
+            gc = ga * to_b
+            out[KEEP + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
+            out[TO_BLUR + i] = z * (ga + gb)
+            out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
+
+
+@vectorized
+def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
+    """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
-    aa, ab, bb, sa, sb, wa, wb, blur, curvature = zero, zero, zero, zero, zero, zero, zero, zero, zero
+    aa, ab, bb, sa, sb, wa, wb = zero, zero, zero, zero, zero, zero, zero
+    blur, curvature, misfit, pixels = zero, zero, zero, zero
     for k in range(count):
-        z, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
-        ga, gb = g * to_a, g * to_b
+        ga, gb, gz = weights[TO_A + k], weights[TO_B + k], weights[TO_BLUR + k]
         aa += ga * ga
         ab += ga * gb
         bb += gb * gb
@@ -268,9 +287,10 @@ def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arriv
         sb += gb * rest[k]
         wa += ga
         wb += gb
-        gz = z * (ga + gb)
         blur += rest[k] * gz
         curvature += gz * gz
+        misfit += weights[KEEP + k] * squares[k]
+        pixels += weights[KEEP + k]
     sums[AA] += aa
     sums[AB] += ab
     sums[BB] += bb
@@ -280,21 +300,18 @@ def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arriv
     sums[SHARE_B] += wb
     sums[BLUR] += blur
     sums[BLUR_CURVATURE] += curvature
+    sums[MISFIT] += misfit
+    sums[PIXELS] += pixels
 
 
 @vectorized
-def _vote_bending(  # type: ignore[no-untyped-def]
-    along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums
-):
+def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending, with weights t (1 - t) and t (1 - t) (1 - 2 t)."""
     zero = np.float32(0.0)
     ac, ad, bc, bd, cc, cd = zero, zero, zero, zero, zero, zero
     dd, sc, sd, wc, wd = zero, zero, zero, zero, zero
     for k in range(count):
-        _, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
-        ga, gb = g * to_a, g * to_b
-        gc = ga * to_b
-        gd = gc * (to_a - to_b)
+        ga, gb, gc, gd = weights[TO_A + k], weights[TO_B + k], weights[TO_C + k], weights[TO_D + k]
         ac += ga * gc
         ad += ga * gd
         bc += gb * gc
@@ -319,6 +336,20 @@ def _vote_bending(  # type: ignore[no-untyped-def]
     sums[SHARE_D] += wd
 
 
+@vectorized
+def _residual(image, model, box):  # type: ignore[no-untyped-def]
+    """image - model within the box (x from, y from, x to, y to)."""
+    height, width = box[3] - box[1], 3 * (box[2] - box[0])
+    out = np.empty((height, width), np.float32)
+    for y in range(height):
+        seen = image[box[1] + y].reshape(-1)[3 * box[0] : 3 * box[2]]
+        drawn = model[box[1] + y].reshape(-1)[3 * box[0] : 3 * box[2]]
+        own = out[y]
+        for k in range(width):
+            own[k] = np.float32(seen[k]) - drawn[k]
+    return out.reshape(-1)
+
+
 @compiled
 def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  # type: ignore[no-untyped-def]
     """(E, 24) sums over the pixels near each gridline; the columns are named above.
@@ -330,60 +361,45 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  #
     """
     out = np.zeros((lines.shape[0], SUMS))
     inverse, reach = 1.0 / sigma, BAND * sigma
-    seen, drawn, width = image.reshape(-1), model.reshape(-1), image.shape[1]
-    one, two = np.uint64(1), np.uint64(2)
-    alongs, asides = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.float32)
-    rests = np.empty(CHUNK, np.float32)
+    residual, width, height = _residual(image, model, box), box[2] - box[0], box[3] - box[1]
+    at, rows, weights = (
+        np.empty(CHUNK, np.int64),
+        np.empty(4 * CHUNK, np.float32),
+        np.empty(6 * CHUNK, np.float32),
+    )
+    rest, squares = np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
     for e in range(lines.shape[0]):
-        u0, u1, u2 = np.float32(contrasts[e, 0]), np.float32(contrasts[e, 1]), np.float32(contrasts[e, 2])
-        strength = u0 * u0 + u1 * u1 + u2 * u2
+        color = np.float32(contrasts[e, 0]), np.float32(contrasts[e, 1]), np.float32(contrasts[e, 2])
+        strength = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
+        beneath = np.float32(black[e, 0]), np.float32(black[e, 1]), np.float32(black[e, 2])
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
-        x0, y0, leave, arrive = lines[e, X], lines[e, Y], lines[e, LEAVE], lines[e, ARRIVE]
-        b0, b1, b2 = np.float32(black[e, 0]), np.float32(black[e, 1]), np.float32(black[e, 2])
-        flat = abs(ux) > abs(uy)  # then columns of pixels are walked through, else rows
-        # p counts along the longer axis, q along the other
-        p0, q0, up, uq = (x0, y0, ux, uy) if flat else (y0, x0, uy, ux)
-        sense = 1.0 if flat else -1.0
-        lower, upper = (box[0], box[2] - 1) if flat else (box[1], box[3] - 1)
-        side_low, side_high = (box[1], box[3] - 1) if flat else (box[0], box[2] - 1)
-        first = max(int(np.ceil(min(p0, p0 + length * up) - reach)), lower)
-        last = min(int(np.floor(max(p0, p0 + length * up) + reach)), upper)
-        half, lean, per_length = reach / abs(up), uq / up, 1.0 / (up * length)
-        stride = np.uint64(3 * width) if flat else np.uint64(3)
-        misfit, pixels, filled, sums = np.float32(0.0), 0, 0, out[e]
+        x0, y0, leave, arrive = lines[e, X] - box[0], lines[e, Y] - box[1], lines[e, LEAVE], lines[e, ARRIVE]
+        # columns of pixels are walked through where it runs along x rather than along y, else rows
+        along_x = abs(ux) > abs(uy)
+        p0, q0, up, uq = (x0, y0, ux, uy) if along_x else (y0, x0, uy, ux)
+        p_end, q_end, step_p, step_q = (
+            (width, height, 3, 3 * width) if along_x else (height, width, 3 * width, 3)
+        )
+        first = max(int(np.ceil(min(p0, p0 + length * up) - reach)), 0)
+        last = min(int(np.floor(max(p0, p0 + length * up) + reach)), p_end - 1)
+        half = reach / abs(up)
+        wide, most = row_sizes(half, q_end)
+        sums, sense = out[e], 1.0 if along_x else -1.0
         small = np.float32(inverse), np.float32(1.0 / length), np.float32(END_BELL * sigma / length)
         shape = np.float32(length), np.float32(leave), np.float32(arrive)
-        for p in range(first, last + 1):
-            middle = q0 + (p - p0) * lean + sense * bow((p - p0) * per_length, length, leave, arrive) / up
-            start = max(int(np.ceil(middle - half)), side_low)
-            end = min(int(np.floor(middle + half)), side_high)
-            if filled + end - start + 1 > CHUNK:
-                _vote(alongs, asides, rests, filled, *small, *shape, sums)
-                if loose[e]:
-                    _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
-                filled = 0
-            at = np.uint64((start * width + p if flat else p * width + start) * 3)
-            along = (p - p0) * up + (start - q0) * uq
-            aside = sense * ((start - q0) * up - (p - p0) * uq)
-            for _ in range(min(end - start + 1, CHUNK)):
-                if along >= -reach and along <= length + reach:
-                    r0 = np.float32(seen[at]) - drawn[at] - b0
-                    r1 = np.float32(seen[at + one]) - drawn[at + one] - b1
-                    r2 = np.float32(seen[at + two]) - drawn[at + two] - b2
-                    rests[filled] = u0 * r0 + u1 * r1 + u2 * r2
-                    alongs[filled], asides[filled] = along, aside
-                    misfit += r0 * r0 + r1 * r1 + r2 * r2
-                    filled += 1
-                    pixels += 1
-                at += stride
-                along += uq
-                aside += sense * up
-        _vote(alongs, asides, rests, filled, *small, *shape, sums)
-        if loose[e]:
-            _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
-        sums[MISFIT], sums[PIXELS] = misfit, pixels
+        steps = np.float32(uq), np.float32(sense * up), np.float32(reach)
+        line = (p0, q0, up, uq, length, leave, arrive, half)
+        for begin in range(first, last + 1, most):
+            count = min(most, last + 1 - begin)
+            lanes = lanes_of(count)
+            lay_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, False, at, rows)
+            gather_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
+            _weigh(rows, lanes, wide, *steps, *small, *shape, weights)
+            _vote(rest, squares, weights, lanes * wide, sums)
+            if loose[e]:
+                _vote_bending(rest, weights, lanes * wide, sums)
         for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
             sums[k] *= strength * inverse * inverse
         for k in (A, B, BLUR, C, D):
