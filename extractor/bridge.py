@@ -52,6 +52,9 @@ def unbridged(
     Args:
         before, after: (N,) the layout's cell of each cell of the image, or -1, without and with those beyond gaps.
     """
+    beyond = np.count_nonzero((after >= 0) & (before < 0))
+    if beyond == 0 or (beyond < limits.members and limits.cell == np.inf):  # none that could be judged
+        return np.zeros(len(after), np.bool_)
     tables = lattice.axial, lattice.cell_of, lattice.layers
     slope = gradients(cells.center_px, after, lattice)
     group, sure = _groups(before, after, cells.whole, slope, len(lattice.ink), tables)
