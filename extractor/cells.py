@@ -110,12 +110,16 @@ def _entire(center, area):  # type: ignore[no-untyped-def]
     entire = np.ones(area.shape[0], np.bool_)
     if area.shape[0] <= NEIGHBOURS:
         return entire
+    limit = WHOLE_SHARE * area.max()
+    if area.min() >= limit:
+        return entire
     grid = bucketed(center)
     index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
     for i in range(area.shape[0]):
-        nearest(center, grid, center[i, 0], center[i, 1], index, square)
-        larger = 0
-        for j in index:
-            larger += area[i] < WHOLE_SHARE * area[j]
-        entire[i] = larger <= NEIGHBOURS // 4
+        if area[i] < limit:
+            nearest(center, grid, center[i, 0], center[i, 1], index, square)
+            larger = 0
+            for j in index:
+                larger += area[i] < WHOLE_SHARE * area[j]
+            entire[i] = larger <= NEIGHBOURS // 4
     return entire
