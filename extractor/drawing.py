@@ -77,14 +77,15 @@ class Draughtsman:
         """The fit after as many steps as it takes, or as a preset allows."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
         for _ in range(steps.synthesis - 1):
-            far = np.linalg.norm(fit.measured - drawing.xy, axis=1) > steps.near * drawing.sigma
-            moving = far & (fit.strides > steps.enough)
+            near = steps.near * drawing.sigma
+            anew, moving = still_moving(
+                fit.measured, drawing.xy, fit.strides, near, steps.enough, self._mesh.edges
+            )
             other = _looks_other(fit, drawing)
-            if not (other or moving.any()):
+            if not (other or moving):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
-            anew = moving | neighbours(moving, self._mesh.edges)
-            if other or anew.sum() > MAX_AGAIN * len(anew):
+            if other or moving > MAX_AGAIN * len(anew):
                 fit, drawing = self._first(view, fit)
             else:
                 fit, drawing = self._again(view, fit, drawing, anew)
@@ -109,28 +110,26 @@ class Draughtsman:
         """A step from what was read, once more where gridlines end at markers that are ``anew`` (M,) bool."""
         image, mesh, levels, sigma = view.image, self._mesh, drawing.levels, drawing.sigma
         picture, box = self.picture(image.shape), drawing.box
-        again = np.asarray(anew[mesh.edges].any(axis=1))[:, None]
-        xy = np.where(anew[:, None], fit.xy, drawing.xy)
-        bend = np.where(again, fit.bend, drawing.bend)
+        again, which = touching(anew, mesh.edges), touching(anew, mesh.cells)
+        xy, bend = chosen(anew, fit.xy, drawing.xy), chosen(again, fit.bend, drawing.bend)
         fit = fit._replace(xy=xy, bend=bend)
-        lines = np.where(again, lines_of(mesh, fit), drawing.lines)
+        lines = chosen(again, lines_of(mesh, fit), drawing.lines)
         contrasts = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        which = np.asarray(anew[mesh.cells].any(axis=1))
         cells = mesh.cells[which], mesh.cell_edges[which], mesh.edges
         cell, slope = levels.cell[which], levels.slope[which]
         draw_cells(drawing.xy, *cells, drawing.lines, -cell, -slope, sigma, box, picture)
         draw_cells(xy, *cells, lines, cell, slope, sigma, box, picture)
         black = black_at(levels.black, middles(lines), *view.frame)
         some = lines.copy()
-        some[~again[:, 0], KNOWN] = 0.0
+        some[~again, KNOWN] = 0.0
         sums = read_gridlines(image, picture, some, contrasts, black, sigma, box, loose_ones(mesh, fit))
         drawing = drawing._replace(
             xy=xy,
             lines=lines,
             bend=bend,
-            contrasts=np.where(again, contrasts, drawing.contrasts),
-            black=np.where(again, black, drawing.black),
-            sums=np.where(again, sums, drawing.sums),
+            contrasts=chosen(again, contrasts, drawing.contrasts),
+            black=chosen(again, black, drawing.black),
+            sums=chosen(again, sums, drawing.sums),
         )
         return self._stepped(view.frame, fit, drawing), drawing
 
@@ -173,17 +172,60 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
     """Whether the blur or the levels were found to be others than those drawn."""
     if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
         return True
-    levels = np.median(np.abs(drawing.levels.cell).max(axis=1))
-    change = np.median(np.abs(drawing.bettered.cell - drawing.levels.cell).max(axis=1))
-    return bool(change > SAME_LEVELS * levels)
+    return bool(level_change(drawing.levels.cell, drawing.bettered.cell) > SAME_LEVELS)
 
 
 @compiled
-def neighbours(which, edges):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers with a gridline to one of ``which`` (M,)."""
-    out = np.zeros(which.shape[0], np.bool_)
+def level_change(before, now):  # type: ignore[no-untyped-def]
+    """The cells' median change of level (K, 3), over their median level."""
+    sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
+    for i in range(before.shape[0]):
+        for channel in range(3):
+            sizes[i] = max(sizes[i], abs(before[i, channel]))
+            changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
+    return np.median(changes) / max(np.median(sizes), 1e-9)
+
+
+@compiled
+def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
+    those beside them; how many these are, 0 if there are none."""
+    count = drawn.shape[0]
+    moving, found = np.zeros(count, np.bool_), False
+    for m in range(count):
+        dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
+        moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
+        found |= moving[m]
+    out = moving.copy()
+    if found:
+        beside(moving, edges, out)
+    return out, np.sum(out)
+
+
+@compiled
+def beside(which, edges, out):  # type: ignore[no-untyped-def]
+    """Add to ``out`` (M,) the markers with a gridline to one of ``which`` (M,)."""
     for e in range(edges.shape[0]):
         a, b = edges[e]
         out[a] |= which[b]
         out[b] |= which[a]
+
+
+@compiled
+def touching(which, groups):  # type: ignore[no-untyped-def]
+    """(G,) bool, the groups (G, n) of markers with one of ``which`` (M,) among them."""
+    out = np.zeros(groups.shape[0], np.bool_)
+    for g in range(groups.shape[0]):
+        for k in range(groups.shape[1]):
+            out[g] |= which[groups[g, k]]
+    return out
+
+
+@compiled
+def chosen(which, ones, others):  # type: ignore[no-untyped-def]
+    """Rows of ``ones`` where ``which``, of ``others`` elsewhere."""
+    out = others.copy()
+    for i in range(which.shape[0]):
+        if which[i]:
+            out[i] = ones[i]
     return out

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around
-from .drawing import MIN_SIGMA_PX, Draughtsman, neighbours
+from .drawing import MIN_SIGMA_PX, Draughtsman, beside, touching
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .image import estimate_noise
@@ -155,9 +155,10 @@ class Refiner:
     ) -> tuple[Fit, NDArray[np.bool_]]:
         """A round of profiles around some markers, judged by these and some elsewhere."""
         edges = self._mesh.edges
-        near = neighbours(which, edges) | which
+        near = which.copy()
+        beside(which, edges, near)
         room = across.room.copy()
-        elsewhere = ~near[edges].any(axis=1)
+        elsewhere = ~touching(near, edges)
         elsewhere[::ELSEWHERE] = False
         room[elsewhere] = 0.0
         return self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
