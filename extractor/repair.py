@@ -47,6 +47,8 @@ MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadrat
 # to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
 MILD_ERROR = 2.0
 HEAVY_ERROR = 1.4
+LOST, MEASURED = np.uint8(Status.LOST), np.uint8(Status.MEASURED)
+REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,26 +73,14 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     slide = cov, refined.free_px, places.xy_px, edge_px, lattice.rim
     rings = lattice.ring_weights, lattice.neighbours
     if _sound(xy, believed, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
-        return Repaired(xy, cov, np.isfinite(xy[:, 0]) * np.uint8(Status.MEASURED))
+        return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
     _drop_outliers(xy, cov, edge_px, believed, places.whole, *rings, lattice.marker_mm)
     _drop_frayed(xy, cov, places, lattice)
     _drop_slid(xy, cov, _slid(xy, *slide), places, lattice)
-    measured, edge = xy.copy(), _filled(edge_px, lattice.neighbours)
-    outside = ~_inside(xy, size)
-    xy[outside], cov[outside] = np.nan, np.nan
-    status = np.where(outside, Status.LOST, Status.MEASURED).astype(np.uint8)
-    if status[lattice.present].all():
-        return Repaired(xy, cov, status)
-    for place, variance, kind in (
-        (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
-        (*_by_cells(measured, places, edge, lattice, size), Status.REPAIRED),
-        (*_by_layer(measured, edge, lattice), Status.FITTED),
-    ):
-        use = (status == Status.LOST) & _inside(place, size) & lattice.present
-        xy[use] = place[use]
-        cov[use] = np.eye(2) * variance[use, None, None]
-        status[use] = kind
-    return Repaired(xy, cov, status)
+    tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
+    return Repaired(
+        xy, cov, _fill(xy, cov, _filled(edge_px, lattice.neighbours), places.xy_px, *tables, size)
+    )
 
 
 @compiled
@@ -105,7 +95,7 @@ def _sound(xy, believed, slide, rings, inner_rings, present, size):  # type: ign
             if present[m]:
                 return False
             continue
-        if not (x >= -0.5 and y >= -0.5 and x <= size[0] - 0.5 and y <= size[1] - 0.5):
+        if not _inside(x, y, size):
             return False
         if strays(xy, m, MAX_DEVIATION * edge[m] if believed[m] else 0.0, weights, table):
             return False
@@ -116,9 +106,10 @@ def _sound(xy, believed, slide, rings, inner_rings, present, size):  # type: ign
     return True
 
 
-def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Places within the image, out to the edges of its pixels; NaN not."""
-    return np.asarray((xy >= -0.5).all(axis=1) & (xy <= np.array(size) - 0.5).all(axis=1))
+@compiled
+def _inside(x, y, size):  # type: ignore[no-untyped-def]
+    """Whether a place is within the image, out to the edges of its pixels; NaN is not."""
+    return x >= -0.5 and y >= -0.5 and x <= size[0] - 0.5 and y <= size[1] - 0.5
 
 
 @compiled
@@ -129,14 +120,15 @@ def _drop_outliers(xy, cov, edge, believed, whole, weights, table, marker_mm):  
     lie farther off.
     """
     near = np.where(believed, MAX_DEVIATION * edge, 0.0)
-    excess = np.empty(edge.shape[0])
+    excess, stale = np.zeros(edge.shape[0]), np.ones(edge.shape[0], np.bool_)
     for _ in range(ROUNDS):
-        # only what may be too far is looked at closely
-        doubtful = deviant(xy, near, weights, table)
-        if not doubtful.any():
-            break
+        # only what may be too far is looked at closely, and again where a neighbour has been dropped
+        doubtful = deviant(xy, near, weights, table) & stale
         place, variance, leverage, support = predicted(xy, doubtful, marker_mm, table)
-        for m in range(edge.shape[0]):
+        for m in np.flatnonzero(stale):
+            excess[m] = 0.0
+            if not doubtful[m]:
+                continue
             allowed = MAX_DEVIATION
             if whole[m]:
                 allowed = MAX_AGREED
@@ -146,19 +138,24 @@ def _drop_outliers(xy, cov, edge, believed, whole, weights, table, marker_mm):  
                 sigma = np.sqrt(variance[m] * (1 + leverage[m]))
                 allowed = clamp(SIGMAS * sigma / edge[m], MAX_DEVIATION, MAX_TOLERANCE)
             apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
-            excess[m] = apart / (edge[m] * allowed)
-            if not np.isfinite(excess[m]):
-                excess[m] = 0.0
-            if not (np.isnan(xy[m, 0]) or believed[m] or np.isfinite(place[m, 0])):
+            if np.isfinite(apart / (edge[m] * allowed)):
+                excess[m] = apart / (edge[m] * allowed)
+            if not (believed[m] or np.isfinite(place[m, 0])):
                 excess[m] = np.inf
-        if not (excess > 1.0).any():
+        worst = np.flatnonzero(excess > 1.0)
+        if worst.shape[0] == 0:
             break
-        for m in range(edge.shape[0]):
-            worst = excess[m] > 1.0
+        stale[:] = False
+        for m in worst:
+            largest = True
             for n in table[m]:
-                worst = worst and (n < 0 or excess[m] >= excess[n])
-            if worst:
-                xy[m], cov[m] = np.nan, np.nan
+                largest = largest and (n < 0 or excess[m] >= excess[n])
+            stale[m] = largest
+        for m in np.flatnonzero(stale):
+            xy[m], cov[m] = np.nan, np.nan
+            for n in table[m]:
+                if n >= 0:
+                    stale[n] = True
 
 
 def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
@@ -239,57 +236,63 @@ def _filled(edge, table):  # type: ignore[no-untyped-def]
     return out
 
 
-def _by_neighbours(
-    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) places by the two rings around each lost marker, NaN where not safe, and their (M,) variances."""
+@compiled
+def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
+    """Write the places and covariances of the lost markers that can be told, NaN for those outside the image; (M,)
+    uint8 the status of all."""
     lost = np.isnan(xy[:, 0])
-    place, variance, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
-    nearer = predict(xy, lost, lattice.marker_mm, lattice.ring)[0]
-    with np.errstate(invalid="ignore"):
-        # where the inner ring alone says something else, the surface is too bent for either to be believed
-        alone = np.isnan(nearer[:, 0])
-        doubt = np.where(alone, (UNSEEN * edge) ** 2, ((place - nearer) ** 2).sum(axis=1) / 4)
-        at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
-        safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
-    hidden = np.where(alone, 0.25 * (UNSEEN * edge) ** 2, 0.0)
-    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance + hidden
+    if lost.any():
+        near = predicted(xy, lost, marker_mm, table)
+        nearer = predicted(xy, lost, marker_mm, ring)[0]
+        along, doubt = by_layer(xy, layers)
+    status = np.where(lost, LOST, MEASURED)
+    for m in range(xy.shape[0]):
+        if lost[m] and present[m]:
+            variance = _by_neighbours(m, near, nearer, edge[m])
+            if variance >= 0.0 and _inside(near[0][m, 0], near[0][m, 1], size):
+                xy[m], status[m] = near[0][m], REPAIRED
+            else:
+                variance = _by_cells(m, near, implied, edge[m], size)
+                if variance >= 0.0 and _inside(implied[m, 0], implied[m, 1], size):
+                    xy[m], status[m] = implied[m], REPAIRED
+                elif doubt[m] + (3 * MODEL_SIGMA * edge[m]) ** 2 < (MAX_SIGMA * edge[m]) ** 2:
+                    variance = HEAVY_ERROR * doubt[m] + (MODEL_SIGMA * edge[m]) ** 2
+                    xy[m], status[m] = along[m], FITTED
+            cov[m] = variance * np.eye(2)
+        if not _inside(xy[m, 0], xy[m, 1], size):
+            xy[m], cov[m], status[m] = np.nan, np.nan, LOST
+    return status
 
 
-def _by_cells(
-    xy: NDArray[np.float64],
-    places: Places,
-    edge: NDArray[np.float64],
-    lattice: Lattice,
-    size: tuple[int, int],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) the corners that the cells around each lost marker imply, averaged (the article's eq. 6), and their (M,)
-    variance; NaN where the markers around say something else, and at the image's border, which cuts cells.
+@compiled
+def _by_neighbours(m, near, nearer, edge):  # type: ignore[no-untyped-def]
+    """The variance of a lost marker's place by the two rings around it; NaN where that is not safe."""
+    place, spread, leverage, support = near
+    dx, dy = place[m, 0] - nearer[m, 0], place[m, 1] - nearer[m, 1]
+    # where the inner ring alone says something else, the surface is too bent for either to be believed
+    alone = np.isnan(nearer[m, 0])
+    doubt = (UNSEEN * edge) ** 2 if alone else (dx * dx + dy * dy) / 4
+    at_most = spread[m] * (1 + leverage[m]) + (MODEL_SIGMA * edge) ** 2 + doubt
+    if support[m] < MILD_SUPPORT or not (leverage[m] < MAX_LEVERAGE and at_most < (MAX_SIGMA * edge) ** 2):
+        return np.nan
+    hidden = 0.25 * (UNSEEN * edge) ** 2 if alone else 0.0
+    return (MILD_ERROR * leverage[m]) ** 2 * spread[m] + hidden
+
+
+@compiled
+def _by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
+    """The variance of the corners that the cells around a lost marker imply, averaged (the article's eq. 6); NaN where
+    the markers around say something else, and at the image's border, which cuts cells.
 
     Where gridlines bend sharply, the markers around tell little more than that.
     """
-    lost = np.isnan(xy[:, 0])
-    expected, spread, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
-    apart = places.xy_px - expected
-    squares = (apart**2).sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        deep = np.minimum(places.xy_px, np.array(size) - 1 - places.xy_px).min(axis=1) > BORDER * edge
-        use = lost & deep & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
-        known = spread * (1 + leverage)
-        use &= (
-            (leverage < RIM_LEVERAGE)
-            & (known < (MAX_IMPLIED * edge) ** 2)
-            & (squares < 4 * (known + (IMPLIED_SIGMA * edge) ** 2))
-        )
-    variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
-    return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
-
-
-def _by_layer(
-    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) places by the markers of each lost marker's layer, NaN where not safe, and their (M,) variances."""
-    place, variance = by_layer(xy, lattice.layers)
-    with np.errstate(invalid="ignore"):
-        safe = variance + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_SIGMA * edge) ** 2
-    return np.where(safe[:, None], place, np.nan), HEAVY_ERROR * variance + (MODEL_SIGMA * edge) ** 2
+    expected, spread, leverage, support = near
+    x, y = implied[m]
+    square = (x - expected[m, 0]) ** 2 + (y - expected[m, 1]) ** 2
+    deep = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER * edge
+    if not (deep and support[m] >= RIM_SUPPORT and square < (MAX_IMPLIED * edge) ** 2):
+        return np.nan
+    known, own = spread[m] * (1 + leverage[m]), (IMPLIED_SIGMA * edge) ** 2
+    if not (leverage[m] < RIM_LEVERAGE and known < (MAX_IMPLIED * edge) ** 2 and square < 4 * (known + own)):
+        return np.nan
+    return 0.25 * square + own
