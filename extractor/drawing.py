@@ -76,13 +76,13 @@ class Draughtsman:
     def steps(self, view: Sight, fit: Fit, steps: Steps) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
-        for _ in range(steps.synthesis - 1):
+        for step in range(steps.synthesis):
             near = steps.near * drawing.sigma
             anew, moving = still_moving(
                 fit.measured, drawing.xy, fit.strides, near, steps.enough, self._mesh.edges
             )
             other = _looks_other(fit, drawing)
-            if not (other or moving):
+            if not (other or (moving and step + 1 < steps.synthesis)):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
             if other or moving > MAX_AGAIN * len(anew):
