@@ -1,12 +1,6 @@
-"""The pattern is drawn from its current markers, and what the image shows beyond it is read along the gridlines.
+"""What the image shows beyond the pattern as it is drawn (``painting``) is read along the gridlines.
 
-A pixel of the drawing is the share of each cell under a Gaussian (the optics' blur and the pixel's box in one) times
-the cell's level over black. The three sides of a cell are half planes, where two of them are near they form a wedge
-(``gaussian``); inclusion and exclusion joins them:
-
-    share = wedge01 + wedge12 + wedge20 - side0 - side1 - side2 + 1.
-
-Every pixel near a gridline then votes with the derivative of the drawing by the gridline's offset, which sinks towards
+Every pixel near a gridline votes with the derivative of the drawing by the gridline's offset, which sinks towards
 its two ends as 1 - t and t: the gradient of the log-likelihood, and its curvature.
 """
 
@@ -15,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, vectorized
-from .gaussian import REACH, normal, side_of_wedge
-from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
+from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
+from .painting import draw_cells as draw_cells
 from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur
@@ -48,152 +42,6 @@ def clear(model, box):  # type: ignore[no-untyped-def]
     """Zeros inside the box (x from, y from, x to, y to)."""
     for y in range(box[1], box[3]):
         model[y, box[0] : box[2]] = np.float32(0.0)
-
-
-@compiled
-def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
-    """A cell's side in units of the blur: d = out[0] + out[1] x + out[2] y inside, t from its first corner likewise.
-
-    out: 0-2 distance, 3-5 place along, 6 length, 7 and 8 slopes at its first and second corner, positive inwards.
-    """
-    line = lines[e]
-    ux, uy, length = line[UX], line[UY], line[LENGTH]
-    nx, ny = -uy * sense * inverse, ux * sense * inverse
-    out[0], out[1], out[2] = -(nx * line[X] + ny * line[Y]), nx, ny
-    ux, uy = ux * inverse, uy * inverse
-    along = -(ux * line[X] + uy * line[Y])
-    out[6] = length * inverse
-    if forward:
-        out[3], out[4], out[5] = along, ux, uy
-        out[7], out[8] = sense * line[LEAVE], sense * line[ARRIVE]
-    else:
-        out[3], out[4], out[5] = out[6] - along, -ux, -uy
-        out[7], out[8] = -sense * line[ARRIVE], -sense * line[LEAVE]
-
-
-@compiled
-def _sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
-    """Fill in a cell's three sides; how far they can lie off their chords."""
-    bulge = 0.0
-    for k in range(3):
-        e = cell_edges[k]
-        forward = edges[e, 0] == cell[k]
-        _side(lines, e, forward, turn if forward else -turn, inverse, side[k])
-        bulge = max(bulge, (0.25 * side[k, 6] + REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
-    return bulge
-
-
-@compiled
-def _opening(side, other):  # type: ignore[no-untyped-def]
-    """The angle at the corner between a side's end and the next one's start, over 2 pi."""
-    ax, ay = -side[4], -side[5]
-    bx, by = other[4], other[5]
-    # the first side bows inwards with slope 8 along its direction; seen from the corner that turns it outwards
-    angle = np.arccos(min(max((ax * bx + ay * by) / (np.hypot(ax, ay) * np.hypot(bx, by)), -1.0), 1.0))
-    return (angle + np.arctan(side[8]) - np.arctan(other[7])) / (2.0 * np.pi)
-
-
-@compiled
-def _columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
-    """The columns of row y that lie less than ``far`` outside of every side."""
-    low, high = left, right
-    for k in range(3):
-        rest = side[k, 0] + side[k, 2] * y + far
-        if side[k, 1] > 0.0:
-            low = max(low, np.ceil(-rest / side[k, 1]))
-        elif side[k, 1] < 0.0:
-            high = min(high, np.floor(-rest / side[k, 1]))
-        elif rest < 0.0:
-            high = low - 1.0
-    return low, high
-
-
-@compiled
-def _wedge(opening, end, d, back, start, other, t):  # type: ignore[no-untyped-def]
-    """Share of the wedge between the end of one side (distance d, ``back`` from the corner, slope ``end``) and the
-    start of the next (distance ``other``, place t, slope ``start``)."""
-    return opening + side_of_wedge(d, back - end * d) + side_of_wedge(other, t + start * other)
-
-
-@compiled
-def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, model):  # type: ignore[no-untyped-def]
-    """Add the drawn cells' levels over black to the model."""
-    inverse = 1.0 / sigma
-    side = np.zeros((3, 9))
-    flat, width = model.reshape(-1), model.shape[1]
-    one, two = np.uint64(1), np.uint64(2)
-    for i in range(cells.shape[0]):
-        if (
-            lines[cell_edges[i, 0], KNOWN] * lines[cell_edges[i, 1], KNOWN] * lines[cell_edges[i, 2], KNOWN]
-            == 0.0
-        ):
-            continue
-        a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
-        turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
-        bulge = _sides(cells[i], cell_edges[i], edges, lines, turn, inverse, side)
-        angle0, angle1, angle2 = (
-            _opening(side[2], side[0]),
-            _opening(side[0], side[1]),
-            _opening(side[1], side[2]),
-        )
-        length0, length1, length2 = side[0, 6], side[1, 6], side[2, 6]
-        leave0, leave1, leave2 = side[0, 7], side[1, 7], side[2, 7]
-        arrive0, arrive1, arrive2 = side[0, 8], side[1, 8], side[2, 8]
-        short0, short1, short2 = 1.0 / length0, 1.0 / length1, 1.0 / length2
-        step0, step1, step2 = side[0, 1], side[1, 1], side[2, 1]
-        walk0, walk1, walk2 = side[0, 4], side[1, 4], side[2, 4]
-        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        far = REACH + bulge
-        top = max(int(np.ceil(min(a[1], b[1], c[1]) - far * sigma)), box[1])
-        bottom = min(int(max(a[1], b[1], c[1]) + far * sigma), box[3] - 1)
-        left = max(np.ceil(min(a[0], b[0], c[0]) - far * sigma), float(box[0]))
-        right = min(np.floor(max(a[0], b[0], c[0]) + far * sigma), box[2] - 1.0)
-        g0, g1, g2 = slopes[i, 0, 0], slopes[i, 1, 0], slopes[i, 2, 0]
-        for y in range(top, bottom + 1):
-            low, high = _columns(side, y, far, left, right)
-            if high < low:
-                continue
-            l0 = levels[i, 0] + slopes[i, 0, 1] * (y - cy) - g0 * cx
-            l1 = levels[i, 1] + slopes[i, 1, 1] * (y - cy) - g1 * cx
-            l2 = levels[i, 2] + slopes[i, 2, 1] * (y - cy) - g2 * cx
-            off0, way0 = side[0, 0] + side[0, 2] * y, side[0, 3] + side[0, 5] * y
-            off1, way1 = side[1, 0] + side[1, 2] * y, side[1, 3] + side[1, 5] * y
-            off2, way2 = side[2, 0] + side[2, 2] * y, side[2, 3] + side[2, 5] * y
-            at = np.uint64((y * width + int(low)) * 3)
-            for x in range(int(low), int(high) + 1):
-                here = at
-                at += np.uint64(3)
-                d0, d1, d2 = off0 + step0 * x, off1 + step1 * x, off2 + step2 * x
-                t0, t1, t2 = way0 + walk0 * x, way1 + walk1 * x, way2 + walk2 * x
-                if d0 < far:
-                    d0 -= bow(t0 * short0, length0, leave0, arrive0)
-                if d1 < far:
-                    d1 -= bow(t1 * short1, length1, leave1, arrive1)
-                if d2 < far:
-                    d2 -= bow(t2 * short2, length2, leave2, arrive2)
-                if min(d0, d1, d2) <= -REACH:
-                    continue
-                share = 1.0
-                near0, near1, near2 = d0 < REACH, d1 < REACH, d2 < REACH
-                if near0:
-                    if near1:
-                        share = _wedge(angle1, arrive0, d0, length0 - t0, leave1, d1, t1)
-                        if near2:
-                            share += 1.0 - normal(d0) - normal(d1) - normal(d2)
-                            share += _wedge(angle2, arrive1, d1, length1 - t1, leave2, d2, t2)
-                            share += _wedge(angle0, arrive2, d2, length2 - t2, leave0, d0, t0)
-                            share = max(share, 0.0)
-                    elif near2:
-                        share = _wedge(angle0, arrive2, d2, length2 - t2, leave0, d0, t0)
-                    else:
-                        share = normal(d0)
-                elif near1:
-                    share = _wedge(angle2, arrive1, d1, length1 - t1, leave2, d2, t2) if near2 else normal(d1)
-                elif near2:
-                    share = normal(d2)
-                flat[here] += np.float32(share * (l0 + g0 * x))
-                flat[here + one] += np.float32(share * (l1 + g1 * x))
-                flat[here + two] += np.float32(share * (l2 + g2 * x))
 
 
 @compiled
