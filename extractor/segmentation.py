@@ -61,7 +61,7 @@ def _arcs(inks):  # type: ignore[no-untyped-def]
 def _within(hue, arc):  # type: ignore[no-untyped-def]
     """Whether a hue is among those of an arc."""
     first, count = arc
-    past = np.uint8(hue - first) if hue >= first else np.uint8(hue + np.uint8(HUES) - first)
+    past = np.uint8(int(hue) - int(first)) if hue >= first else np.uint8(int(hue) + HUES - int(first))
     return past < count
 
 
