@@ -31,6 +31,7 @@ MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
 SAME_LEVELS = 0.015  # likewise, of the levels
+LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
@@ -89,7 +90,7 @@ class Draughtsman:
                 fit, drawing = self._first(view, fit)
             else:
                 fit, drawing = self._again(view, fit, drawing, anew)
-        return fit
+        return fit._replace(unsettled=unsettled(fit.measured - drawing.xy, drawing.sigma))
 
     def _first(self, view: Sight, fit: Fit) -> tuple[Fit, Drawing]:
         """A step from everything."""
@@ -200,6 +201,19 @@ def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore
     if found:
         beside(moving, edges, out)
     return out, np.sum(out)
+
+
+@compiled
+def unsettled(shift, sigma):  # type: ignore[no-untyped-def]
+    """(M, 2, 2) px^2, what the last step may have left of a ``shift`` (M, 2) from where the markers are drawn: the
+    drawing answers to shifts of the size of the blur as it would to smaller ones."""
+    out = np.zeros((shift.shape[0], 2, 2))
+    for m in range(shift.shape[0]):
+        x, y = shift[m]
+        share = min(LEFT * np.hypot(x, y) / sigma, MOST_LEFT)
+        out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
+        out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
+    return out
 
 
 @compiled

@@ -66,6 +66,7 @@ class Fit(NamedTuple):
         bend: (E, 2) px, by how much they do.
         strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
         reading: what that step saw.
+        unsettled: (M, 2, 2) px^2, what it may have left; None where nothing is drawn.
     """
 
     xy: NDArray[np.float64]
@@ -82,6 +83,7 @@ class Fit(NamedTuple):
     bend: NDArray[np.float64]
     strides: NDArray[np.float64]
     reading: Reading | None
+    unsettled: NDArray[np.float64] | None = None
 
 
 class Across(NamedTuple):

@@ -30,7 +30,7 @@ from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_EDGE_PX = 5.0  # edges at a reduced scale
+MIN_EDGE_PX = 4.5  # edges at a reduced scale
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 BLIND_SIGMA_PX = 0.9  # where no gridline shows it
@@ -174,7 +174,7 @@ class Refiner:
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            judged, trusted = self._judged(view, placed(self._mesh, fit), across, lost)
+            judged, trusted = self._judged(view, placed(self._mesh, fit._replace(unsettled=None)), across, lost)
             profiled, wide = self._sure(judged, places)
             use = lost & trusted
             xy[use], cov[use] = profiled[use], wide[use]
@@ -209,6 +209,8 @@ class Refiner:
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
+        if fit.unsettled is not None:
+            cov += fit.unsettled
         cov += HIDDEN**2 * around(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
         _drop_unsure(xy, cov, places.xy_px, places.edge_px, places.whole)
         return xy, cov
