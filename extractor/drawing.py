@@ -30,8 +30,10 @@ MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
-SAME_LEVELS = 0.015  # likewise, of the levels
+SMALL_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
+SAME_LEVELS = 0.006  # likewise, of the levels
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
+MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
@@ -74,19 +76,20 @@ class Draughtsman:
             kept = self._kept.picture = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def steps(self, view: Sight, fit: Fit, steps: Steps) -> Fit:
-        """The fit after as many steps as it takes, or as a preset allows."""
+    def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
+        """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
-        for step in range(steps.synthesis):
-            near = steps.near * drawing.sigma
-            anew, moving = still_moving(
-                fit.measured, drawing.xy, fit.strides, near, steps.enough, self._mesh.edges
-            )
-            other = _looks_other(fit, drawing)
-            if not (other or (moving and step + 1 < steps.synthesis)):
+        spent = _effort(view.scale)
+        for step in range(MAX_STEPS):
+            near = steps.near * min(drawing.sigma, (SMALL_BLUR * edge_px) ** 2 / drawing.sigma)
+            about = fit.measured, drawing.xy, fit.strides
+            anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
+            everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
+            spent += _effort(view.scale, None if everything else moving / len(anew))
+            if not (everything or moving) or (step > 0 and spent > steps.effort):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
-            if other or moving > MAX_AGAIN * len(anew):
+            if everything:
                 fit, drawing = self._first(view, fit)
             else:
                 fit, drawing = self._again(view, fit, drawing, anew)
@@ -167,6 +170,12 @@ class Draughtsman:
         black = cell_means(view.image, picture, fit.xy, mesh.black, 0.0)
         drawn[:, :3] += fit.levels.cell
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
+
+
+def _effort(scale: int, share: float | None = None) -> float:
+    """What a step costs, 1 for everything at half the image's scale: from everything, or around a share of markers."""
+    pixels = (2 / scale) ** 2
+    return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
 
 
 def _looks_other(fit: Fit, drawing: Drawing) -> bool:
