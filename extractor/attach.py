@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
 from .bridge import MESHED, PREDICTED, unbridged
 from .cells import Cells
 from .engine import compiled
-from .mesh import Mesh, among
+from .mesh import Mesh
 from .near import bucketed, nearest
 from .numbering import Numbering
-from .parts import largest_parts
+from .parts import connected
 from .tables import Lattice
 
 ROUNDS = 12
@@ -39,13 +38,11 @@ def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> 
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    core = np.where(_core(mesh, cells, numbering.cell), numbering.cell, -1).astype(np.int32)
+    core = _core(mesh.faces, mesh.neighbours, mesh.turn, cells.whole, numbering.cell)
     meshed = numbering.cell.copy()
     meshed[unbridged(cells, core, meshed, lattice, MESHED)] = -1
     cell = meshed
-    free = np.ones(len(lattice.ink), np.bool_)
-    free[cell[cell >= 0]] = False
-    candidates = (cell < 0) & np.isin(cells.ink, lattice.ink[free])
+    free, candidates = _candidates(cells.ink, cell, lattice.ink)
     if candidates.any():
         seen = cells.center_px, cells.ink, cells.area_px
         layout = lattice.center_mm, lattice.ink, lattice.size_mm
@@ -54,13 +51,44 @@ def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> 
     return replace(numbering, cell=cell)
 
 
-def _core(mesh: Mesh, cells: Cells, cell: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(N,) bool, the numbered cells in the largest part of the mesh that hangs together without damaged ones."""
-    parts = largest_parts(among(mesh, cells.whole & (cell >= 0)), 1)
-    core = np.zeros(len(cell), np.bool_)
-    for part in parts:
-        core[mesh.faces[part]] = True
+@compiled
+def _core(faces, neighbours, turn, whole, cell):  # type: ignore[no-untyped-def]
+    """The numbers of the cells in the largest part of the mesh that hangs together without damaged ones; else -1.
+
+    Across damaged cells it hangs together by chance.
+    """
+    core, member = np.full(cell.shape[0], -1, np.int32), np.zeros(turn.shape[0], np.bool_)
+    for f in range(turn.shape[0]):
+        member[f] = turn[f] != 0
+        for i in faces[f]:
+            member[f] = member[f] and whole[i] and cell[i] >= 0
+    part = connected(neighbours, member)
+    if not member.any():
+        return core
+    sizes = np.bincount(part[member])
+    largest = sizes.argmax()
+    for f in range(turn.shape[0]):
+        if part[f] == largest:
+            for i in faces[f]:
+                core[i] = cell[i]
     return core
+
+
+@compiled
+def _candidates(ink, cell, ink_of):  # type: ignore[no-untyped-def]
+    """(U,) bool the free places of the layout, and (N,) bool the cells without a number whose ink some of them hold."""
+    free = np.ones(ink_of.shape[0], np.bool_)
+    for i in range(cell.shape[0]):
+        if cell[i] >= 0:
+            free[cell[i]] = False
+    wanted = np.zeros(256, np.bool_)
+    for u in range(ink_of.shape[0]):
+        if free[u]:
+            wanted[ink_of[u]] = True
+    candidates = np.zeros(cell.shape[0], np.bool_)
+    for i in range(cell.shape[0]):
+        candidates[i] = cell[i] < 0 and wanted[ink[i]]
+    return free, candidates
 
 
 @compiled

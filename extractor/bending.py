@@ -162,6 +162,16 @@ def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def bending_ones(rough, bend, edges):  # type: ignore[no-untyped-def]
+    """(E,) bool, the gridlines that bend (E, 2), or with an end that is rough (M,)."""
+    out = np.empty(edges.shape[0], np.bool_)
+    for e in range(edges.shape[0]):
+        bends = bend[e, 0] != 0.0 or bend[e, 1] != 0.0
+        out[e] = bends or rough[edges[e, 0]] > 0.0 or rough[edges[e, 1]] > 0.0
+    return out
+
+
+@compiled
 def freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
     """(E,) px^2, the variance of b and s, by what the gridlines around show, as far as they are in use (E,), and by how
     rough (M,) their ends are."""

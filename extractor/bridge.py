@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .gradients import gradients
+from .gradients import seen_as, slopes
 from .lattice import SIX, layer_of, marker_id
 from .near import bucketed, nearest
 from .parts import connected
@@ -52,20 +52,27 @@ def unbridged(
     Args:
         before, after: (N,) the layout's cell of each cell of the image, or -1, without and with those beyond gaps.
     """
-    tables = lattice.axial, lattice.cell_of, lattice.layers
-    slope = gradients(cells.center_px, after, lattice)
-    group, sure = _groups(before, after, cells.whole, slope, len(lattice.ink), tables)
+    beyond = np.count_nonzero((after >= 0) & (before < 0))
+    if beyond == 0 or (beyond < limits.members and limits.cell == np.inf):  # none that could be judged
+        return np.zeros(len(after), np.bool_)
+    seen, layout = (cells.center_px, cells.whole), (lattice.center_mm, lattice.size_mm)
+    return np.asarray(_unbridged(*seen, before, after, lattice.slope_tables, *layout, *limits))
+
+
+@compiled
+def _unbridged(center_px, whole, before, after, tables, center_mm, size_mm, cell_limit, group_limit, members):  # type: ignore[no-untyped-def]
+    slope = slopes(center_px, after, seen_as(after, size_mm.shape[0]), tables)
+    group, sure = _groups(before, after, whole, slope, size_mm.shape[0], tables)
     here = np.flatnonzero(sure & (before >= 0))
     there = np.flatnonzero(sure & (group >= 0))
-    bad = np.zeros(len(after), np.bool_)
-    if len(here) < PAIRS or len(there) == 0:
+    bad = np.zeros(after.shape[0], np.bool_)
+    if here.shape[0] < PAIRS or there.shape[0] == 0:
         return bad
-    layout = lattice.center_mm, lattice.size_mm
-    jump = _jumps(cells.center_px, slope, after, here, there, *layout)
-    bad[there] = jump > limits.cell
-    for one in np.unique(group[there]):
+    jump = _jumps(center_px, slope, after, here, there, center_mm, size_mm)
+    bad[there] = jump > cell_limit
+    for one in range(group.max() + 1):
         known = jump[(group[there] == one) & np.isfinite(jump)]
-        if len(known) >= limits.members and np.median(known) > limits.group:
+        if known.shape[0] >= members and np.median(known) > group_limit:
             bad[group == one] = True
     return bad
 
@@ -74,11 +81,8 @@ def unbridged(
 def _groups(before, after, whole, slope, count, tables):  # type: ignore[no-untyped-def]
     """(N,) int32 the group of neighbouring cells beyond gaps that each belongs to, or -1; and (N,) bool, the numbered
     cells with a slope that are whole and amid whole ones."""
-    axial, cell_of, layers = tables
-    seen_as = np.full(count, -1, np.int32)
-    for i in range(after.shape[0]):
-        if after[i] >= 0:
-            seen_as[after[i]] = i
+    _, axial, cell_of, layers = tables
+    seen = seen_as(after, count)
     sure = np.zeros(after.shape[0], np.bool_)
     beside = np.full((after.shape[0], 6), -1, np.int32)
     for i in range(after.shape[0]):
@@ -88,7 +92,7 @@ def _groups(before, after, whole, slope, count, tables):  # type: ignore[no-unty
         for k in range(6):
             q, r = axial[after[i], 0] + SIX[k, 0], axial[after[i], 1] + SIX[k, 1]
             if layer_of(q, r) <= layers and cell_of[marker_id(q, r)] >= 0:
-                j = seen_as[cell_of[marker_id(q, r)]]
+                j = seen[cell_of[marker_id(q, r)]]
                 beside[i, k] = j
                 sure[i] = sure[i] and (j < 0 or whole[j])
     return connected(beside, (after >= 0) & (before < 0)), sure

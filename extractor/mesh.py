@@ -142,11 +142,3 @@ def build_mesh(cells: Cells) -> Mesh | None:
         return None
     _flip(cells.center_px, cells.ink, faces, neighbours)
     return Mesh(*_judge(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours))
-
-
-def among(mesh: Mesh, whole: NDArray[np.bool_]) -> Mesh:
-    """The mesh without the faces of damaged cells: across these it hangs together by chance."""
-    turn = np.where(whole[mesh.faces].all(axis=1), mesh.turn, 0).astype(np.int8)
-    across = np.where(turn[mesh.neighbours] != 0, mesh.neighbours, -1)
-    across[turn == 0] = -1
-    return Mesh(mesh.faces, across, turn)

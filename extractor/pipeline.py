@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from .attach import attach
 from .cells import Cells, find_cells
-from .color import find_target, nominal_hues_deg, segment, to_colors
+from .color import nominal_hues_deg, to_colors
 from .errors import LayoutError
+from .fit import Seen
 from .image import prepare
 from .mesh import build_mesh
 from .missed import missed
@@ -23,8 +24,10 @@ from .reference import Reference
 from .refine import Refiner
 from .regions import find_seeds, grow, large_enough
 from .repair import repair
+from .segmentation import segment
 from .sight import Sights
 from .tables import lattice_of
+from .target import find_target
 from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason
@@ -152,10 +155,16 @@ class Extractor:
         return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(
-        self, sights: Sights, places: Places, mirrored: bool, origin: Origin, stages: Stages
+        self,
+        sights: Sights,
+        places: Places,
+        mirrored: bool,
+        origin: Origin,
+        stages: Stages,
+        before: Seen | None = None,
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        refined = stages.done("refine", self._refine(sights, places))
+        refined = stages.done("refine", self._refine(sights, places, before))
         repaired = stages.done("repair", repair(refined, places, self._lattice, sights.size))
         virtual = stages.done("virtual", place_virtual(self._mesh, repaired, refined.points))
         return Markers(

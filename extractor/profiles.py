@@ -48,6 +48,14 @@ REACH_SIGMA = 1.3  # how far a profile reaches, in units of the blur
 CLEAR_SIGMA = 2.6  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a profile may reach at most
 MIN_CONTRAST = 12.0
+CLOSEST = (
+    0.45  # of the way to the next gridline that a profile may reach for the blur; 0.41 in a regular cell
+)
+ENOUGH_BLURS = 6
+# Wide blur mixes the neighbours' inks into the middles that the contrasts are taken from, and the profile looks steeper
+# than it is: the blur it shows, and the true one, in units of the cell's height (rendered honeycombs).
+SHOWN_BLUR = np.array([0.0, 0.092, 0.112, 0.128, 0.137, 0.149, 0.154])
+TRUE_BLUR = np.array([0.000, 0.093, 0.117, 0.140, 0.160, 0.195, 0.225])
 BILINEAR_PX2 = 1.0 / 6.0  # variance that bilinear sampling adds to the blur, on the average
 CLIP = 0.3  # of the contrast, by which a pixel may lie beyond both colors
 FAR = np.float32(2.6)  # in units of the blur, as far as the polynomials hold
@@ -104,9 +112,10 @@ def unmixing(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, fr
 def profile_blur(image, lines, weights, room, every):  # type: ignore[no-untyped-def]
     """The blur (px, sigma) seen across the middle of every n-th gridline, their median; NaN where nothing is seen.
 
-    The integral of f (1 - f) is sigma / sqrt(pi); bilinear samples add to it.
+    The integral of f (1 - f) is sigma / sqrt(pi); bilinear samples add to it. So does another gridline near the
+    profile: where enough gridlines have room around their middle only these count, else the least blurred quarter.
     """
-    blurs, count = np.empty(lines.shape[0] // every + 1), 0
+    blurs, count, roomy = np.empty((lines.shape[0] // every + 1, 2)), 0, 0
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     for e in range(0, lines.shape[0], every):
         if room[e, 3] == 0.0:
@@ -124,12 +133,18 @@ def profile_blur(image, lines, weights, room, every):  # type: ignore[no-untyped
                 f = sample_dot(flat, height, width, x + m * step * nx, y + m * step * ny, u0, u1, u2) - zero
                 total += f * (1.0 - f) * step / 3.0
         if np.isfinite(total):
-            blurs[count] = total * np.sqrt(np.pi)
+            shown = total * np.sqrt(np.pi)
+            size = np.sqrt(0.5 * 3**0.5 * length * room[e, 0])  # the height of a regular cell of this area
+            share = np.sqrt(max(shown * abs(shown) - BILINEAR_PX2, 0.0)) / size
+            sine = min(room[e, 1], room[e, 2])
+            away = 0.4 * length * sine / np.sqrt(max(1.0 - sine * sine, 1e-9))
+            blurs[count, 0] = size * np.interp(share, SHOWN_BLUR, TRUE_BLUR)
+            blurs[count, 1] = MAX_REACH * room[e, 0] < CLOSEST * away
+            roomy += blurs[count, 1] > 0.0
             count += 1
-    if count == 0:
-        return np.nan
-    sigma = np.median(blurs[:count])
-    return np.sqrt(max(sigma * abs(sigma) - BILINEAR_PX2, 0.0))
+    if roomy >= ENOUGH_BLURS:
+        return np.median(blurs[:count, 0][blurs[:count, 1] > 0.0])
+    return np.partition(blurs[:count, 0], count // 4)[count // 4] if count > 0 else np.nan
 
 
 @compiled

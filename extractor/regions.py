@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import HUES, Segmentation
-from .engine import compiled
+from .color import HUES
+from .engine import compiled, vectorized
+from .segmentation import Segmentation
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
 MIN_DOMAIN_PX = 4
@@ -59,10 +60,9 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
     count = 0
     for y in range(label.shape[0]):
         row = label[y]
-        before = 0
-        for ink in row:
-            count += (ink != before) & (ink != 0)
-            before = ink
+        count += row[0] != 0
+        for x in range(1, label.shape[1]):
+            count += (row[x] != row[x - 1]) & (row[x] != 0)
     return count
 
 
@@ -120,37 +120,43 @@ def _runs(label):  # type: ignore[no-untyped-def]
 
 @compiled
 def _seeds(runs, root):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
+    """Per domain of at least ``MIN_DOMAIN_PX``: the pixel of it nearest to its geometric center, that center, its ink
+    and its area."""
+    size = np.zeros(runs.shape[0], np.int64)
+    for i in range(runs.shape[0]):
+        size[root[i]] += runs[i, 2] - runs[i, 1] + 1
     number = np.full(runs.shape[0], -1, np.int32)
     domains = 0
     for i in range(runs.shape[0]):
-        if root[i] == i:
+        if size[i] >= MIN_DOMAIN_PX:
             number[i] = domains
             domains += 1
-    area = np.zeros(domains, np.int64)
-    sums = np.zeros((domains, 2))
-    ink = np.zeros(domains, np.uint8)
+    area, ink = np.empty(domains, np.int64), np.empty(domains, np.uint8)
+    center = np.zeros((domains, 2))
     for i in range(runs.shape[0]):
         d = number[root[i]]
-        length = runs[i, 2] - runs[i, 1] + 1
-        area[d] += length
-        sums[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
-        sums[d, 1] += length * runs[i, 0]
-        ink[d] = runs[i, 3]
+        if d >= 0:
+            length = runs[i, 2] - runs[i, 1] + 1
+            area[d] = size[root[i]]
+            ink[d] = runs[i, 3]
+            center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
+            center[d, 1] += length * runs[i, 0]
+    for d in range(domains):
+        center[d] /= area[d]
     best = np.full(domains, np.inf)
     xy = np.zeros((domains, 2), np.int32)
     for i in range(runs.shape[0]):
         d = number[root[i]]
-        cx = sums[d, 0] / area[d]
+        if d < 0:
+            continue
+        cx, cy = center[d]
         x = min(max(round(cx), runs[i, 1]), runs[i, 2])
-        distance = (x - cx) ** 2 + (runs[i, 0] - sums[d, 1] / area[d]) ** 2
+        distance = (x - cx) ** 2 + (runs[i, 0] - cy) ** 2
         if distance < best[d]:
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    for d in range(domains):
-        sums[d] /= area[d]
-    return xy, sums, ink, area
+    return xy, center, ink, area
 
 
 def find_seeds(segmentation: Segmentation) -> Seeds:
@@ -158,14 +164,32 @@ def find_seeds(segmentation: Segmentation) -> Seeds:
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
     """
-    xy, center, ink, area = _seeds(*_runs(segmentation.label))
-    keep = area >= MIN_DOMAIN_PX
-    return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
+    return Seeds(*_seeds(*_runs(segmentation.label)))
 
 
 def large_enough(seeds: Seeds) -> bool:
     """Whether at most a few of the domains are too small to be recognised safely."""
     return len(seeds.ink) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
+
+
+@vectorized
+def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
+    """Write the moments of pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+    m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(x_of.shape[0]):
+        x, y = float(x_of[i] - x0), float(y_of[i] - y0)
+        xx, xy, yy = x * x, x * y, y * y
+        m1 += x
+        m2 += y
+        m3 += xx
+        m4 += xy
+        m5 += yy
+        m6 += xx * x
+        m7 += xx * y
+        m8 += x * yy
+        m9 += yy * y
+    out[0], out[1], out[2], out[3], out[4] = x_of.shape[0], m1, m2, m3, m4
+    out[5], out[6], out[7], out[8], out[9] = m5, m6, m7, m8, m9
 
 
 @compiled
@@ -174,8 +198,8 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     height, width = label.shape
     owner = np.zeros((height, width), np.int32)
     owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
-    last = height * width
-    queue = np.empty((limit_px + 2, 2), np.int32)  # a pixel's place in the flat image, and its x
+    across = np.empty(limit_px + 2, np.int32)  # a queue of pixels: their x
+    down = np.empty(limit_px + 2, np.int32)  # and y
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
     half = HUES // 2
@@ -184,7 +208,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
         first = sy * width + sx
         if owners[first] != 0:
             continue
-        queue[0, 0], queue[0, 1] = first, sx
+        across[0], down[0] = sx, sy
         owners[first] = region + 1
         h0 = float(colors[3 * first])
         sum_h, sum_s, sum_v = 0.0, float(colors[3 * first + 1]), float(colors[3 * first + 2])
@@ -193,12 +217,13 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
         while begin < end and end <= limit_px:
             wave_end = end
             for i in range(begin, wave_end):
-                at, x = queue[i, 0], queue[i, 1]
+                x, y = across[i], down[i]
                 for side in range(4):
-                    step = 1 if side == 0 else -1 if side == 1 else width if side == 2 else -width
-                    to = at + step
-                    if to < 0 or to >= last or (side == 0 and x == width - 1) or (side == 1 and x == 0):
+                    nx = x + (1 if side == 0 else -1 if side == 1 else 0)
+                    ny = y + (1 if side == 2 else -1 if side == 3 else 0)
+                    if nx < 0 or ny < 0 or nx == width or ny == height:
                         continue
+                    to = ny * width + nx
                     if owners[to] != 0 or end > limit_px or (labels[to] != ink and labels[to] != 0):
                         continue
                     h, s, v = float(colors[3 * to]), float(colors[3 * to + 1]), float(colors[3 * to + 2])
@@ -210,8 +235,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                     if dh * dh + ds * ds + dv * dv >= limit2 * scale:
                         continue
                     owners[to] = region + 1
-                    queue[end, 0] = to
-                    queue[end, 1] = x + step if side < 2 else x
+                    across[end], down[end] = nx, ny
                     end += 1
                     away = h - h0
                     sum_h += away + (HUES if away < -half else -HUES if away >= half else 0.0)
@@ -223,20 +247,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
-        m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(end):
-            x, y = float(queue[i, 1] - sx), float((queue[i, 0] - queue[i, 1]) // width - sy)
-            xx, xy, yy = x * x, x * y, y * y
-            m1 += x
-            m2 += y
-            m3 += xx
-            m4 += xy
-            m5 += yy
-            m6 += xx * x
-            m7 += xx * y
-            m8 += x * yy
-            m9 += yy * y
-        moments[region] = (float(end), m1, m2, m3, m4, m5, m6, m7, m8, m9)
+        _add_moments(across[:end], down[:end], sx, sy, moments[region])
     return owner, moments
 
 

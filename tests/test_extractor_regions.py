@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from pictures import picture
 
 from extractor import parse_layout
-from extractor.color import Segmentation, Target, find_hues, find_target, nominal_hues_deg, segment, to_colors
+from extractor.color import find_hues, hue_weights, nominal_hues_deg, to_colors
 from extractor.image import estimate_noise
 from extractor.regions import GROW_THRESHOLD, find_seeds, grow
+from extractor.segmentation import Segmentation, segment
+from extractor.target import Target, find_target
 
 Image = NDArray[np.uint8]
 NOMINAL_DEG = nominal_hues_deg(dict(small_layout().palette))
@@ -53,21 +55,34 @@ def test_nominal_hues_are_the_palettes() -> None:
 @pytest.mark.parametrize("shift_deg", [-30, -8, -1, 0, 1, 8, 30])
 def test_hues_are_found_where_the_light_puts_them(shift_deg: int) -> None:
     """Red wanders over the wrap at 0; the hues are those of the image, not the palette's."""
-    histogram = np.zeros((180, 256), np.int64)
+    weight = np.zeros(180)
     true_deg = NOMINAL_DEG + shift_deg
     for hue in true_deg:
         for away in range(-3, 4):
-            histogram[round(hue / 2 + away) % 180, 150] += 100 - 20 * abs(away)
-    found = find_hues(histogram, NOMINAL_DEG)
+            weight[round(hue / 2 + away) % 180] += 100 - 20 * abs(away)
+    found = find_hues(weight, NOMINAL_DEG)
     assert found is not None and (found >= 0).all() and (found < 360).all()
     assert hue_distance(found, true_deg).max() <= 1.01
 
 
 def test_without_one_of_the_inks_there_are_no_hues() -> None:
-    histogram = np.zeros((180, 256), np.int64)
-    assert find_hues(histogram, NOMINAL_DEG) is None
-    histogram[[round(hue / 2) % 180 for hue in NOMINAL_DEG[:2]], 150] = 100
-    assert find_hues(histogram, NOMINAL_DEG) is None
+    weight = np.zeros(180)
+    assert find_hues(weight, NOMINAL_DEG) is None
+    weight[[round(hue / 2) % 180 for hue in NOMINAL_DEG[:2]]] = 100
+    assert find_hues(weight, NOMINAL_DEG) is None
+
+
+@pytest.mark.parametrize("strongest", [60, 130, 255])
+def test_hues_weigh_what_is_not_pale(strongest: int) -> None:
+    """All but 2 % of the colored pixels have less chroma than what counts as strong; an eighth of that is pale."""
+    rng = np.random.default_rng(strongest)
+    hue = rng.integers(0, 180, (70, 90)).astype(np.uint8)
+    chroma = rng.integers(0, strongest + 1, hue.shape).astype(np.uint8)
+    colored = np.sort(chroma[chroma >= 12])
+    strong = int(colored[np.ceil(0.98 * len(colored)).astype(int) - 1])
+    kept = chroma >= max(12, strong // 8)
+    expected = np.bincount(hue[kept], chroma[kept], minlength=180)
+    np.testing.assert_array_equal(hue_weights(hue, chroma), expected)
 
 
 @pytest.mark.parametrize("shift_deg", [-12, 0, 12])

@@ -35,7 +35,7 @@ from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
-from extractor.color import Segmentation
+from extractor.drawing import Draughtsman
 from extractor.fit import Refined
 from extractor.information import covariances, solve
 from extractor.meeting import overlap
@@ -45,6 +45,7 @@ from extractor.placing import Places
 from extractor.presets import PRESETS
 from extractor.regions import find_seeds, grow
 from extractor.repair import repair
+from extractor.segmentation import Segmentation
 from extractor.tables import lattice_of
 from extractor.topology import topology_of
 from extractor.triangles import fit_triangles
@@ -218,7 +219,14 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 
 def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
     return Refined(
-        xy_px, cov_px2, np.ones(len(xy_px), np.bool_), np.zeros(len(xy_px)), 1.0, 2.0, np.empty((0, 0, 3))
+        xy_px,
+        cov_px2,
+        np.ones(len(xy_px), np.bool_),
+        np.zeros(len(xy_px)),
+        1.0,
+        2.0,
+        None,
+        np.empty((0, 0, 3)),
     )
 
 
@@ -241,7 +249,8 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    monkeypatch.setattr(type(double._refine), "_buffer", lambda self, shape: np.zeros(shape))
+    kept: dict[tuple[int, ...], NDArray[np.float64]] = {}
+    monkeypatch.setattr(Draughtsman, "picture", lambda self, shape: kept.setdefault(shape, np.zeros(shape)))
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))
