@@ -162,7 +162,7 @@ def profile_blur(image, lines, weights, room, most):  # type: ignore[no-untyped-
     return np.median(blurs[:count]) if roomy else np.partition(blurs[:count], count // 4)[count // 4]
 
 
-@vectorized
+@compiled
 def _weigh(rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, rest, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 beyond the band, and in the place of what they
     show, 1 before and 0 beyond the gridline, what is left of it beyond the blurred step."""
@@ -186,7 +186,7 @@ def _weigh(rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, res
 @vectorized
 def _vote(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums, per unit of contrast and blur."""
-    zero = np.float32(0.0)
+    zero = np.float64(0.0)  # so that the order of summing hardly matters
     aa, ab, bb, a, b, squares, pixels = zero, zero, zero, zero, zero, zero, zero
     for k in range(count):
         ga, gb = weights[TO_A + k], weights[TO_B + k]
@@ -209,7 +209,7 @@ def _vote(rest, weights, count, sums):  # type: ignore[no-untyped-def]
 @vectorized
 def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending."""
-    zero = np.float32(0.0)
+    zero = np.float64(0.0)  # so that the order of summing hardly matters
     ac, ad, bc, bd, cc, cd, dd, c, d = zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(count):
         ga, gb, gc, gd = weights[TO_A + k], weights[TO_B + k], weights[TO_C + k], weights[TO_D + k]
