@@ -30,7 +30,9 @@ MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
-SMALL_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
+NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
+SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle together, which takes
+WIDE_EFFORT = 2.0  # times the effort
 SAME_LEVELS = 0.006  # likewise, of the levels
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 MAX_STEPS = 10
@@ -79,14 +81,16 @@ class Draughtsman:
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
+        wide = drawing.sigma > SMALL_BLUR * edge_px
+        allowed = (WIDE_EFFORT if wide else 1.0) * steps.effort
         spent = _effort(view.scale)
         for step in range(MAX_STEPS):
-            near = steps.near * min(drawing.sigma, (SMALL_BLUR * edge_px) ** 2 / drawing.sigma)
+            near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
             spent += _effort(view.scale, None if everything else moving / len(anew))
-            if not (everything or moving) or (step > 0 and spent > steps.effort):
+            if not (everything or moving) or (step > 0 and spent > allowed):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
             if everything:

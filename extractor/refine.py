@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around
-from .drawing import MIN_SIGMA_PX, Draughtsman, beside, touching
+from .drawing import MIN_SIGMA_PX, SMALL_BLUR, Draughtsman, beside, touching
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .image import estimate_noise
@@ -30,7 +30,8 @@ from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_EDGE_PX = 5.0  # edges at a reduced scale
+MIN_EDGE_PX = 5.0  # edges at a reduced scale, and
+MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 BLIND_SIGMA_PX = 0.9  # where no gridline shows it
@@ -83,7 +84,8 @@ class Refiner:
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
-        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
+        least = MIN_EDGE_PX if sigma_px < SMALL_BLUR * edge_px else MIN_BLURRED_EDGE_PX
+        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / least)))
 
     def _begin(self, view: Sight, places: Places, before: Seen | None = None) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
@@ -224,10 +226,10 @@ class Refiner:
         mesh, information = self._mesh, fit.information
         xy = fit.measured.copy()
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
-        if fit.unsettled is not None:
-            cov += fit.unsettled
         cov += HIDDEN**2 * around(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
         _drop_unsure(xy, cov, places.xy_px, places.edge_px, places.whole)
+        if fit.unsettled is not None:
+            cov += fit.unsettled
         return xy, cov
 
 
