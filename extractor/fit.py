@@ -13,6 +13,16 @@ from .levels import Levels
 from .offsets import Reading
 
 
+class Seen(NamedTuple):
+    """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
+    and the inks' levels."""
+
+    scale: int
+    sigma: float
+    noise: float
+    levels: Levels
+
+
 @dataclass(frozen=True, eq=False)
 class Refined:
     """Markers after refinement.
@@ -25,6 +35,7 @@ class Refined:
         free_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
+        seen: how the image looks, where the pattern was drawn.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
     """
 
@@ -34,6 +45,7 @@ class Refined:
     free_px: NDArray[np.float64]
     blur_px: float
     noise: float
+    seen: Seen | None
     points: NDArray[np.float64]
 
 
@@ -43,7 +55,8 @@ class Fit(NamedTuple):
     Attributes:
         xy: (M, 2) where the pattern is drawn: markers that the image hardly shows, or not at all (``beyond``), lie
             where their neighbours' maps put them.
-        measured: (M, 2), the same as the last step left them.
+        measured: (M, 2), all of them as the last step left them.
+        guiding: (M, 2), the same with NaN where the image hardly shows them.
         beyond: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
         sigma: the blur, px. noise: grey levels, one channel. levels: of the inks.
@@ -51,12 +64,13 @@ class Fit(NamedTuple):
         rough: (M,) px^2, how rough the markers are around each.
         loose: (E,) px^2, how freely gridlines may bend beyond the map there.
         bend: (E, 2) px, by how much they do.
-        moved: by how many of its standard deviations the last step moved a marker at most.
+        strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
         reading: what that step saw.
     """
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
+    guiding: NDArray[np.float64]
     beyond: NDArray[np.bool_]
     maps: NDArray[np.float64]
     sigma: float
@@ -66,7 +80,7 @@ class Fit(NamedTuple):
     rough: NDArray[np.float64]
     loose: NDArray[np.float64]
     bend: NDArray[np.float64]
-    moved: float
+    strides: NDArray[np.float64]
     reading: Reading | None
 
 

@@ -13,6 +13,7 @@ from .attach import attach
 from .cells import Cells, find_cells
 from .color import nominal_hues_deg, to_colors
 from .errors import LayoutError
+from .fit import Seen
 from .image import prepare
 from .mesh import build_mesh
 from .missed import missed
@@ -158,10 +159,16 @@ class Extractor:
         return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(
-        self, sights: Sights, places: Places, mirrored: bool, origin: Origin, stages: Stages
+        self,
+        sights: Sights,
+        places: Places,
+        mirrored: bool,
+        origin: Origin,
+        stages: Stages,
+        before: Seen | None = None,
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        refined = stages.done("refine", self._refine(sights, places))
+        refined = stages.done("refine", self._refine(sights, places, before))
         repaired = stages.done("repair", repair(refined, places, self._lattice, sights.size))
         virtual = stages.done("virtual", place_virtual(self._mesh, repaired, refined.points))
         return Markers(

@@ -35,8 +35,10 @@ from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
+from extractor.drawing import Draughtsman
 from extractor.fit import Refined
-from extractor.information import covariances, overlap, solve
+from extractor.information import covariances, solve
+from extractor.meeting import overlap
 from extractor.mesh import build_mesh
 from extractor.neighbourhood import predict
 from extractor.placing import Places
@@ -225,7 +227,7 @@ def test_gridlines_seen_nearly_parallel(tilt_deg: float) -> None:
 
 def test_two_gridlines_on_one_line_overlap_finitely() -> None:
     for cosine in (1.0, 1.0 - 1e-15, -1.0, -1.0 + 1e-15, 1.0 + 1e-15, -1.0 - 1e-15):
-        assert np.isfinite(overlap(cosine, 20.0, 20.0, 1.0)).all()
+        assert np.isfinite(overlap(cosine, 0.05, 0.05, 1.0)).all()
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -243,7 +245,14 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 
 def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
     return Refined(
-        xy_px, cov_px2, np.ones(len(xy_px), np.bool_), np.zeros(len(xy_px)), 1.0, 2.0, np.empty((0, 0, 3))
+        xy_px,
+        cov_px2,
+        np.ones(len(xy_px), np.bool_),
+        np.zeros(len(xy_px)),
+        1.0,
+        2.0,
+        None,
+        np.empty((0, 0, 3)),
     )
 
 
@@ -266,7 +275,8 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    monkeypatch.setattr(type(double._refine), "_buffer", lambda self, shape: np.zeros(shape))
+    kept: dict[tuple[int, ...], NDArray[np.float64]] = {}
+    monkeypatch.setattr(Draughtsman, "picture", lambda self, shape: kept.setdefault(shape, np.zeros(shape)))
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))
