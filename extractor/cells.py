@@ -52,17 +52,17 @@ class Cells:
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
-    """The domains that are large enough for cells, at full scale.
+    """The domains that are large enough for cells, at full scale; in a crowd, triangles alone.
 
     Args:
         scale: full-scale pixels per pixel of the seeds.
     """
     found = triangles.region, triangles.corner_px
-    return Cells(*_gathered(seeds.center, seeds.ink, seeds.area_px, *found, scale))
+    return Cells(*_gathered(seeds.center, seeds.ink, seeds.area_px, *found, scale, seeds.crowded))
 
 
 @compiled
-def _gathered(place, ink_of, area_px, region, corner_px, scale):  # type: ignore[no-untyped-def]
+def _gathered(place, ink_of, area_px, region, corner_px, scale, crowded):  # type: ignore[no-untyped-def]
     """The fields of ``Cells``."""
     center = (place + 0.5) * scale - 0.5
     corners = np.full((place.shape[0], 3, 2), np.nan)
@@ -73,6 +73,8 @@ def _gathered(place, ink_of, area_px, region, corner_px, scale):  # type: ignore
                 corner_px[t, 0, axis] + corner_px[t, 1, axis] + corner_px[t, 2, axis]
             ) / 3
     area = area_px.astype(np.float64)
+    if crowded:  # of what is so fine, and sharp
+        center, ink_of, area, corners = center[region], ink_of[region], area[region], corners[region]
     keep = np.flatnonzero(_large(center, area))
     return center[keep], ink_of[keep], area[keep] * scale * scale, corners[keep]
 

@@ -95,12 +95,12 @@ def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
     if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):
         return True
     limit = SHARED_CORNER * SHARED_CORNER * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
+    nearest = np.inf
     for i in range(3):
         for j in range(3):
             dx, dy = corner[a, i, 0] - corner[b, j, 0], corner[a, i, 1] - corner[b, j, 1]
-            if dx * dx + dy * dy < limit:
-                return True
-    return False
+            nearest = min(nearest, dx * dx + dy * dy)
+    return nearest < limit
 
 
 @compiled

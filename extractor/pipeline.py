@@ -22,7 +22,7 @@ from .placing import Places, place
 from .presets import PRESETS, Preset
 from .reference import Reference
 from .refine import Refiner
-from .regions import find_seeds, grow, large_enough
+from .regions import NO_CROWD, find_seeds, grow, large_enough
 from .repair import repair
 from .segmentation import segment
 from .sight import Sights
@@ -35,6 +35,8 @@ from .virtual import place_virtual
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
 MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss
+CROWD = 8  # times as many domains as the pattern has cells, and at least
+MIN_CROWD = 2000  # so many are not a pattern's alone
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
 
 
@@ -88,6 +90,7 @@ class Extractor:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
         self._mesh = topology_of(layout)
+        self._crowd = max(CROWD * len(self._lattice.ink), MIN_CROWD)
         self._refine = Refiner(self._mesh, preset, layout.virtual_per_edge)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
@@ -141,7 +144,8 @@ class Extractor:
         segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
             return None
-        seeds = stages.done("seeds", find_seeds(segmentation))
+        # at a reduced scale, a crowd is what another scale may tell
+        seeds = stages.done("seeds", find_seeds(segmentation, self._crowd if scale == 1 else NO_CROWD))
         if scale > 1 and not large_enough(seeds):
             return None
         regions = stages.done("grow", grow(segmentation, seeds))

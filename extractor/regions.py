@@ -13,6 +13,11 @@ from .segmentation import Segmentation
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
 MIN_DOMAIN_PX = 4
+# In a crowd, a cell has edges of 5 px at least, and of its area no less than a convex shape has for the spread of its
+# pixels (the root of their covariance's determinant): a triangle 10.4 times, an ellipse 12.6 times.
+MIN_CROWDED_PX = 12
+MIN_SOLIDITY = 8.0
+NO_CROWD = 1 << 62
 SAFE_AREA_PX = 20  # a cell with edges of 7 px
 MAX_SMALL = 0.1  # of the domains
 MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
@@ -27,12 +32,14 @@ class Seeds:
         center: (N, 2) float64, the domain's geometric center.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) int64, the domain's area.
+        crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
     """
 
     xy: NDArray[np.int32]
     center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
+    crowded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,28 +86,28 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 def _runs(label):  # type: ignore[no-untyped-def]
     """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
 
-    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 with the first run of each run's domain.
+    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 an earlier run of each run's domain, or itself.
     """
     height, width = label.shape
     runs = np.empty((_count_runs(label) + 1, 4), np.int32)
+    begin = np.empty(width + 1, np.int32)  # where the stretches of a row begin, those without ink among them
     count = 0
     for y in range(height):
         row = label[y]
-        before = np.uint8(0)
-        for x in range(width):
-            ink = row[x]
-            if ink != before:
-                if before != 0:
-                    runs[count, 2] = x - 1
-                    count += 1
-                if ink != 0:
-                    runs[count, 0] = y
-                    runs[count, 1] = x
-                    runs[count, 3] = ink
-                before = ink
-        if before != 0:
-            runs[count, 2] = width - 1
-            count += 1
+        begin[0], stretches = 0, 1
+        for x in range(1, width):
+            begin[stretches] = x
+            stretches += row[x] != row[x - 1]
+        begin[stretches] = width
+        for n in range(stretches):
+            ink = row[begin[n]]
+            runs[count, 0], runs[count, 1], runs[count, 2], runs[count, 3] = (
+                y,
+                begin[n],
+                begin[n + 1] - 1,
+                ink,
+            )
+            count += ink != 0
     parent = np.arange(count).astype(np.int32)
     above = 0
     for i in range(count):
@@ -113,40 +120,77 @@ def _runs(label):  # type: ignore[no-untyped-def]
                 a, b = _root(parent, i), _root(parent, other)
                 parent[max(a, b)] = min(a, b)
             other += 1
-    for i in range(count):
-        parent[i] = parent[parent[i]]
     return runs[:count], parent
 
 
 @compiled
-def _seeds(runs, root):  # type: ignore[no-untyped-def]
-    """Per domain of at least ``MIN_DOMAIN_PX``: the pixel of it nearest to its geometric center, that center, its ink
-    and its area."""
-    size = np.zeros(runs.shape[0], np.int64)
+def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
+    """(R,) int32 the domain of each run, -1 where that is too small, or there are more than ``crowd`` and it is none a
+    cell could be; the areas of the others; and whether there are more."""
+    domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
+    count = 0
     for i in range(runs.shape[0]):
-        size[root[i]] += runs[i, 2] - runs[i, 1] + 1
-    number = np.full(runs.shape[0], -1, np.int32)
-    domains = 0
+        if parent[i] == i:
+            domain[i] = count
+            count += 1
+        else:
+            domain[i] = domain[parent[i]]
+        area[domain[i]] += runs[i, 2] - runs[i, 1] + 1
+    area = area[:count]
+    crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
+    area = _keep(domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
+    if crowded:
+        area = _keep(domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
+    return domain, area, crowded
+
+
+@compiled
+def _keep(domain, area, keep):  # type: ignore[no-untyped-def]
+    """Number the domains to keep anew, in place, with -1 for the others; their areas."""
+    number = np.where(keep, np.cumsum(keep) - 1, -1)
+    for i in range(domain.shape[0]):
+        if domain[i] >= 0:
+            domain[i] = number[domain[i]]
+    return area[keep]
+
+
+@compiled
+def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
+    """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
+    sums = np.zeros((area.shape[0], 5))
+    for i in np.flatnonzero(domain >= 0):
+        row, y, length = sums[domain[i]], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
+        x = 0.5 * (runs[i, 1] + runs[i, 2])
+        row[0] += length * x
+        row[1] += length * y
+        row[2] += length * (x * x + (length * length - 1) / 12.0)
+        row[3] += length * x * y
+        row[4] += length * y * y
+    sums /= area.reshape(-1, 1)
+    x, y = sums[:, 0], sums[:, 1]
+    # a pixel is a square, not a point: it adds 1/12 to each variance
+    xx, xy, yy = sums[:, 2] - x * x + 1.0 / 12.0, sums[:, 3] - x * y, sums[:, 4] - y * y + 1.0 / 12.0
+    return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0))
+
+
+@compiled
+def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
+    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
+    count = area.shape[0]
+    ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
     for i in range(runs.shape[0]):
-        if size[i] >= MIN_DOMAIN_PX:
-            number[i] = domains
-            domains += 1
-    area, ink = np.empty(domains, np.int64), np.empty(domains, np.uint8)
-    center = np.zeros((domains, 2))
-    for i in range(runs.shape[0]):
-        d = number[root[i]]
+        d = domain[i]
         if d >= 0:
             length = runs[i, 2] - runs[i, 1] + 1
-            area[d] = size[root[i]]
             ink[d] = runs[i, 3]
             center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
             center[d, 1] += length * runs[i, 0]
-    for d in range(domains):
+    for d in range(count):
         center[d] /= area[d]
-    best = np.full(domains, np.inf)
-    xy = np.zeros((domains, 2), np.int32)
+    best = np.full(count, np.inf)
+    xy = np.zeros((count, 2), np.int32)
     for i in range(runs.shape[0]):
-        d = number[root[i]]
+        d = domain[i]
         if d < 0:
             continue
         cx, cy = center[d]
@@ -159,12 +203,19 @@ def _seeds(runs, root):  # type: ignore[no-untyped-def]
     return xy, center, ink, area
 
 
-def find_seeds(segmentation: Segmentation) -> Seeds:
+def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
     """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
+
+    Args:
+        crowd: where there are more domains than this, small and ragged ones are clutter, too: an image of noise has
+            many times more than any pattern.
     """
-    return Seeds(*_seeds(*_runs(segmentation.label)))
+    runs, parent = _runs(segmentation.label)
+    domain, area, crowded = _domains(runs, parent, crowd)
+    xy, center, ink, area_px = _seeds(runs, domain, area)
+    return Seeds(xy, center, ink, area_px, crowded)
 
 
 def large_enough(seeds: Seeds) -> bool:

@@ -180,6 +180,24 @@ def test_domains_are_4_connected_components(seed: int, height: int, width: int, 
     assert sorted(zip(seeds.ink.tolist(), seeds.area_px.tolist(), strict=True)) == sorted(expected)
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_in_a_crowd_what_is_convex_is_left(seed: int) -> None:
+    """A triangle, which has the least area of all convex shapes for the spread of its pixels, beside a comb."""
+    rng = np.random.default_rng(seed)
+    label = np.zeros((60, 140), np.uint8)
+    angles = rng.uniform(0, 2 * np.pi) + np.cumsum([0, *rng.uniform(1.6, 2.6, 2)])
+    corners = 28 + rng.uniform(8, 25) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    cv2.fillConvexPoly(label, np.rint(corners).astype(np.int32), 1)
+    label[5:8, 70:130] = label[8:50, 70:130:6] = 2
+    label[55, 70:75] = 3  # too small
+    segmentation = segmentation_of(np.zeros((*label.shape, 3), np.uint8), label)
+    assert set(find_seeds(segmentation, crowd=3).ink.tolist()) == {1, 2, 3}
+    seeds = find_seeds(segmentation, crowd=2)
+    assert seeds.crowded and seeds.ink.tolist() == [1]
+    assert seeds.area_px[0] == (label == 1).sum()
+
+
 def plain_growing(
     hsv: Image, label: Image, seed: tuple[int, int], ink: int, taken: NDArray[np.bool_], again: bool = False
 ) -> NDArray[np.bool_]:

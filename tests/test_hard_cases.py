@@ -168,6 +168,32 @@ def test_regions_of_one_pixel_are_clutter() -> None:
     assert sound(extractor().extract(image), seen).mean() > 0.95
 
 
+@pytest.mark.parametrize("pattern", ["honeycomb", "round"])
+def test_a_pattern_amid_colored_noise_is_read(pattern: str) -> None:
+    """Thousands of domains all around, so many that only what looks like a cell is looked at."""
+    seen = render(scene(pattern), size=SIZE)
+    rng = np.random.default_rng(2)
+    image = np.clip(rng.normal(110, 60, (600, 800, 3)), 0, 255).astype(np.uint8)
+    image = cv2.GaussianBlur(image, (0, 0), 0.7)
+    within = cv2.convexHull(np.rint(seen.truth.marker_xy_px).astype(np.int32))
+    mask = cv2.dilate(cv2.fillConvexPoly(np.zeros(SIZE[::-1], np.uint8), within, 1), np.ones((15, 15)))
+    image[: SIZE[1], : SIZE[0]][mask > 0] = seen.image[mask > 0]
+    markers = extractor(pattern).extract(image)
+    assert markers.stages["seeds"].crowded
+    assert sound(markers, seen).all() and rms(markers, seen) < 0.05
+
+
+def test_of_an_image_of_noise_hardly_any_domain_becomes_a_cell() -> None:
+    grain = np.random.default_rng(1).standard_normal((480, 640, 3), dtype=np.float32)
+    grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), 1.0))
+    image = np.clip(127 + 70 * grain / grain.std(), 0, 255).astype(np.uint8)
+    markers = extractor().extract(image)
+    assert not sound(markers).any() and markers.reason is not None
+    assert markers.stages["seeds"].crowded
+    everything = find_seeds(markers.stages["segment"])
+    assert len(markers.stages["cells"].ink) < 0.2 * len(everything.ink)
+
+
 def test_collinear_corners_are_no_triangle() -> None:
     """Regions one pixel wide: the determinant of their covariance is that of the pixel alone, or 0."""
     for mask in (np.eye(64, dtype=bool), np.arange(64)[:, None] == np.full(64, 31), np.zeros((64, 64), bool)):
