@@ -95,13 +95,14 @@ def _columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
 def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
     """Fill in the pixels' distances from a side; (x0, y0) is what their places count from."""
     zero, one, limit = np.float32(0.0), np.float32(1.0), np.float32(far)
-    d0, dx, dy = np.float32(side[0] + side[1] * x0 + side[2] * y0), np.float32(side[1]), np.float32(side[2])
-    t0, tx, ty = np.float32(side[3] + side[4] * x0 + side[5] * y0), np.float32(side[4]), np.float32(side[5])
+    d0, dx, dy = side[0] + side[1] * x0 + side[2] * y0, side[1], side[2]
+    t0, tx, ty = side[3] + side[4] * x0 + side[5] * y0, side[4], side[5]
     length, short = np.float32(side[6]), np.float32(1.0 / side[6])
     leave, arrive = np.float32(side[7]), np.float32(side[8])
     for k in range(count):
-        d = d0 + dx * places[PX + k] + dy * places[PY + k]
-        t = t0 + tx * places[PX + k] + ty * places[PY + k]
+        x, y = np.float64(places[PX + k]), np.float64(places[PY + k])
+        # what is near is the difference of what is far
+        d, t = np.float32(d0 + dx * x + dy * y), np.float32(t0 + tx * x + ty * y)
         part = t * short
         inside = min(max(part, zero), one)
         off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)

@@ -186,8 +186,9 @@ def _weigh(rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, res
 @vectorized
 def _vote(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums, per unit of contrast and blur."""
-    zero = np.float64(0.0)  # so that the order of summing hardly matters
-    aa, ab, bb, a, b, squares, pixels = zero, zero, zero, zero, zero, zero, zero
+    # what moves the markers is summed so that the order of summing hardly matters
+    zero, fine = np.float32(0.0), np.float64(0.0)
+    aa, ab, bb, a, b, squares, pixels = fine, fine, fine, fine, fine, zero, zero
     for k in range(count):
         ga, gb = weights[TO_A + k], weights[TO_B + k]
         aa += ga * ga
@@ -209,7 +210,7 @@ def _vote(rest, weights, count, sums):  # type: ignore[no-untyped-def]
 @vectorized
 def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending."""
-    zero = np.float64(0.0)  # so that the order of summing hardly matters
+    zero = np.float32(0.0)
     ac, ad, bc, bd, cc, cd, dd, c, d = zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(count):
         ga, gb, gc, gd = weights[TO_A + k], weights[TO_B + k], weights[TO_C + k], weights[TO_D + k]

@@ -78,7 +78,7 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
     return out
 
 
-@vectorized
+@compiled
 def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
     """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
     gridline's place by those of its start and end."""
@@ -103,7 +103,7 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@vectorized
+@compiled
 def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
@@ -129,8 +129,10 @@ def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leav
 def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
-    aa, ab, bb, sa, sb, wa, wb = zero, zero, zero, zero, zero, zero, zero
-    blur, curvature, misfit, pixels = zero, zero, zero, zero
+    blur, curvature, misfit, pixels, wa, wb = zero, zero, zero, zero, zero, zero
+    # what moves the markers is summed so that the order of summing hardly matters
+    fine = np.float64(0.0)
+    aa, ab, bb, sa, sb = fine, fine, fine, fine, fine
     for k in range(count):
         ga, gb, gz = weights[TO_A + k], weights[TO_B + k], weights[TO_BLUR + k]
         aa += ga * ga
