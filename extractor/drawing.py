@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .bending import hidden_misfit
 from .engine import compiled
 from .fit import Fit
-from .gridlines import KNOWN
+from .gridlines import KNOWN, LENGTH
 from .levels import Levels, black_at, cell_means, smooth_levels
 from .offsets import Reading, foot_of
 from .presets import Steps
@@ -35,6 +35,7 @@ SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle toge
 WIDE_EFFORT = 2.0  # times the effort
 SAME_LEVELS = 0.006  # likewise, of the levels
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
+USUAL_EDGE_PX = 10.0
 MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -83,13 +84,14 @@ class Draughtsman:
         fit, drawing = self._first(view, roughened(self._mesh, fit))
         wide = drawing.sigma > SMALL_BLUR * edge_px
         allowed = (WIDE_EFFORT if wide else 1.0) * steps.effort
-        spent = _effort(view.scale)
+        size = float(np.median(drawing.lines[:, LENGTH]))
+        spent = _effort(size)
         for step in range(MAX_STEPS):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
-            spent += _effort(view.scale, None if everything else moving / len(anew))
+            spent += _effort(size, None if everything else moving / len(anew))
             if not (everything or moving) or (step > 0 and spent > allowed):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
@@ -176,9 +178,9 @@ class Draughtsman:
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
 
 
-def _effort(scale: int, share: float | None = None) -> float:
-    """What a step costs, 1 for everything at half the image's scale: from everything, or around a share of markers."""
-    pixels = (2 / scale) ** 2
+def _effort(size_px: float, share: float | None = None) -> float:
+    """What a step costs, 1 for everything with edges of ``USUAL_EDGE_PX``: from everything, or around a share of it."""
+    pixels = min((size_px / USUAL_EDGE_PX) ** 2, 4.0)
     return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
 
 
