@@ -86,7 +86,7 @@ class Draughtsman:
         allowed = (WIDE_EFFORT if wide else 1.0) * steps.effort
         size = float(np.median(drawing.lines[:, LENGTH]))
         spent = _effort(size)
-        for step in range(MAX_STEPS):
+        for step in range(MAX_STEPS - 1):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)

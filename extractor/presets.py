@@ -19,8 +19,8 @@ class Steps(NamedTuple):
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.
-        effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are allowed in
-            any case.
+        effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are
+            allowed in any case.
         enough: no more steps once no marker moves by more than so many of its standard deviations
         near: and by more than this share of the blur.
     """
