@@ -17,7 +17,7 @@ from .bending import hidden_misfit
 from .engine import compiled
 from .fit import Fit
 from .gridlines import KNOWN, LENGTH
-from .levels import Levels, black_at, cell_means, smooth_levels
+from .levels import Levels, black_at, cell_means, level_change, smooth_levels
 from .offsets import Reading, foot_of
 from .presets import Steps
 from .sight import Frame, Sight
@@ -189,17 +189,6 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
     if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
         return True
     return bool(level_change(drawing.levels.cell, drawing.bettered.cell) > SAME_LEVELS)
-
-
-@compiled
-def level_change(before, now):  # type: ignore[no-untyped-def]
-    """The cells' median change of level (K, 3), over their median level."""
-    sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
-    for i in range(before.shape[0]):
-        for channel in range(3):
-            sizes[i] = max(sizes[i], abs(before[i, channel]))
-            changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
-    return np.median(changes) / max(np.median(sizes), 1e-9)
 
 
 @compiled

@@ -326,6 +326,17 @@ def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64])
 
 
 @compiled
+def level_change(before, now):  # type: ignore[no-untyped-def]
+    """The cells' median change of level (K, 3), over their median level."""
+    sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
+    for i in range(before.shape[0]):
+        for channel in range(3):
+            sizes[i] = max(sizes[i], abs(before[i, channel]))
+            changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
+    return np.median(changes) / max(np.median(sizes), 1e-9)
+
+
+@compiled
 def black_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
     """(K, 3): the black's polynomial at the points (K, 2) px."""
     out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)

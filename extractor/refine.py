@@ -72,7 +72,9 @@ class Refiner:
         if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
             view = sights.at(before.scale)
             fit, across = self._begin(view, places, before)
-            return self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            refined = self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            if refined.seen is not None and refined.seen.near(before):
+                return refined
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
         scale = self._scale(view.scale * fit.sigma, edge)
