@@ -19,11 +19,12 @@ from .fit import Fit
 from .gridlines import KNOWN, LENGTH
 from .levels import Levels, black_at, cell_means, level_change, smooth_levels
 from .offsets import Reading, foot_of
+from .painting import draw_cells
 from .presets import Steps
 from .sight import Frame, Sight
 from .step import Judged, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import box_of, middles, trust, votes, widening
-from .synthesis import clear, draw_cells, edge_contrasts, read_gridlines
+from .synthesis import clear, edge_contrasts, read_gridlines
 from .topology import Topology
 
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29

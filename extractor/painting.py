@@ -98,7 +98,7 @@ def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untype
     d0, dx, dy = side[0] + side[1] * x0 + side[2] * y0, side[1], side[2]
     t0, tx, ty = side[3] + side[4] * x0 + side[5] * y0, side[4], side[5]
     length, short = np.float32(side[6]), np.float32(1.0 / side[6])
-    leave, arrive = np.float32(side[7]), np.float32(side[8])
+    leave, arrive, three = np.float32(side[7]), np.float32(side[8]), np.float32(3.0)
     for k in range(count):
         x, y = np.float64(places[PX + k]), np.float64(places[PY + k])
         # what is near is the difference of what is far
@@ -107,7 +107,9 @@ def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untype
         inside = min(max(part, zero), one)
         off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)
         off += leave * min(part, zero) + arrive * max(part - one, zero)
-        d = d - length * off if d < limit else d
+        # blur draws a curved edge towards the centre of its curvature, by half of that times the squared blur
+        drawn = (three * (leave + arrive) * inside - (leave + leave + arrive)) * short
+        d = d - length * off - drawn if d < limit else d
         out[D + k], out[TO_END + k], out[TO_START + k] = d, length - t - arrive * d, t + leave * d
 
 

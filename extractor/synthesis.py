@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from .engine import compiled, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
-from .painting import draw_cells as draw_cells
 from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,9 +19,9 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
 from extractor.drawing import Draughtsman, Drawing, beside, chosen, still_moving, touching, unsettled
 from extractor.levels import Levels, bled, unbled
+from extractor.painting import draw_cells
 from extractor.presets import STEPS
 from extractor.refine import Refiner
-from extractor.synthesis import draw_cells
 
 SIZE = (300, 260)
 LAYERS = 5
@@ -180,3 +181,32 @@ def test_the_first_estimate_of_the_blur_is_close(
     assert 0.75 < ratios[-1] < 1.1
     if blur <= 1.0:
         assert 0.95 < ratios[-1] < 1.06
+
+
+@pytest.mark.parametrize("bow", [-0.3, -0.1, 0.1, 0.3])
+def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
+    """One cell with a curved side against the same, finely sampled and filtered: blur moves curved edges."""
+    fine, sigma, size = 16, 3.0, 96
+    corners = np.array([[18.0, 70.0], [78.0, 70.0], [48.0, 18.0]])
+    xy, cells = corners, np.array([[0, 1, 2]], np.int32)
+    edges, cell_edges = np.array([[0, 1], [1, 2], [0, 2]], np.int32), np.array([[0, 1, 2]], np.int32)
+    chords = corners[edges[:, 1]] - corners[edges[:, 0]]
+    lengths = np.linalg.norm(chords, axis=1)
+    lines = np.zeros((3, 8))
+    lines[:, :2], lines[:, 2:4] = corners[edges[:, 0]], chords / lengths[:, None]
+    lines[:, 4], lines[:, 7] = lengths, 1.0
+    lines[0, 5:7] = bow, -bow  # a parabola
+    picture = np.zeros((size, size, 3), np.float32)
+    box, level = np.array([0, 0, size, size]), np.full((1, 3), 100.0)
+    draw_cells(xy, cells, cell_edges, edges, lines, level, np.zeros((1, 3, 2)), sigma, box, picture)
+    y, x = np.mgrid[0 : size * fine, 0 : size * fine].astype(np.float32)
+    x, y = (x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5
+    t = np.clip((x - 18.0) / 60.0, 0.0, 1.0)
+    below, apart = y - 18.0, np.abs(x - 48.0) / 30.0 * 52.0
+    mask = ((y < 70.0 + 60.0 * bow * t * (1 - t)) & (apart < below)).astype(np.float32)
+    mask = cv2.GaussianBlur(mask, (0, 0), sigma * fine)
+    true = 100.0 * cv2.resize(mask, (size, size), interpolation=cv2.INTER_AREA)
+    middle = slice(56, 84), slice(38, 59)  # about the curved side, away from the corners
+    assert (
+        np.abs(picture[..., 0] - true)[middle].max() < 0.25
+    )  # 0.8 where blur is taken to leave edges in place
