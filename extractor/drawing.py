@@ -32,8 +32,12 @@ MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
-SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle together, which takes
-WIDE_EFFORT = 2.0  # times the effort
+SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle together, and where
+BENT, MANY_BENT = (
+    0.02,
+    0.25,
+)  # gridlines are bent by that share of an edge, and so many of them, each step bends others:
+HARD_EFFORT = 2.0  # times the effort is allowed
 SAME_LEVELS = 0.006  # likewise, of the levels
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
@@ -83,16 +87,16 @@ class Draughtsman:
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
-        wide = drawing.sigma > SMALL_BLUR * edge_px
-        allowed = (WIDE_EFFORT if wide else 1.0) * steps.effort
         size = float(np.median(drawing.lines[:, LENGTH]))
-        spent = _effort(size)
+        spent, wide = _effort(size), drawing.sigma > SMALL_BLUR * edge_px
         for step in range(MAX_STEPS - 1):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
+            hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
+            allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             if not (everything or moving) or (step > 0 and spent > allowed):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
@@ -206,6 +210,15 @@ def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore
     if found:
         beside(moving, edges, out)
     return out, np.sum(out)
+
+
+@compiled
+def bent_share(bend, limit):  # type: ignore[no-untyped-def]
+    """The share of gridlines that bend (E, 2) by more than a limit, px."""
+    many = 0
+    for e in range(bend.shape[0]):
+        many += max(abs(bend[e, 0]), abs(bend[e, 1])) > limit
+    return many / bend.shape[0]
 
 
 @compiled
