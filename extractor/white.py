@@ -1,7 +1,8 @@
 """Where the white cell stands: it fixes the turn and the origin of a numbering that is right up to these.
 
 The white cell is a down-cell, one of those that are black elsewhere. So it is looked for where down-cells must be, in
-the middle between three numbered cells first, and farther off only when it is not found there.
+the middle between three numbered cells first, and farther off only when it is not found there. It fills its triangle
+and ends with it, which hardly any dirt or reflection on a black cell does.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .algebra import dot
 from .cells import Cells
 from .engine import compiled
 from .lattice import SIX, turned
@@ -29,7 +31,18 @@ SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled
 # color is. The weakest channel so, and against the strongest.
 MIN_WEAKEST = 0.5
 MIN_BALANCE = 0.4
-MAX_WHITES = 8
+MAX_WHITES = 16
+# The white cell's shape, from 0 for the paler one of ink and black to 1 for its middle: half-way from there to each
+# corner at least, and as far beyond each side as it is wide inside at most. A scratch or drop is as white beyond.
+INSIDE, BEYOND = 0.5, -0.75
+MIN_INSIDE, MAX_BEYOND = 0.4, 0.65
+# Beyond each side lies a cell of a known ink, or where it is missing black: no other color, but in so many places, of
+# what the walked cells touch and of what they do not; and that must be whiter, too.
+MAX_STRANGE = 0, 0
+MIN_FAR = 0.75
+SAME_INK = 0.9  # cosine between a color and an ink, both above black
+FAINT = 0.3  # of an ink's strength above black: black
+MAX_ASIDE = 0.3  # in edges, of the centroid from where it is expected; the next down-cell is at 1
 MAX_OUTSIDE = 0.02  # of a part's cells, where it is put into the layout
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
@@ -37,6 +50,10 @@ STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
 STEP_REACH = 6
 OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
+# The corners of a down-cell from its middle, in axial steps; and the places over which its centroid is taken.
+CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
+NEXT = np.array([1, 2, 0])  # opposite to them lie the cells of the inks (q - r + this) mod 3
+GRID, GRID_REACH = 4, 0.8
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
 WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
 
@@ -49,12 +66,14 @@ class Way(NamedTuple):
         outside: how many of the walked ones have no place in it.
         white_px: (2,) the middle of what would be the white cell.
         white: how white that is: its weakest channel, against the ink that has most of it.
+        touching: cells beside the white one were walked to.
     """
 
     cell: NDArray[np.int32]
     outside: int
     white_px: NDArray[np.float64]
     white: float
+    touching: bool
 
 
 def ways_from_white(
@@ -77,23 +96,28 @@ def ways_from_white(
         steps = (low < DISTANCES) & (high >= DISTANCES)
         far = low >= WHITE_REACHES[0]
         tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
-        places, where, mean, white, votes = _whiteness(image, *tables, far)
+        places, where, mean, white, votes, slope, seen, inks = _whiteness(image, *tables, far)
         if low == 0.0 and not _dark(mean, votes):
             return []
-        mean[white < MIN_WEAKEST] = 0.0
-        bright = np.flatnonzero(mean > SAME_WHITE * mean.max(initial=0.0))
-        if mean.max(initial=0.0) > WHITE_RATIO:
+        mean[white < (MIN_WEAKEST if low == 0.0 else MIN_FAR)] = 0.0
+        bright = np.flatnonzero(mean > WHITE_RATIO)
+        bright = bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]
+        black = np.median(seen[votes == votes.max(initial=0)], axis=0)
+        strange = MAX_STRANGE[0 if low == 0.0 else 1]
+        middle = _middles(image, places, where, slope, white, bright, inks, black, strange)
+        bright = bright[np.isfinite(middle[bright, 0])]
+        if len(bright) > 0:
             break
     else:
         return []
     found = []
-    for place in bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]:
+    for place in bright[mean[bright] > SAME_WHITE * mean[bright[0]]]:
         moved = np.full_like(at, UNKNOWN)
         moved[known] = _from_white(at[known], places[place])
         cell = cells_at(moved, lattice)
         outside = len(known) - int((cell >= 0).sum())
         if outside <= MAX_OUTSIDE * len(known):
-            found.append(Way(cell, outside, where[place], float(white[place])))
+            found.append(Way(cell, outside, middle[place], float(white[place]), low == 0.0))
     return found
 
 
@@ -145,7 +169,8 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
 @compiled
 def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
     """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, how
-    white, 0 where it is colored, and how many cells tell.
+    white, 0 where it is colored, how many cells tell, (D, 2, 2) image step per axial step, (D, 3) their colors; and
+    (4, 3) those of the inks, 0 where there is none.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
@@ -156,8 +181,8 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
         low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
     low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
     rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
-    # x, y, radius and level, summed over the cells that see the place, and their number
-    sums = np.zeros((rows, columns, 5))
+    # x, y, radius, level and basis, summed over the cells that see the place, and their number
+    sums = np.zeros((rows, columns, 9))
     own, strongest = np.empty(3), np.zeros(3)
     colors, count = np.full((4, known.shape[0], 3), np.nan), np.zeros(4, np.int64)
     for n in range(known.shape[0]):
@@ -174,11 +199,17 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             cell[2] += radius
             cell[3] += own.sum()
             cell[4] += 1.0
+            for axis in range(2):
+                cell[5 + axis] += basis[n, 0, axis]
+                cell[7 + axis] += basis[n, 1, axis]
+    inks = np.zeros((4, 3))
     for channel in range(3):
         for c in range(1, 4):
             if count[c] > 0:
-                strongest[channel] = max(strongest[channel], np.median(colors[c, : count[c], channel]))
+                inks[c, channel] = np.median(colors[c, : count[c], channel])
+                strongest[channel] = max(strongest[channel], inks[c, channel])
     found = int((sums[:, :, 4] > 0.0).sum())
+    slope, seen = np.empty((found, 2, 2)), np.zeros((found, 3))
     places, where = np.empty((found, 2), np.int32), np.empty((found, 2))
     ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
     found = 0
@@ -191,14 +222,91 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             x, y, radius, level = sums[q, r, :4] / votes
             places[found, 0], places[found, 1] = q + low_q, r + low_r
             where[found, 0], where[found, 1] = x, y
+            for axis in range(2):
+                slope[found, 0, axis] = sums[q, r, 5 + axis] / votes
+                slope[found, 1, axis] = sums[q, r, 7 + axis] / votes
             if sample_patch(flat, height, width, x, y, radius, own):
                 brightness = own.sum() / max(level, 1.0)
+                seen[found] = own
                 own /= np.maximum(strongest, 1.0)
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
             found += 1
-    return places, where, ratio, white, seen_by
+    return places, where, ratio, white, seen_by, slope, seen, inks
+
+
+@compiled
+def _middles(image, places, where, slope, white, bright, inks, black, strange):  # type: ignore[no-untyped-def]
+    """(D, 2) px the centroids of the bright places, NaN where it is not near, or the white does not fill its cell, goes
+    on beyond it, or has more than so many ``strange`` neighbours."""
+    middle, strongest = np.full(where.shape, np.nan), np.ones(3)
+    for channel in range(3):
+        strongest[channel] = max(inks[:, channel].max(), 1.0)
+    ground = (black / strongest).min()  # the whiteness of black, or of the palest ink
+    for c in range(1, 4):
+        ground = max(ground, (inks[c] / strongest).min())
+    for d in bright:
+        u, v = _centroid(image, where[d], slope[d], ground, strongest)
+        if not u * u + u * v + v * v <= MAX_ASIDE**2:
+            continue
+        x, y = where[d] + slope[d] @ np.array([u, v])
+        whole = _fills(image, x, y, slope[d], ground, strongest, white[d])
+        if whole and _strangers(image, x, y, slope[d], places[d], inks, black) <= strange:
+            middle[d, 0], middle[d, 1] = x, y
+    return middle
+
+
+@compiled
+def _sampled(image, x, y, slope, u, v, out):  # type: ignore[no-untyped-def]
+    """Write the mean color around (x, y) and this axial way; False outside the image."""
+    radius = 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
+    px, py = x + slope[0, 0] * u + slope[0, 1] * v, y + slope[1, 0] * u + slope[1, 1] * v
+    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, radius, out)
+
+
+@compiled
+def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
+    """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
+    total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
+    for a in range(-GRID, GRID + 1):
+        for b in range(-GRID, GRID + 1):
+            u, v = GRID_REACH * a / GRID, GRID_REACH * b / GRID
+            if abs(a + b) <= GRID and _sampled(image, where[0], where[1], slope, u, v, own):
+                weight = max((own / strongest).min() - ground, 0.0)
+                total, q, r = total + weight, q + weight * u, r + weight * v
+    return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
+
+
+@compiled
+def _fills(image, x, y, slope, ground, strongest, white):  # type: ignore[no-untyped-def]
+    """Whether it is white towards the corners of the cell and not beyond its sides; outside the image nothing is."""
+    own, reach = np.empty(3), max(white - ground, 1e-3)
+    for k in range(3):
+        q, r = CORNERS[k]
+        if not _sampled(image, x, y, slope, INSIDE * q, INSIDE * r, own):
+            return False
+        if (own / strongest).min() - ground < MIN_INSIDE * reach:
+            return False
+        seen = _sampled(image, x, y, slope, BEYOND * q, BEYOND * r, own)
+        if seen and (own / strongest).min() - ground > MAX_BEYOND * reach:
+            return False
+    return True
+
+
+@compiled
+def _strangers(image, x, y, slope, place, inks, black):  # type: ignore[no-untyped-def]
+    """How many of the three cells beside a down-cell show neither their ink nor black."""
+    own, count = np.empty(3), 0
+    for k in range(3):
+        if not _sampled(image, x, y, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):
+            continue
+        ink = inks[(place[0] - place[1] + NEXT[k]) % 3 + 1] - black
+        own -= black
+        strength, size = dot(ink, ink), np.sqrt(dot(own, own))
+        faint = size < FAINT * np.sqrt(strength)
+        count += not (faint or dot(own, ink) > SAME_INK * size * np.sqrt(strength))
+    return count
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
