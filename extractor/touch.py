@@ -53,6 +53,23 @@ def touching(center, corner, area, whole, cell, seen_as, beside):  # type: ignor
                 least, limit = x * x + y * y, CLOSE * edge
             if least < limit * limit:
                 out[i, k] = j
+    return _by_three(out)
+
+
+@compiled
+def _by_three(beside):  # type: ignore[no-untyped-def]
+    """The same without what touches by one corner alone, no third cell touching both: that may be chance."""
+    out = beside.copy()
+    for i in range(beside.shape[0]):
+        for k in range(6):
+            j, found = beside[i, k], False
+            if j < 0:
+                continue
+            for a in (beside[i, k - 1], beside[i, (k + 1) % 6]):
+                for b in range(6):
+                    found = found or (a >= 0 and beside[j, b] == a)
+            if not found:
+                out[i, k] = -1
     return out
 
 

@@ -32,14 +32,14 @@ SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled
 MIN_WEAKEST = 0.5
 MIN_BALANCE = 0.4
 MAX_WHITES = 16
-# The white cell's shape, from 0 for the paler one of ink and black to 1 for its middle: half-way from there to each
-# corner at least, and as far beyond each side as it is wide inside at most. A scratch or drop is as white beyond.
-INSIDE, BEYOND = 0.5, -0.75
-MIN_INSIDE, MAX_BEYOND = 0.4, 0.65
+# The white cell's shape, from 0 for the paler one of ink and black to 1 for its middle. A drop or scratch goes on
+# beyond its sides or corners, or does not fill it.
+MIN_INSIDE, MAX_OUTSIDE_WHITE = 0.4, 0.65
 # Beyond each side lies a cell of a known ink, or where it is missing black: no other color, but in so many places, of
 # what the walked cells touch and of what they do not; and that must be whiter, too.
 MAX_STRANGE = 0, 0
 MIN_FAR = 0.75
+MAX_APART = 0.2  # in edges, the deviation between the cells' words where it is, where they do not touch it
 SAME_INK = 0.9  # cosine between a color and an ink, both above black
 FAINT = 0.3  # of an ink's strength above black: black
 MAX_ASIDE = 0.3  # in edges, of the centroid from where it is expected; the next down-cell is at 1
@@ -52,6 +52,12 @@ OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
 # The corners of a down-cell from its middle, in axial steps; and the places over which its centroid is taken.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
+# Inside towards its corners and sides; around it beyond its corners and beyond three places of each side.
+INSIDE = np.concatenate([0.5 * CORNERS, -0.33 * CORNERS])
+BESIDE = [
+    one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
+]
+OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(BESIDE) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]])
 NEXT = np.array([1, 2, 0])  # opposite to them lie the cells of the inks (q - r + this) mod 3
 GRID, GRID_REACH = 4, 0.8
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
@@ -181,8 +187,9 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
         low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
     low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
     rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
-    # x, y, radius, level and basis, summed over the cells that see the place, and their number
-    sums = np.zeros((rows, columns, 9))
+    # x, y, radius, level and basis, summed over the cells that see the place, and their number; x^2 + y^2
+    sums = np.zeros((rows, columns, 10))
+    middle_x, middle_y = center[known, 0].mean(), center[known, 1].mean()
     own, strongest = np.empty(3), np.zeros(3)
     colors, count = np.full((4, known.shape[0], 3), np.nan), np.zeros(4, np.int64)
     for n in range(known.shape[0]):
@@ -194,8 +201,11 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
         count[ink[i]] += 1
         for k in range(steps.shape[0]):
             cell = sums[at[i, 0] + steps[k, 0] - low_q, at[i, 1] + steps[k, 1] - low_r]
-            cell[0] += center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1]
-            cell[1] += center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1]
+            x = center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1] - middle_x
+            y = center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1] - middle_y
+            cell[0] += x
+            cell[1] += y
+            cell[9] += x * x + y * y
             cell[2] += radius
             cell[3] += own.sum()
             cell[4] += 1.0
@@ -220,6 +230,8 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 continue
             seen_by[found] = int(votes)
             x, y, radius, level = sums[q, r, :4] / votes
+            apart2 = max(sums[q, r, 9] / votes - x * x - y * y, 0.0)
+            x, y = x + middle_x, y + middle_y
             places[found, 0], places[found, 1] = q + low_q, r + low_r
             where[found, 0], where[found, 1] = x, y
             for axis in range(2):
@@ -232,6 +244,10 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
+            m = slope[found]
+            area = abs(m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
+            if far and (votes < 2.0 or apart2 > MAX_APART**2 * area):
+                ratio[found] = 0.0
             found += 1
     return places, where, ratio, white, seen_by, slope, seen, inks
 
@@ -280,16 +296,16 @@ def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untype
 
 @compiled
 def _fills(image, x, y, slope, ground, strongest, white):  # type: ignore[no-untyped-def]
-    """Whether it is white towards the corners of the cell and not beyond its sides; outside the image nothing is."""
+    """Whether it is white all over the cell and nowhere around it; outside the image nothing is."""
     own, reach = np.empty(3), max(white - ground, 1e-3)
-    for k in range(3):
-        q, r = CORNERS[k]
-        if not _sampled(image, x, y, slope, INSIDE * q, INSIDE * r, own):
+    for n in range(INSIDE.shape[0]):
+        if not _sampled(image, x, y, slope, INSIDE[n, 0], INSIDE[n, 1], own):
             return False
         if (own / strongest).min() - ground < MIN_INSIDE * reach:
             return False
-        seen = _sampled(image, x, y, slope, BEYOND * q, BEYOND * r, own)
-        if seen and (own / strongest).min() - ground > MAX_BEYOND * reach:
+    for n in range(OUTSIDE.shape[0]):
+        seen = _sampled(image, x, y, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
+        if seen and (own / strongest).min() - ground > MAX_OUTSIDE_WHITE * reach:
             return False
     return True
 
