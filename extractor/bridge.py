@@ -45,7 +45,9 @@ def unbridged(
     numbered = np.flatnonzero(cell >= 0)
     seen_as[cell[numbered]] = numbered
     seen = cells.center_px, cells.corner_px, cells.area_px
-    beside = touching(*seen, cells.whole, cell, seen_as, lattice.beside)
+    step = 1 if mirrored else 2
+    tables = lattice.center_mm, lattice.arms_mm, lattice.beside
+    beside = touching(*seen, cells.whole, cell, seen_as, tables, step)
     block = connected(beside, cells.whole & (cell >= 0))
     sizes = np.bincount(block[block >= 0])
     if len(sizes) == 0:
@@ -56,17 +58,8 @@ def unbridged(
         apart = ((cells.center_px[among] - white_px) ** 2).sum(axis=1)
         near = block[among[np.argsort(apart, kind="stable")[:SEEDS]]]
         first = int(near[sizes[near].argmax()])
-    held = _held(
-        *seen,
-        cell,
-        block,
-        first,
-        beside,
-        lattice.center_mm,
-        lattice.size_mm,
-        lattice.arms_mm,
-        1 + (not mirrored),
-    )
+    layout = lattice.center_mm, lattice.size_mm, lattice.arms_mm
+    held = _held(*seen, cell, block, first, beside, *layout, step)
     return np.asarray((cell >= 0) & ~held)
 
 

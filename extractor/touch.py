@@ -29,51 +29,6 @@ def edge_of(area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def touching(center, corner, area, whole, cell, seen_as, beside):  # type: ignore[no-untyped-def]
-    """(N, 6) int32, the whole numbered cells that are a whole numbered cell's neighbours and share a corner with it, or
-    -1; close by where a triangle is missing."""
-    out = np.full((cell.shape[0], 6), -1, np.int32)
-    for i in range(cell.shape[0]):
-        if cell[i] < 0 or not whole[i]:
-            continue
-        for k in range(6):
-            v = beside[cell[i], k]
-            if v < 0 or seen_as[v] < 0 or not whole[seen_as[v]]:
-                continue
-            j = seen_as[v]
-            edge = edge_of(min(area[i], area[j]))
-            least = np.inf
-            for a in range(3):
-                for b in range(3):
-                    x, y = corner[i, a, 0] - corner[j, b, 0], corner[i, a, 1] - corner[j, b, 1]
-                    least = min(least, x * x + y * y) if np.isfinite(x) else -1.0
-            limit = SHARED * edge
-            if least < 0.0:
-                x, y = center[i, 0] - center[j, 0], center[i, 1] - center[j, 1]
-                least, limit = x * x + y * y, CLOSE * edge
-            if least < limit * limit:
-                out[i, k] = j
-    return _by_three(out)
-
-
-@compiled
-def _by_three(beside):  # type: ignore[no-untyped-def]
-    """The same without what touches by one corner alone, no third cell touching both: that may be chance."""
-    out = beside.copy()
-    for i in range(beside.shape[0]):
-        for k in range(6):
-            j, found = beside[i, k], False
-            if j < 0:
-                continue
-            for a in (beside[i, k - 1], beside[i, (k + 1) % 6]):
-                for b in range(6):
-                    found = found or (a >= 0 and beside[j, b] == a)
-            if not found:
-                out[i, k] = -1
-    return out
-
-
-@compiled
 def own_map(center, corner, arms, turn, step, out):  # type: ignore[no-untyped-def]
     """Write the image step per layout step that carries a cell's arms onto its triangle, counted from ``turn``."""
     a, b = arms[0], arms[1]
@@ -82,6 +37,51 @@ def own_map(center, corner, arms, turn, step, out):  # type: ignore[no-untyped-d
         p, q = corner[turn, axis] - center[axis], corner[(turn + step) % 3, axis] - center[axis]
         out[axis, 0] = (p * b[1] - q * a[1]) / area
         out[axis, 1] = (q * a[0] - p * b[0]) / area
+
+
+@compiled
+def touching(center, corner, area, whole, cell, seen_as, tables, step):  # type: ignore[no-untyped-def]
+    """(N, 6) int32, the whole numbered cells that are a whole numbered cell's neighbours and share that corner with it
+    by which they are, or -1; close by where a triangle is missing."""
+    center_mm, arms_mm, beside = tables
+    out = np.full((cell.shape[0], 6), -1, np.int32)
+    for i in range(cell.shape[0]):
+        if cell[i] < 0 or not whole[i]:
+            continue
+        for k in range(3):  # the other way from the other cell
+            v = beside[cell[i], k]
+            if v < 0 or seen_as[v] < 0 or not whole[seen_as[v]]:
+                continue
+            j = seen_as[v]
+            edge = edge_of(min(area[i], area[j]))
+            x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
+            if np.isnan(corner[i, 0, 0]) or np.isnan(corner[j, 0, 0]):
+                touch = x * x + y * y < (CLOSE * edge) ** 2
+            else:
+                touch = False
+                for a in range(3):
+                    for b in range(3):
+                        u, w = corner[j, b, 0] - corner[i, a, 0], corner[j, b, 1] - corner[i, a, 1]
+                        if u * u + w * w < (SHARED * edge) ** 2:
+                            here = center[i], corner[i], arms_mm[cell[i]], (a + 6 - step * OWN[k]) % 3
+                            there = center[j], corner[j], arms_mm[v], (b + 6 - step * THEIRS[k]) % 3
+                            way = center_mm[v] - center_mm[cell[i]]
+                            touch = touch or (
+                                _leads(here, x, y, way, step) and _leads(there, -x, -y, -way, step)
+                            )
+            if touch:
+                out[i, k], out[j, k + 3] = j, i
+    return out
+
+
+@compiled
+def _leads(triangle, x, y, way, step):  # type: ignore[no-untyped-def]
+    """Whether a triangle, counted from its turn, carries this way in the layout near (x, y) from its center."""
+    center, corner, arms, turn = triangle
+    own = np.empty((2, 2))
+    own_map(center, corner, arms, turn, step, own)
+    u, v = own[0, 0] * way[0] + own[0, 1] * way[1] - x, own[1, 0] * way[0] + own[1, 1] * way[1] - y
+    return u * u + v * v < MAX_ASIDE**2 * (x * x + y * y)
 
 
 @compiled
@@ -149,11 +149,11 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, fresh, tabl
                     if (corner[j, c, 0] - at[0]) ** 2 + (corner[j, c, 1] - at[1]) ** 2 > limit:
                         continue
                     turned = (c + 6 - step * THEIRS[k]) % 3
-                    own_map(center[j], corner[j], arms_mm[v], turned, step, back)
-                    ax = center[j, 0] - back[0, 0] * x - back[0, 1] * y - center[i, 0]
-                    ay = center[j, 1] - back[1, 0] * x - back[1, 1] * y - center[i, 1]
-                    if ax * ax + ay * ay > MAX_ASIDE**2 * way2:
+                    there = center[j], corner[j], arms_mm[v], turned
+                    back_x, back_y = center[i, 0] - center[j, 0], center[i, 1] - center[j, 1]
+                    if not _leads(there, back_x, back_y, center_mm[u] - center_mm[v], step):
                         continue
+                    own_map(center[j], corner[j], arms_mm[v], turned, step, back)
                     cell[j], free[v], turn[j] = v, False, turned
                     maps[j] = back
                     queue[end] = j
