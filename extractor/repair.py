@@ -7,7 +7,7 @@ sextant, read at equidistant places. What neither can tell within a tenth of an 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,11 +66,12 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    edge_px = places.edge_px
+    shortest = _shortest(xy, lattice.neighbours[:, INNER], places.edge_px)
+    places = replace(places, edge_px=np.where(places.agreed, places.edge_px, shortest))
     _drop_outliers(xy, cov, places, refined.explained, lattice)
     _drop_frayed(xy, cov, places, lattice)
     _drop_slid(xy, cov, refined.free_px, places, lattice)
-    measured, edge = xy.copy(), _filled(edge_px, lattice)
+    measured, edge = xy.copy(), _filled(shortest, lattice)
     outside = ~_inside(xy, size)
     xy[outside], cov[outside] = np.nan, np.nan
     status = np.where(outside, Status.LOST, Status.MEASURED).astype(np.uint8)
@@ -91,6 +92,20 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
 def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Places within the image, out to the edges of its pixels; NaN not."""
     return np.asarray((xy >= -0.5).all(axis=1) & (xy <= np.array(size) - 0.5).all(axis=1))
+
+
+@compiled
+def _shortest(xy, around, edge):  # type: ignore[no-untyped-def]
+    """(M,) the way from each marker to the nearest of its known neighbours, or its edge where that is shorter: what
+    lies off by a share of a longer one is another's."""
+    out = edge.copy()
+    for m in range(xy.shape[0]):
+        for n in around[m]:
+            if n >= 0:
+                apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
+                if apart < out[m]:
+                    out[m] = apart
+    return out
 
 
 def _drop_outliers(
@@ -123,7 +138,9 @@ def _drop_outliers(
             allowed = np.where(places.whole, MAX_AGREED, allowed)
             excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
-        excess[known & ~believed & ~np.isfinite(place[:, 0])] = np.inf
+        with np.errstate(invalid="ignore"):
+            vouched = sigma < MAX_UNEXPLAINED * edge
+        excess[known & ~believed & ~vouched & doubtful] = np.inf
         if not (excess > 1.0).any():
             break
         around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
@@ -169,11 +186,16 @@ def _drop_slid(
     if not slid.any():
         return
     expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
+    # at the corners of the rim two rings hold fewer than a quadratic takes, but the layers inside do not
+    few = slid & (support < MIN_QUADRATIC)
+    if few.any():
+        inside, _, _, known = predict(xy, few, lattice.marker_mm, lattice.inner)
+        expected[few], support[few] = inside[few], known[few]
     after, before = (np.hypot(*(start - expected).T) for start in (xy, places.xy_px))
     with np.errstate(invalid="ignore"):
-        near, known = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
-        stays = (after < before) & (after < near) & known
-        back = slid & ~stays & (before < near) & known & places.agreed
+        near, enough = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
+        stays = (after < before) & (after < near) & enough
+        back = slid & ~stays & (before < near) & enough & places.agreed
     bad = slid & ~stays & ~back
     xy[bad], cov[bad] = np.nan, np.nan
     xy[back] = places.xy_px[back]

@@ -34,7 +34,7 @@ MIN_BALANCE = 0.4
 MAX_WHITES = 16
 # The white cell's shape, from 0 for the paler one of ink and black to 1 for its middle. A drop or scratch goes on
 # beyond its sides or corners, or does not fill it.
-MIN_INSIDE, MAX_OUTSIDE_WHITE = 0.4, 0.65
+MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE_WHITE = 0.5, 0.25, 0.5
 # Beyond each side lies a cell of a known ink, or where it is missing black: no other color, but in so many places, of
 # what the walked cells touch and of what they do not; and that must be whiter, too.
 MAX_STRANGE = 0, 0
@@ -52,8 +52,8 @@ OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
 # The corners of a down-cell from its middle, in axial steps; and the places over which its centroid is taken.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
-# Inside towards its corners and sides; around it beyond its corners and beyond three places of each side.
-INSIDE = np.concatenate([0.5 * CORNERS, -0.33 * CORNERS])
+# In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
+INSIDE = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
 BESIDE = [
     one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
 ]
@@ -301,7 +301,8 @@ def _fills(image, x, y, slope, ground, strongest, white):  # type: ignore[no-unt
     for n in range(INSIDE.shape[0]):
         if not _sampled(image, x, y, slope, INSIDE[n, 0], INSIDE[n, 1], own):
             return False
-        if (own / strongest).min() - ground < MIN_INSIDE * reach:
+        least = MIN_CORNER if n < CORNERS.shape[0] else MIN_INSIDE
+        if (own / strongest).min() - ground < least * reach:
             return False
     for n in range(OUTSIDE.shape[0]):
         seen = _sampled(image, x, y, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
