@@ -120,3 +120,11 @@ def test_a_block_beyond_a_scratch_is_numbered() -> None:
 def test_cells_in_a_row_beside_a_hole_have_corners(pattern: str) -> None:
     figures = read(one_hole(plain(pattern, 0), 0.3))
     assert figures.wrong == 0 and figures.kept >= 0.98 * figures.sure
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_cells_that_touch_by_corners_are_numbered(pattern: str) -> None:
+    """Two of five cells missing, at random: no mesh hangs together, but corners do."""
+    figures = [read(plain(pattern, seed).damaged(missing_share=0.4)) for seed in range(3)]
+    assert all(one.wrong == 0 for one in figures)
+    assert sum(one.kept for one in figures) >= 0.97 * sum(one.sure for one in figures)
