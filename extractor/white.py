@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .algebra import dot
 from .cells import Cells
 from .engine import compiled
 from .lattice import SIX, turned
 from .sampling import sample_patch
 from .tables import UNKNOWN, Lattice, cells_at
+from .whitecell import white_cell
 
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
@@ -32,17 +32,7 @@ SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled
 MIN_WEAKEST = 0.5
 MIN_BALANCE = 0.4
 MAX_WHITES = 16
-# The white cell's shape, from 0 for the paler one of ink and black to 1 for its middle. A drop or scratch goes on
-# beyond its sides or corners, or does not fill it.
-MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE_WHITE = 0.5, 0.25, 0.5
-# Beyond each side lies a cell of a known ink, or where it is missing black: no other color, but in so many places, of
-# what the walked cells touch and of what they do not; and that must be whiter, too.
-MAX_STRANGE = 0, 0
-MIN_FAR = 0.75
-MAX_APART = 0.2  # in edges, the deviation between the cells' words where it is, where they do not touch it
-SAME_INK = 0.9  # cosine between a color and an ink, both above black
-FAINT = 0.3  # of an ink's strength above black: black
-MAX_ASIDE = 0.3  # in edges, of the centroid from where it is expected; the next down-cell is at 1
+MIN_FAR = 0.75  # the weakest channel, where no walked cell touches it
 MAX_OUTSIDE = 0.02  # of a part's cells, where it is put into the layout
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
@@ -50,16 +40,6 @@ STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
 STEP_REACH = 6
 OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
-# The corners of a down-cell from its middle, in axial steps; and the places over which its centroid is taken.
-CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
-# In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
-INSIDE = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
-BESIDE = [
-    one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
-]
-OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(BESIDE) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]])
-NEXT = np.array([1, 2, 0])  # opposite to them lie the cells of the inks (q - r + this) mod 3
-GRID, GRID_REACH = 4, 0.8
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
 WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
 
@@ -102,29 +82,26 @@ def ways_from_white(
         steps = (low < DISTANCES) & (high >= DISTANCES)
         far = low >= WHITE_REACHES[0]
         tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
-        places, where, mean, white, votes, slope, seen, inks = _whiteness(image, *tables, far)
+        places, mean, white, votes, seen, inks = _whiteness(image, *tables, far)
         if low == 0.0 and not _dark(mean, votes):
             return []
-        mean[white < (MIN_WEAKEST if low == 0.0 else MIN_FAR)] = 0.0
+        mean[white < (MIN_FAR if far else MIN_WEAKEST)] = 0.0
         bright = np.flatnonzero(mean > WHITE_RATIO)
         bright = bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]
         black = np.median(seen[votes == votes.max(initial=0)], axis=0)
-        strange = MAX_STRANGE[0 if low == 0.0 else 1]
-        middle = _middles(image, places, where, slope, white, bright, inks, black, strange)
-        bright = bright[np.isfinite(middle[bright, 0])]
-        if len(bright) > 0:
-            break
-    else:
-        return []
-    found = []
-    for place in bright[mean[bright] > SAME_WHITE * mean[bright[0]]]:
-        moved = np.full_like(at, UNKNOWN)
-        moved[known] = _from_white(at[known], places[place])
-        cell = cells_at(moved, lattice)
-        outside = len(known) - int((cell >= 0).sum())
-        if outside <= MAX_OUTSIDE * len(known):
-            found.append(Way(cell, outside, middle[place], float(white[place]), low == 0.0))
-    return found
+        found: list[tuple[float, Way]] = []
+        for place in bright:
+            moved = np.full_like(at, UNKNOWN)
+            moved[known] = _from_white(at[known], places[place])
+            cell = cells_at(moved, lattice)
+            outside = len(known) - int((cell >= 0).sum())
+            if outside <= MAX_OUTSIDE * len(known):
+                middle = white_cell(image, cells, cell, lattice, inks, black)
+                if middle is not None:
+                    found.append((mean[place], Way(cell, outside, middle, float(white[place]), not far)))
+        if found:
+            return [way for brightness, way in found if brightness > SAME_WHITE * found[0][0]]
+    return []
 
 
 def _dark(brightness: NDArray[np.float64], votes: NDArray[np.int64]) -> bool:
@@ -174,9 +151,8 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
 
 @compiled
 def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, how
-    white, 0 where it is colored, how many cells tell, (D, 2, 2) image step per axial step, (D, 3) their colors; and
-    (4, 3) those of the inks, 0 where there is none.
+    """The down-cells at these steps from numbered cells: axial places, brightness against the inks, how white, 0 where
+    it is colored, how many cells tell, (D, 3) their colors; and (4, 3) those of the inks, 0 where there is none.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
@@ -187,9 +163,8 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
         low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
     low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
     rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
-    # x, y, radius, level and basis, summed over the cells that see the place, and their number; x^2 + y^2
-    sums = np.zeros((rows, columns, 10))
-    middle_x, middle_y = center[known, 0].mean(), center[known, 1].mean()
+    # x, y, radius and level, summed over the cells that see the place, and their number
+    sums = np.zeros((rows, columns, 5))
     own, strongest = np.empty(3), np.zeros(3)
     colors, count = np.full((4, known.shape[0], 3), np.nan), np.zeros(4, np.int64)
     for n in range(known.shape[0]):
@@ -201,17 +176,11 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
         count[ink[i]] += 1
         for k in range(steps.shape[0]):
             cell = sums[at[i, 0] + steps[k, 0] - low_q, at[i, 1] + steps[k, 1] - low_r]
-            x = center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1] - middle_x
-            y = center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1] - middle_y
-            cell[0] += x
-            cell[1] += y
-            cell[9] += x * x + y * y
+            cell[0] += center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1]
+            cell[1] += center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1]
             cell[2] += radius
             cell[3] += own.sum()
             cell[4] += 1.0
-            for axis in range(2):
-                cell[5 + axis] += basis[n, 0, axis]
-                cell[7 + axis] += basis[n, 1, axis]
     inks = np.zeros((4, 3))
     for channel in range(3):
         for c in range(1, 4):
@@ -219,8 +188,7 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 inks[c, channel] = np.median(colors[c, : count[c], channel])
                 strongest[channel] = max(strongest[channel], inks[c, channel])
     found = int((sums[:, :, 4] > 0.0).sum())
-    slope, seen = np.empty((found, 2, 2)), np.zeros((found, 3))
-    places, where = np.empty((found, 2), np.int32), np.empty((found, 2))
+    places, seen = np.empty((found, 2), np.int32), np.zeros((found, 3))
     ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
     found = 0
     for q in range(rows):
@@ -230,13 +198,7 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 continue
             seen_by[found] = int(votes)
             x, y, radius, level = sums[q, r, :4] / votes
-            apart2 = max(sums[q, r, 9] / votes - x * x - y * y, 0.0)
-            x, y = x + middle_x, y + middle_y
             places[found, 0], places[found, 1] = q + low_q, r + low_r
-            where[found, 0], where[found, 1] = x, y
-            for axis in range(2):
-                slope[found, 0, axis] = sums[q, r, 5 + axis] / votes
-                slope[found, 1, axis] = sums[q, r, 7 + axis] / votes
             if sample_patch(flat, height, width, x, y, radius, own):
                 brightness = own.sum() / max(level, 1.0)
                 seen[found] = own
@@ -244,86 +206,8 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
-            m = slope[found]
-            area = abs(m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
-            if far and (votes < 2.0 or apart2 > MAX_APART**2 * area):
-                ratio[found] = 0.0
             found += 1
-    return places, where, ratio, white, seen_by, slope, seen, inks
-
-
-@compiled
-def _middles(image, places, where, slope, white, bright, inks, black, strange):  # type: ignore[no-untyped-def]
-    """(D, 2) px the centroids of the bright places, NaN where it is not near, or the white does not fill its cell, goes
-    on beyond it, or has more than so many ``strange`` neighbours."""
-    middle, strongest = np.full(where.shape, np.nan), np.ones(3)
-    for channel in range(3):
-        strongest[channel] = max(inks[:, channel].max(), 1.0)
-    ground = (black / strongest).min()  # the whiteness of black, or of the palest ink
-    for c in range(1, 4):
-        ground = max(ground, (inks[c] / strongest).min())
-    for d in bright:
-        u, v = _centroid(image, where[d], slope[d], ground, strongest)
-        if not u * u + u * v + v * v <= MAX_ASIDE**2:
-            continue
-        x, y = where[d] + slope[d] @ np.array([u, v])
-        whole = _fills(image, x, y, slope[d], ground, strongest, white[d])
-        if whole and _strangers(image, x, y, slope[d], places[d], inks, black) <= strange:
-            middle[d, 0], middle[d, 1] = x, y
-    return middle
-
-
-@compiled
-def _sampled(image, x, y, slope, u, v, out):  # type: ignore[no-untyped-def]
-    """Write the mean color around (x, y) and this axial way; False outside the image."""
-    radius = 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
-    px, py = x + slope[0, 0] * u + slope[0, 1] * v, y + slope[1, 0] * u + slope[1, 1] * v
-    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, radius, out)
-
-
-@compiled
-def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
-    """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
-    total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
-    for a in range(-GRID, GRID + 1):
-        for b in range(-GRID, GRID + 1):
-            u, v = GRID_REACH * a / GRID, GRID_REACH * b / GRID
-            if abs(a + b) <= GRID and _sampled(image, where[0], where[1], slope, u, v, own):
-                weight = max((own / strongest).min() - ground, 0.0)
-                total, q, r = total + weight, q + weight * u, r + weight * v
-    return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
-
-
-@compiled
-def _fills(image, x, y, slope, ground, strongest, white):  # type: ignore[no-untyped-def]
-    """Whether it is white all over the cell and nowhere around it; outside the image nothing is."""
-    own, reach = np.empty(3), max(white - ground, 1e-3)
-    for n in range(INSIDE.shape[0]):
-        if not _sampled(image, x, y, slope, INSIDE[n, 0], INSIDE[n, 1], own):
-            return False
-        least = MIN_CORNER if n < CORNERS.shape[0] else MIN_INSIDE
-        if (own / strongest).min() - ground < least * reach:
-            return False
-    for n in range(OUTSIDE.shape[0]):
-        seen = _sampled(image, x, y, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
-        if seen and (own / strongest).min() - ground > MAX_OUTSIDE_WHITE * reach:
-            return False
-    return True
-
-
-@compiled
-def _strangers(image, x, y, slope, place, inks, black):  # type: ignore[no-untyped-def]
-    """How many of the three cells beside a down-cell show neither their ink nor black."""
-    own, count = np.empty(3), 0
-    for k in range(3):
-        if not _sampled(image, x, y, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):
-            continue
-        ink = inks[(place[0] - place[1] + NEXT[k]) % 3 + 1] - black
-        own -= black
-        strength, size = dot(ink, ink), np.sqrt(dot(own, own))
-        faint = size < FAINT * np.sqrt(strength)
-        count += not (faint or dot(own, ink) > SAME_INK * size * np.sqrt(strength))
-    return count
+    return places, ratio, white, seen_by, seen, inks
 
 
 def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
