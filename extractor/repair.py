@@ -27,6 +27,7 @@ FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where th
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
+MAX_AGREED_ALONE = 0.14  # in edges, where two triangles agree and the drawing explains nothing
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
 IMPLIED_SIGMA = 0.02  # in edges
@@ -34,6 +35,7 @@ BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
+MAX_FITTED_SIGMA = 0.05  # the same of a fitted one: a layer's quadratic is wrong where the surface is bent
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
@@ -69,7 +71,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     shortest = _shortest(xy, lattice.neighbours[:, INNER], places.edge_px)
     places = replace(places, edge_px=np.where(places.agreed, places.edge_px, shortest))
     _drop_outliers(xy, cov, places, refined.explained, lattice)
-    _drop_frayed(xy, cov, places, lattice)
+    _drop_frayed(xy, cov, places, refined.explained, lattice)
     _drop_slid(xy, cov, refined.free_px, places, lattice)
     measured, edge = xy.copy(), _filled(shortest, lattice)
     outside = ~_inside(xy, size)
@@ -121,10 +123,11 @@ def _drop_outliers(
     lie farther off.
     """
     table, edge, believed = lattice.neighbours, places.edge_px, explained | places.agreed
+    limit = np.where(explained, MAX_DEVIATION, MAX_AGREED_ALONE) * edge * believed
     for _ in range(ROUNDS):
         known = np.isfinite(xy[:, 0])
         # only what may be too far is looked at closely
-        doubtful = deviant(xy, MAX_DEVIATION * edge * believed, lattice.ring_weights, table)
+        doubtful = deviant(xy, limit, lattice.ring_weights, table)
         if not doubtful.any():
             break
         place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
@@ -135,6 +138,7 @@ def _drop_outliers(
             allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
             usual = np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE)
             allowed = np.where(believed, usual, MAX_UNEXPLAINED)
+            allowed = np.where(believed & ~explained, np.minimum(allowed, MAX_AGREED_ALONE), allowed)
             allowed = np.where(places.whole, MAX_AGREED, allowed)
             excess = deviation / (edge * allowed)
         excess[~np.isfinite(excess)] = 0.0
@@ -149,7 +153,13 @@ def _drop_outliers(
         cov[bad] = np.nan
 
 
-def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
+def _drop_frayed(
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    places: Places,
+    explained: NDArray[np.bool_],
+    lattice: Lattice,
+) -> None:
     """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
@@ -278,5 +288,5 @@ def _by_layer(
     """(M, 2) places by the markers of each lost marker's layer, NaN where not safe, and their (M,) variances."""
     place, variance = by_layer(xy, lattice.layers)
     with np.errstate(invalid="ignore"):
-        safe = variance + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_SIGMA * edge) ** 2
+        safe = variance + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_FITTED_SIGMA * edge) ** 2
     return np.where(safe[:, None], place, np.nan), HEAVY_ERROR * variance + (MODEL_SIGMA * edge) ** 2
