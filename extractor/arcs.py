@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
 from .engine import compiled
@@ -14,7 +11,8 @@ MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadrat
 TERMS = 3  # 1, s, s^2, s from -1 to 1 along the sextant
 
 
-def by_layer(xy: NDArray[np.float64], layers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+@compiled
+def by_layer(xy, layers):  # type: ignore[no-untyped-def]
     """Places of the unknown markers, between known ones, on the quadratic through their layer and sextant.
 
     Args:
@@ -22,14 +20,9 @@ def by_layer(xy: NDArray[np.float64], layers: int) -> tuple[NDArray[np.float64],
 
     Returns:
         (M, 2) px, NaN where there are too few markers; and their (M,) variance, px^2 per axis, by what the fit leaves
-        in its markers. A corner of the layer, which two sextants share, lies where the surer one says.
+        in its markers, infinite where there is none. A corner of the layer, which two sextants share, lies where the
+        surer one says.
     """
-    result: tuple[Any, Any] = _by_layer(np.ascontiguousarray(xy), layers)
-    return result
-
-
-@compiled
-def _by_layer(xy, layers):  # type: ignore[no-untyped-def]
     place, variance = np.full(xy.shape, np.nan), np.full(xy.shape[0], np.inf)
     ids = np.empty(layers + 1, np.int64)
     for layer in range(1, layers + 1):

@@ -46,9 +46,7 @@ def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> 
     by_white = numbering.white_px if numbering.origin is Origin.WHITE else None
     cell = numbering.cell.copy()
     cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
-    free = np.ones(len(lattice.ink), np.bool_)
-    free[cell[cell >= 0]] = False
-    candidates = (cell < 0) & np.isin(cells.ink, lattice.ink[free])
+    free, candidates = _candidates(cells.ink, cell, lattice.ink)
     if candidates.any():
         slope = gradients(cells.center_px, cell, lattice)
         seen = cells.center_px, cells.corner_px, cells.ink, cells.area_px
@@ -57,6 +55,23 @@ def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> 
         cell = _attached(*seen, cells.whole, slope, candidates, cell, free, layout, step)
         cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
     return replace(numbering, cell=cell)
+
+
+@compiled
+def _candidates(ink, cell, ink_of):  # type: ignore[no-untyped-def]
+    """(U,) bool the free places of the layout, and (N,) bool the cells without a number whose ink some of them hold."""
+    free = np.ones(ink_of.shape[0], np.bool_)
+    for i in range(cell.shape[0]):
+        if cell[i] >= 0:
+            free[cell[i]] = False
+    wanted = np.zeros(256, np.bool_)
+    for u in range(ink_of.shape[0]):
+        if free[u]:
+            wanted[ink_of[u]] = True
+    candidates = np.zeros(cell.shape[0], np.bool_)
+    for i in range(cell.shape[0]):
+        candidates[i] = cell[i] < 0 and wanted[ink[i]]
+    return free, candidates
 
 
 @compiled
@@ -177,20 +192,20 @@ def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: i
     In units of the witnesses' mean distance, with the cell at the origin, so that the map's first term is the place.
     """
     count = near.shape[0]
-    scale, size, middle = 0.0, 0.0, np.zeros(2)
+    scale, size, middle_x, middle_y = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
+        u = cell[near[k]]
         scale += np.sqrt(square[k]) / count
-        size += size_mm[cell[near[k]]] / count
-        middle += center_mm[cell[near[k]]] / count
+        size += size_mm[u] / count
+        middle_x += center_mm[u, 0] / count
+        middle_y += center_mm[u, 1] / count
     rows, offset, closeness = np.empty((count, TERMS)), np.empty((count, 2)), np.empty(count)
     for k in range(count):
-        x, y = (
-            (center_px[near[k], 0] - center_px[i, 0]) / scale,
-            (center_px[near[k], 1] - center_px[i, 1]) / scale,
-        )
+        j, u = near[k], cell[near[k]]
+        x, y = (center_px[j, 0] - center_px[i, 0]) / scale, (center_px[j, 1] - center_px[i, 1]) / scale
         rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
         rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
-        offset[k] = center_mm[cell[near[k]]] - middle
+        offset[k, 0], offset[k, 1] = center_mm[u, 0] - middle_x, center_mm[u, 1] - middle_y
         closeness[k] = 1.0 / (0.3 + square[k] / scale**2)
     terms, variance, leverage = _robust(rows, offset, closeness, (EXACT * size) ** 2)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) / scale
@@ -199,7 +214,7 @@ def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: i
     )
     if not sure:
         return np.nan, np.nan, size
-    return middle[0] + terms[0, 0], middle[1] + terms[1, 0], size
+    return middle_x + terms[0, 0], middle_y + terms[1, 0], size
 
 
 @compiled
@@ -209,7 +224,7 @@ def _robust(rows, offset, closeness, exact2):  # type: ignore[no-untyped-def]
     count = rows.shape[0]
     weight, squares = closeness.copy(), np.zeros(count)
     normal, right = np.empty((TERMS, TERMS)), np.empty((3, TERMS))
-    for _ in range(ROBUST_ROUNDS):
+    for number in range(ROBUST_ROUNDS):
         normal[:], right[:] = 0.0, 0.0
         right[2, 0] = 1.0
         for k in range(count):
@@ -224,7 +239,7 @@ def _robust(rows, offset, closeness, exact2):  # type: ignore[no-untyped-def]
         largest = 0.0
         for a in range(TERMS):
             largest = max(largest, normal[a, a])
-        cholesky_solve(normal, right, TERMS)
+        cholesky_solve(normal, right if number == ROBUST_ROUNDS - 1 else right[:2], TERMS)
         for a in range(TERMS):
             if not normal[a, a] ** 2 > MIN_PIVOT * largest:
                 return right[:2], np.inf, np.inf

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, vectorized
 from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
 from .synthesis import (
     AA,
@@ -48,8 +48,33 @@ OF_NOISE = 2 * 20 * 2.0
 OF_MEDIAN = 2.0  # a mean of squares against their median
 PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
 MAX_PARDON = 0.1
+SEEN, LANES = 6 * (1 + FIRST_RING), 64  # third differences around a marker at most, and markers at once
 SURE = 3.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
+
+
+@vectorized
+def _order(low, high):  # type: ignore[no-untyped-def]
+    """Swap what stands the wrong way round."""
+    for k in range(low.shape[0]):
+        low[k], high[k] = min(low[k], high[k]), max(low[k], high[k])
+
+
+@compiled
+def _sort_lanes(column):  # type: ignore[no-untyped-def]
+    """Sort ``SEEN`` rows of ``LANES`` numbers, each lane by itself: Batcher's odd-even merge sort, which compares the
+    same rows whatever they hold."""
+    size = 1
+    while size < SEEN:
+        step = size
+        while step >= 1:
+            for low in range(step % size, SEEN - step, 2 * step):
+                high = low + step
+                if low // (2 * size) == high // (2 * size):
+                    end = min(high + step, SEEN)
+                    _order(column[low * LANES : (end - step) * LANES], column[high * LANES : end * LANES])
+            step //= 2
+        size *= 2
 
 
 @compiled
@@ -62,21 +87,51 @@ def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near):  # type: i
     square = _third_differences(xy, maps, edges, ahead, third)
     # what is hardly trusted where it bends must not be taken for noise
     noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
-    out, seen = np.zeros(xy.shape[0]), np.empty(spokes.shape[1] * (1 + FIRST_RING))
-    for m in range(xy.shape[0]):
-        count, above = 0, 0
-        for k in range(-1, FIRST_RING):
-            n = m if k < 0 else near[m, k]
-            if n < 0:
-                continue
-            for e in spokes[n]:
-                if e >= 0 and square[e] >= 0.0:  # not where it is not known
-                    seen[count] = square[e]
-                    count += 1
-                    above += OF_MEDIAN * square[e] > noise
-        if 2 * above > count:
-            out[m] = max(OF_MEDIAN * np.median(seen[:count]) - noise, 0.0)
+    own, known, above = np.full(spokes.shape, np.nan), np.zeros(len(spokes)), np.zeros(len(spokes))
+    for m in range(spokes.shape[0]):
+        for k in range(spokes.shape[1]):
+            e = spokes[m, k]
+            if e >= 0 and square[e] >= 0.0:  # not where it is not known
+                own[m, k] = square[e]
+                known[m] += 1.0
+                above[m] += 1.0 if OF_MEDIAN * square[e] > noise else 0.0
+    out, column, marker = np.zeros(len(spokes)), np.zeros(SEEN * LANES), np.empty(LANES, np.int64)
+    odd = np.empty(LANES, np.bool_)
+    filled = 0
+    for m in range(spokes.shape[0]):
+        count, over = known[m], above[m]
+        for k in range(FIRST_RING):
+            n = near[m, k]
+            if n >= 0:
+                count += known[n]
+                over += above[n]
+        if 2.0 * over > count:
+            _lay_around(m, own, near, column[filled:])
+            marker[filled], odd[filled] = m, count % 2.0 == 1.0
+            filled += 1
+        if filled == LANES or (filled > 0 and m == spokes.shape[0] - 1):
+            _sort_lanes(column)
+            for k in range(filled):
+                lower, upper = column[(SEEN // 2 - 1) * LANES + k], column[SEEN // 2 * LANES + k]
+                middle = upper if odd[k] else 0.5 * (lower + upper)
+                out[marker[k]] = max(OF_MEDIAN * middle - noise, 0.0)
+            filled = 0
     return out
+
+
+@compiled
+def _lay_around(m, own, near, column):  # type: ignore[no-untyped-def]
+    """Lay the third differences at marker m and around it into a lane."""
+    missing = 0
+    for k in range(-1, FIRST_RING):
+        n = m if k < 0 else near[m, k]
+        for i in range(own.shape[1]):
+            seen = own[n, i] if n >= 0 else np.nan
+            if not seen >= 0.0:
+                # what is missing lies on both sides of the median, half of it each
+                seen = -np.inf if missing % 2 == 0 else np.inf
+                missing += 1
+            column[((k + 1) * own.shape[1] + i) * LANES] = seen
 
 
 @compiled
@@ -104,6 +159,16 @@ def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
         if lines[e, KNOWN] != 0.0:
             lines[e, LEAVE] += (bend[e, 1] + bend[e, 0]) / lines[e, LENGTH]
             lines[e, ARRIVE] += (bend[e, 1] - bend[e, 0]) / lines[e, LENGTH]
+
+
+@compiled
+def bending_ones(rough, bend, edges):  # type: ignore[no-untyped-def]
+    """(E,) bool, the gridlines that bend (E, 2), or with an end that is rough (M,)."""
+    out = np.empty(edges.shape[0], np.bool_)
+    for e in range(edges.shape[0]):
+        bends = bend[e, 0] != 0.0 or bend[e, 1] != 0.0
+        out[e] = bends or rough[edges[e, 0]] > 0.0 or rough[edges[e, 1]] > 0.0
+    return out
 
 
 @compiled

@@ -40,7 +40,7 @@ class Cells:
     @property
     def edge_px(self) -> float:
         """The median edge of an equilateral triangle of the cells' areas; 0 without cells."""
-        return float(np.sqrt(np.median(self.area_px) * 4 / np.sqrt(3))) if len(self.area_px) else 0.0
+        return float(_equilateral_edge(self.area_px))
 
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
@@ -52,18 +52,37 @@ class Cells:
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
-    """The domains that are large enough for cells, at full scale.
+    """The domains that are large enough for cells, at full scale; in a crowd, triangles alone.
 
     Args:
         scale: full-scale pixels per pixel of the seeds.
     """
-    corners = np.full((len(seeds.ink), 3, 2), np.nan)
-    corners[triangles.region] = triangles.corner_px
-    center = (seeds.center + 0.5) * scale - 0.5
-    center[triangles.region] = triangles.corner_px.mean(axis=1)
-    area = seeds.area_px.astype(np.float64)
-    keep = _large(center, area)
-    return Cells(center[keep], seeds.ink[keep], area[keep] * scale * scale, corners[keep])
+    found = triangles.region, triangles.corner_px
+    return Cells(*_gathered(seeds.center, seeds.ink, seeds.area_px, *found, scale, seeds.crowded))
+
+
+@compiled
+def _gathered(place, ink_of, area_px, region, corner_px, scale, crowded):  # type: ignore[no-untyped-def]
+    """The fields of ``Cells``."""
+    center = (place + 0.5) * scale - 0.5
+    corners = np.full((place.shape[0], 3, 2), np.nan)
+    for t in range(region.shape[0]):
+        corners[region[t]] = corner_px[t]
+        for axis in range(2):
+            center[region[t], axis] = (
+                corner_px[t, 0, axis] + corner_px[t, 1, axis] + corner_px[t, 2, axis]
+            ) / 3
+    area = area_px.astype(np.float64)
+    if crowded:  # of what is so fine, and sharp
+        center, ink_of, area, corners = center[region], ink_of[region], area[region], corners[region]
+    keep = np.flatnonzero(_large(center, area))
+    return center[keep], ink_of[keep], area[keep] * scale * scale, corners[keep]
+
+
+@compiled
+def _equilateral_edge(area):  # type: ignore[no-untyped-def]
+    """The edge of an equilateral triangle of the median area."""
+    return np.sqrt(np.median(area) * 4.0 / np.sqrt(3.0)) if area.shape[0] > 0 else 0.0
 
 
 @compiled
@@ -93,12 +112,16 @@ def _entire(center, area):  # type: ignore[no-untyped-def]
     entire = np.ones(area.shape[0], np.bool_)
     if area.shape[0] <= NEIGHBOURS:
         return entire
+    limit = WHOLE_SHARE * area.max()
+    if area.min() >= limit:
+        return entire
     grid = bucketed(center)
     index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
     for i in range(area.shape[0]):
-        nearest(center, grid, center[i, 0], center[i, 1], index, square)
-        larger = 0
-        for j in index:
-            larger += area[i] < WHOLE_SHARE * area[j]
-        entire[i] = larger <= NEIGHBOURS // 4
+        if area[i] < limit:
+            nearest(center, grid, center[i, 0], center[i, 1], index, square)
+            larger = 0
+            for j in index:
+                larger += area[i] < WHOLE_SHARE * area[j]
+            entire[i] = larger <= NEIGHBOURS // 4
     return entire

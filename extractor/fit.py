@@ -9,8 +9,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .information import Information
-from .levels import Levels
+from .levels import Levels, level_change
 from .offsets import Reading
+
+MUCH_BLUR, MUCH_LIGHT = 0.06, 0.03  # of the blur and the levels, that no start can take for granted
+
+
+class Seen(NamedTuple):
+    """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
+    and the inks' levels."""
+
+    scale: int
+    sigma: float
+    noise: float
+    levels: Levels
+
+    def relit(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Seen:
+        """The same in another light.
+
+        Args:
+            before, now: (2, C, 3) some cells' inks over black, and their black, in the light then and now.
+        """
+        gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
+        black = self.levels.black.copy()
+        black[:, 0] += (now[1] - before[1]).mean(axis=0)
+        cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
+        return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
+
+    def near(self, other: Seen) -> bool:
+        """Whether blur and levels are nearly the same."""
+        blur = abs(self.sigma - other.sigma) < MUCH_BLUR * other.sigma
+        return blur and bool(level_change(other.levels.cell, self.levels.cell) < MUCH_LIGHT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +54,7 @@ class Refined:
         free_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, grey levels, one channel.
+        seen: how the image looks, where the pattern was drawn.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
     """
 
@@ -34,6 +64,7 @@ class Refined:
     free_px: NDArray[np.float64]
     blur_px: float
     noise: float
+    seen: Seen | None
     points: NDArray[np.float64]
 
 
@@ -43,7 +74,8 @@ class Fit(NamedTuple):
     Attributes:
         xy: (M, 2) where the pattern is drawn: markers that the image hardly shows, or not at all (``beyond``), lie
             where their neighbours' maps put them.
-        measured: (M, 2), the same as the last step left them.
+        measured: (M, 2), all of them as the last step left them.
+        guiding: (M, 2), the same with NaN where the image hardly shows them.
         beyond: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
         sigma: the blur, px. noise: grey levels, one channel. levels: of the inks.
@@ -51,12 +83,14 @@ class Fit(NamedTuple):
         rough: (M,) px^2, how rough the markers are around each.
         loose: (E,) px^2, how freely gridlines may bend beyond the map there.
         bend: (E, 2) px, by how much they do.
-        moved: by how many of its standard deviations the last step moved a marker at most.
+        strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
         reading: what that step saw.
+        unsettled: (M, 2, 2) px^2, what it may have left; None where nothing is drawn.
     """
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
+    guiding: NDArray[np.float64]
     beyond: NDArray[np.bool_]
     maps: NDArray[np.float64]
     sigma: float
@@ -66,8 +100,9 @@ class Fit(NamedTuple):
     rough: NDArray[np.float64]
     loose: NDArray[np.float64]
     bend: NDArray[np.float64]
-    moved: float
+    strides: NDArray[np.float64]
     reading: Reading | None
+    unsettled: NDArray[np.float64] | None = None
 
 
 class Across(NamedTuple):

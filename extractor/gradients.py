@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Cells
 from .engine import compiled
 from .lattice import SIX, layer_of, marker_id
 from .tables import Lattice
@@ -16,8 +15,19 @@ MIN_RIVAL = 0.8  # the same for the triangle turned by a third, which puts it 1.
 
 
 @compiled
-def _gradients(center_px, cell, center_mm, axial, cell_of, layers, seen_as):  # type: ignore[no-untyped-def]
+def seen_as(cell, count):  # type: ignore[no-untyped-def]
+    """(U,) int32, which cell of the image each of the layout's ``count`` cells is, or -1."""
+    out = np.full(count, -1, np.int32)
+    for i in range(cell.shape[0]):
+        if cell[i] >= 0:
+            out[cell[i]] = i
+    return out
+
+
+@compiled
+def slopes(center_px, cell, seen, tables):  # type: ignore[no-untyped-def]
     """(N, 2, 2) least squares over the six neighbours of each cell, NaN where they lie on one line."""
+    center_mm, axial, cell_of, layers = tables
     out = np.full((cell.shape[0], 2, 2), np.nan)
     for i in range(cell.shape[0]):
         u = cell[i]
@@ -30,9 +40,9 @@ def _gradients(center_px, cell, center_mm, axial, cell_of, layers, seen_as):  # 
             if layer_of(q, r) > layers:
                 continue
             v = cell_of[marker_id(q, r)]
-            if v < 0 or seen_as[v] < 0:
+            if v < 0 or seen[v] < 0:
                 continue
-            j = seen_as[v]
+            j = seen[v]
             x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
             px, py = center_px[j, 0] - center_px[i, 0], center_px[j, 1] - center_px[i, 1]
             xx += x * x
@@ -58,8 +68,7 @@ def gradients(
 
     The layout's own shape is in its millimetres, so a round pattern is no more curved than a honeycomb.
     """
-    tables = lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
-    return np.asarray(_gradients(center_px, cell, *tables, _seen_as(cell, lattice)))
+    return np.asarray(slopes(center_px, cell, seen_as(cell, len(lattice.ink)), lattice.slope_tables))
 
 
 @compiled
@@ -73,9 +82,9 @@ def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _add_from_triangles(center_px, corner_px, mirrored, cell, seen_as, tables, out):  # type: ignore[no-untyped-def]
+def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tables, out):  # type: ignore[no-untyped-def]
     """Write the map of every numbered cell that has none, but a triangle, and a neighbour that tells its turn."""
-    arms_mm, center_mm, axial, cell_of, layers = tables
+    center_mm, axial, cell_of, layers = tables
     maps, misfit = np.empty((3, 2, 2)), np.empty(3)
     step = (
         1 if mirrored else 2
@@ -92,10 +101,10 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen_as, tables, o
             if layer_of(q, r) > layers:
                 continue
             v = cell_of[marker_id(q, r)]
-            if v < 0 or seen_as[v] < 0:
+            if v < 0 or seen[v] < 0:
                 continue
             x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
-            px, py = center_px[seen_as[v], 0] - center_px[i, 0], center_px[seen_as[v], 1] - center_px[i, 1]
+            px, py = center_px[seen[v], 0] - center_px[i, 0], center_px[seen[v], 1] - center_px[i, 1]
             for shift in range(3):
                 m = maps[shift]
                 apart = np.hypot(px - m[0, 0] * x - m[0, 1] * y, py - m[1, 0] * x - m[1, 1] * y)
@@ -106,25 +115,11 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen_as, tables, o
             out[i] = maps[best]
 
 
-def whole_gradients(
-    cells: Cells, cell: NDArray[np.int32], lattice: Lattice, mirrored: bool
-) -> NDArray[np.float64]:
-    """``gradients``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle says
-    if one of them tells which of its corners is which.
-
-    Args:
-        cell: (N,) the layout's cell of each cell of the image, or -1.
-        mirrored: the pattern is seen from its back.
-    """
-    slope, seen_as = gradients(cells.center_px, cell, lattice), _seen_as(cell, lattice)
-    tables = lattice.arms_mm, lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
-    _add_from_triangles(cells.center_px, cells.corner_px, mirrored, cell, seen_as, tables, slope)
-    return slope
-
-
-def _seen_as(cell: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
-    """(U,) int32, which cell of the image each of the layout's cells is, or -1."""
-    seen_as = np.full(len(lattice.ink), -1, np.int32)
-    numbered = np.flatnonzero(cell >= 0)
-    seen_as[cell[numbered]] = numbered
-    return seen_as
+@compiled
+def whole_slopes(center_px, corner_px, cell, mirrored, arms_mm, tables):  # type: ignore[no-untyped-def]
+    """``slopes``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle says
+    if one of them tells which of its corners is which."""
+    seen = seen_as(cell, arms_mm.shape[0])
+    out = slopes(center_px, cell, seen, tables)
+    _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tables, out)
+    return out

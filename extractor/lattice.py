@@ -49,11 +49,25 @@ def axial(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int3
     return np.stack([corner_q + step_q, corner_r + step_r], axis=1).astype(np.int32)
 
 
-def turned(at: NDArray[np.int32], turn: int) -> NDArray[np.int32]:
-    """Axial coordinates of cells turned by 0, 120 or 240 degrees; inks are carried onto themselves when shifted
-    so that their (q - r) mod 3 agrees.
+@compiled
+def turned_place(q, r, turn):  # type: ignore[no-untyped-def]
+    """The axial place of a cell turned by 0, 120 or 240 degrees; inks are carried onto themselves when shifted so that
+    their (q - r) mod 3 agrees.
 
     It is the turn that brings the three cells around the down-cell (turn, 0) to those around (0, 0).
     """
-    q, r = (at - np.array([turn, 0])).T
-    return np.stack(((q, r), (-q - r - 1, q + 1), (r - 1, -q - r))[turn], axis=1).astype(np.int32)
+    q -= turn
+    if turn == 1:
+        return -q - r - 1, q + 1
+    if turn == 2:
+        return r - 1, -q - r
+    return q, r
+
+
+@compiled
+def turned(at, turn):  # type: ignore[no-untyped-def]
+    """(N, 2) int32, the axial coordinates of cells turned so."""
+    out = np.empty(at.shape, np.int32)
+    for i in range(at.shape[0]):
+        out[i] = turned_place(at[i, 0], at[i, 1], turn)
+    return out

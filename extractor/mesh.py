@@ -95,12 +95,12 @@ def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
     if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):
         return True
     limit = SHARED_CORNER * SHARED_CORNER * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
+    nearest = np.inf
     for i in range(3):
         for j in range(3):
             dx, dy = corner[a, i, 0] - corner[b, j, 0], corner[a, i, 1] - corner[b, j, 1]
-            if dx * dx + dy * dy < limit:
-                return True
-    return False
+            nearest = min(nearest, dx * dx + dy * dy)
+    return nearest < limit
 
 
 @compiled
@@ -142,11 +142,3 @@ def build_mesh(cells: Cells) -> Mesh | None:
         return None
     _flip(cells.center_px, cells.ink, faces, neighbours)
     return Mesh(*_judge(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours))
-
-
-def among(mesh: Mesh, whole: NDArray[np.bool_]) -> Mesh:
-    """The mesh without the faces of damaged cells: across these it hangs together by chance."""
-    turn = np.where(whole[mesh.faces].all(axis=1), mesh.turn, 0).astype(np.int8)
-    across = np.where(turn[mesh.neighbours] != 0, mesh.neighbours, -1)
-    across[turn == 0] = -1
-    return Mesh(mesh.faces, across, turn)

@@ -51,35 +51,43 @@ def inner_table(axial: NDArray[np.int32], layer: NDArray[np.int32]) -> NDArray[n
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
     """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predict`` does; 0 where
-    these are too few for its quadratic."""
+    these are too few."""
     there = table >= 0
     arms = np.where(there[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
-    count = np.maximum(there.sum(axis=1), 1)
-    scale = np.linalg.norm(arms, axis=2).sum(axis=1) / count
+    count = there.sum(axis=1)
+    scale = np.linalg.norm(arms, axis=2).sum(axis=1) / np.maximum(count, 1)
     x, y = np.moveaxis(arms / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
     rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * there[..., None]
-    gram = np.swapaxes(rows, 1, 2) @ rows
-    gram[count < MIN_QUADRATIC] = 0.0
-    sound = np.linalg.eigvalsh(gram)[:, 0] > PIVOT * count
     weights = np.zeros(table.shape)
-    weights[sound] = np.linalg.solve(gram[sound], np.swapaxes(rows[sound], 1, 2))[:, 0]
+    quadratic = count >= MIN_QUADRATIC
+    for terms, use in ((TERMS, quadratic), (3, (count >= MIN_LINEAR) & ~quadratic)):
+        map_rows = rows[use, :, :terms]
+        gram = np.swapaxes(map_rows, 1, 2) @ map_rows
+        sound = np.linalg.eigvalsh(gram)[:, 0] > PIVOT * count[use]
+        solved = np.linalg.solve(gram[sound], np.swapaxes(map_rows[sound], 1, 2))[:, 0]
+        weights[np.flatnonzero(use)[sound]] = solved
     return weights
 
 
 @compiled
+def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
+    """Whether a known marker lies farther than the limit from where its neighbours put it, or these are not all known,
+    or too few."""
+    x, y = xy_px[m]
+    for k in range(table.shape[1]):
+        if table[m, k] >= 0:
+            x -= weights[m, k] * xy_px[table[m, k], 0]
+            y -= weights[m, k] * xy_px[table[m, k], 1]
+    return not x * x + y * y <= limit_px**2  # also where that is not a number
+
+
+@compiled
 def deviant(xy_px, limit_px, weights, table):  # type: ignore[no-untyped-def]
-    """(M,) bool: known markers that lie farther than the limit (M,) from where their neighbours put them, or whose
-    neighbours are not all known, or too few."""
+    """(M,) bool: the known markers that stray from their neighbours beyond the limit (M,)."""
     out = np.zeros(xy_px.shape[0], np.bool_)
     for m in range(xy_px.shape[0]):
-        if np.isnan(xy_px[m, 0]):
-            continue
-        x, y = xy_px[m]
-        for k in range(table.shape[1]):
-            if table[m, k] >= 0:
-                x -= weights[m, k] * xy_px[table[m, k], 0]
-                y -= weights[m, k] * xy_px[table[m, k], 1]
-        out[m] = not x * x + y * y <= limit_px[m] ** 2  # also where that is not a number
+        if not np.isnan(xy_px[m, 0]):
+            out[m] = strays(xy_px, m, limit_px[m], weights, table)
     return out
 
 
@@ -114,7 +122,7 @@ def _solve(factor, terms, vector):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
+def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
     """Predicted places, residual variances, leverages and numbers of neighbours of the wanted markers."""
     count = xy_px.shape[0]
     place = np.full((count, 2), np.nan)
@@ -190,5 +198,5 @@ def predict(
         leverage, by which the neighbours' own errors are multiplied; (M,) the number of neighbours. NaN where
         the neighbours are too few or on a line.
     """
-    result: tuple[Any, Any, Any, Any] = _predict(np.ascontiguousarray(xy_px), wanted, marker_mm, table)
+    result: tuple[Any, Any, Any, Any] = predicted(np.ascontiguousarray(xy_px), wanted, marker_mm, table)
     return result

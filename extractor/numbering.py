@@ -125,6 +125,22 @@ def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignor
     return at, bad
 
 
+@compiled
+def _walk_around(center, faces, neighbours, turn, part, front, reach):  # type: ignore[no-untyped-def]
+    """Walk a part from its middle; cells that are contradicted are left out and it is walked again. The coordinates,
+    ``UNKNOWN`` where that has no end, and how many cells were left out."""
+    blocked = np.zeros(center.shape[0], np.bool_)
+    for _ in range(MAX_ROUNDS):
+        start = innermost(center, faces, part, blocked)
+        if start < 0:
+            break
+        at, bad = _walk(start, faces, neighbours, turn, front, blocked, reach)
+        if not bad.any():
+            return at, np.count_nonzero(blocked)
+        blocked |= bad
+    return np.full((center.shape[0], 2), UNKNOWN, np.int32), np.count_nonzero(blocked)
+
+
 def reach_of(lattice: Lattice) -> int:
     """How far from its first cell a walk may lead: across the whole layout."""
     return 2 * lattice.layers + 2
@@ -134,17 +150,10 @@ def walk_part(
     cells: Cells, mesh: Mesh, part: NDArray[np.intp], front: int, reach: int
 ) -> tuple[NDArray[np.int32], int]:
     """Walk a part of the mesh from its middle; cells that are contradicted are left out and it is walked again."""
-    count = len(cells.ink)
-    blocked = np.zeros(count, np.bool_)
-    for _ in range(MAX_ROUNDS):
-        start = innermost(cells.center_px, mesh.faces, part, blocked)
-        if start < 0:
-            break
-        at, bad = _walk(start, mesh.faces, mesh.neighbours, mesh.turn, front, blocked, reach)
-        if not bad.any():
-            return at, int(blocked.sum())
-        blocked |= bad
-    return np.full((count, 2), UNKNOWN, np.int32), int(blocked.sum())
+    walked: tuple[NDArray[np.int32], int] = _walk_around(
+        cells.center_px, mesh.faces, mesh.neighbours, mesh.turn, part, front, reach
+    )
+    return walked
 
 
 def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice) -> Numbering | None:
@@ -156,7 +165,7 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     """
     found: list[_Candidate] = []
     no_white: list[tuple[NDArray[np.int32], int, int]] = []
-    least, reach = _least_cells(mesh, lattice), reach_of(lattice)
+    least, reach = _least_cells(cells, mesh, lattice), reach_of(lattice)
     for front in fronts(image, cells, mesh):
         for number_of, part in enumerate(largest_parts(mesh, MAX_PARTS)):
             if len(part) < MIN_FACES and len(part) + 2 < least:  # so many faces have two cells more at most
@@ -185,23 +194,36 @@ def _settled(found: list[_Candidate], least: float, apart_px: float) -> _Candida
     if best is None:
         return None
     middle = best.numbering.white_px
-    rivals = [one for one in found if np.hypot(*(one.numbering.white_px - middle)) > apart_px]
-    doubt = any(one.part != best.part or best.score - one.score < MIN_LEAD for one in rivals)
-    return best._replace(numbering=replace(best.numbering, ambiguous=doubt))
+    rivals = [
+        one for one in found if one is not best and np.hypot(*(one.numbering.white_px - middle)) > apart_px
+    ]
+    if any(one.part != best.part or best.score - one.score < MIN_LEAD for one in rivals):
+        return best._replace(numbering=replace(best.numbering, ambiguous=True))
+    return best
 
 
-def _least_cells(mesh: Mesh, lattice: Lattice) -> float:
+@compiled
+def _meshed(faces, turn, count):  # type: ignore[no-untyped-def]
+    """How many of the cells have a face."""
+    has = np.zeros(count, np.bool_)
+    for f in range(turn.shape[0]):
+        if turn[f] != 0:
+            for k in range(3):
+                has[faces[f, k]] = True
+    return np.count_nonzero(has)
+
+
+def _least_cells(cells: Cells, mesh: Mesh, lattice: Lattice) -> float:
     """How many cells a part must explain to be believed."""
-    meshed = np.count_nonzero(np.bincount(mesh.faces[mesh.turn != 0].reshape(-1)))
+    meshed = int(_meshed(mesh.faces, mesh.turn, len(cells.ink)))
     of_layout = max(MIN_EVIDENCE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
     return max(of_layout, min(MIN_SHARE * meshed, SURE_CELLS))
 
 
 def _candidate(way: Way, front: int, conflicts: int, part: int) -> _Candidate:
-    inside = int((way.cell >= 0).sum())
-    score = inside - 3 * way.outside - conflicts
+    score = way.inside - 3 * way.outside - conflicts
     numbering = Numbering(way.cell, front < 0, way.white_px, conflicts)
-    return _Candidate(inside, score, way.white, part, way.touching, numbering)
+    return _Candidate(way.inside, score, way.white, part, way.touching, numbering)
 
 
 def _with_outline(

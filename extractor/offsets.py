@@ -7,16 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
 from .profiles import HALF, I1, I2, I3, I4, I5
 from .stepping import TRUSTED
 from .synthesis import C0, C1, C2, C3, C4, C5
+from .walking import ALONG, ASIDE, CHUNK, TO, gather, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels count, in units of the blur
 CLEAR_SIGMA = 2.0  # how far the next gridline must be where nothing was drawn, in units of the blur
 MIN_VOTES = 0.08  # of a pixel on the gridline
 OFFSET, VARIANCE = range(2)
+AT_PLACE, PULL, SQUARE = (k * CHUNK for k in range(3))  # of pixels
 
 
 class Reading(NamedTuple):
@@ -57,6 +59,41 @@ def foot_of(contrasts, black, off):  # type: ignore[no-untyped-def]
     return out
 
 
+@vectorized
+def _weigh(  # type: ignore[no-untyped-def]
+    rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, step_seen, places, rest, under, votes
+):
+    """Fill in each pixel's place along the gridline in units of those between virtual markers, its weight times what it
+    shows beyond what lies ``under`` it (and beyond ``step_seen`` times a blurred step), and its weight squared."""
+    zero, one, band = np.float32(0.0), np.float32(1.0), np.float32(BAND * BAND)
+    for j in range(wide):
+        own, below, out, step = rest[j * lanes :], under[j * lanes :], votes[j * lanes :], np.float32(j)
+        for i in range(lanes):
+            t = (rows[ALONG + i] + step * du) * short
+            s = one - t
+            z = (rows[ASIDE + i] + step * dv - length * (t * s * (leave * s - arrive * t))) * inverse
+            zz = z * z
+            within = (step <= rows[TO + i]) & (zz < band)
+            g = C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5))))
+            g = g if within else zero
+            half = HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
+            half = half if within else zero  # the polynomial may be anything beyond
+            out[AT_PLACE + i] = np.floor(t * places - HALF)
+            out[PULL + i], out[SQUARE + i] = g * (own[i] - below[i] - step_seen * half), g * g
+
+
+@vectorized
+def _sum_at(votes, count, place):  # type: ignore[no-untyped-def]
+    """The sums of the weighed residuals and of the squared weights of the pixels at a place."""
+    zero = np.float32(0.0)
+    pull, weight = zero, zero
+    for k in range(count):
+        here = votes[AT_PLACE + k] == place
+        pull += votes[PULL + k] if here else zero
+        weight += votes[SQUARE + k] if here else zero
+    return pull, weight
+
+
 @compiled
 def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, drawn, count):  # type: ignore[no-untyped-def]
     """(E, m, 2): how far each gridline lies off towards (-uy, ux) around its virtual markers, px, and the variance.
@@ -66,9 +103,15 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
     """
     out = np.full((lines.shape[0], count, 2), np.nan)
     flat, shown, height, width = image.reshape(-1), model.reshape(-1), image.shape[0], image.shape[1]
-    one, two = np.uint64(1), np.uint64(2)
-    inverse, reach = 1.0 / sigma, BAND * sigma
-    votes = np.zeros((count, 2))
+    at, rows, votes = (
+        np.empty(CHUNK, np.int64),
+        np.empty(4 * CHUNK, np.float32),
+        np.empty(3 * CHUNK, np.float32),
+    )
+    rest, under = np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
+    inverse, reach, places = 1.0 / sigma, BAND * sigma, count + 1.0
+    nothing, step_seen = np.float32(0.0), np.float32(0.0 if drawn else 1.0)
+    sums = np.zeros((count, 2))
     for e in range(lines.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         if lines[e, KNOWN] == 0.0 or strength == 0.0 or use[e] < TRUSTED:
@@ -76,55 +119,48 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         x0, y0, leave, arrive = lines[e, X], lines[e, Y], lines[e, LEAVE], lines[e, ARRIVE]
         u0, u1, u2 = contrasts[e, 0] / strength, contrasts[e, 1] / strength, contrasts[e, 2] / strength
-        votes[:] = 0.0
-        zero = foot[e]
-        across = abs(ux) > abs(uy)  # then columns of pixels are walked through, else rows
-        p0, q0, up, uq = (x0, y0, ux, uy) if across else (y0, x0, uy, ux)
-        sense = 1.0 if across else -1.0
-        p_end, q_end = (width - 1, height - 1) if across else (height - 1, width - 1)
-        stride = np.uint64(3 * width) if across else np.uint64(3)
-        per_up, short, places = 1.0 / up, 1.0 / length, count + 1.0
-        half, lean, step = abs(reach * per_up), uq * per_up, uq * short
+        color = np.float32(u0), np.float32(u1), np.float32(u2)
+        # columns of pixels are walked through where it runs along x rather than along y, else rows
+        along_x = abs(ux) > abs(uy)
+        p0, q0, up, uq = (x0, y0, ux, uy) if along_x else (y0, x0, uy, ux)
+        p_end, q_end, step_p, step_q = (
+            (width, height, 3, 3 * width) if along_x else (height, width, 3 * width, 3)
+        )
         # the first and the last virtual marker are half a place from where their pixels begin and end
         from_p, to_p = p0 + (0.5 / places) * length * up, p0 + (1.0 - 0.5 / places) * length * up
-        slack = reach * abs(uq)
+        slack, half = reach * abs(uq), reach / abs(up)
         first = max(int(np.ceil(min(from_p, to_p) - slack)), 0)
-        last = min(int(np.floor(max(from_p, to_p) + slack)), p_end)
-        wide = int(2.0 * half) + 1  # the same for every row across, which is what processors guess best
-        for p in range(first, last + 1):
-            middle = q0 + (p - p0) * lean
-            middle += sense * bow((p - p0) * per_up * short, length, leave, arrive) * per_up
-            start = max(int(np.ceil(middle - half)), 0)
-            at = np.uint64((start * width + p if across else p * width + start) * 3)
-            t = ((p - p0) * up + (start - q0) * uq) * short
-            aside = sense * ((start - q0) * up - (p - p0) * uq)
-            for _ in range(min(wide, q_end - start + 1)):
-                place = t * places - 0.5
-                s = 1.0 - t
-                z = (aside - length * (t * s * (leave * s - arrive * t))) * inverse
-                zz = z * z
-                if place >= 0.0 and place < count and zz < BAND * BAND:
-                    g = C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5))))
-                    rest = u0 * flat[at] + u1 * flat[at + one] + u2 * flat[at + two] - zero
-                    if drawn:
-                        rest -= u0 * shown[at] + u1 * shown[at + one] + u2 * shown[at + two]
-                    else:
-                        rest -= HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
-                    at_place = np.uint64(place)
-                    votes[at_place, 0] += g * rest
-                    votes[at_place, 1] += g * g
-                at += stride
-                t += step
-                aside += sense * up
+        last = min(int(np.floor(max(from_p, to_p) + slack)), p_end - 1)
+        wide, most = row_sizes(half, q_end)
+        line = (p0, q0, up, uq, length, leave, arrive, half)
+        steps = (
+            np.float32(uq),
+            np.float32(up if along_x else -up),
+            np.float32(inverse),
+            np.float32(1.0 / length),
+        )
+        shape = np.float32(length), np.float32(leave), np.float32(arrive), step_seen, np.float32(places)
+        sums[:] = 0.0
+        for begin in range(first, last + 1, most):
+            own = min(most, last + 1 - begin)
+            lay_rows(begin, 1, own, *line, 0, q_end - 1, wide, step_p, step_q, False, at, rows)
+            gather(flat, at, own, wide, step_q, color, np.float32(foot[e]), rest)
+            if drawn:
+                gather(shown, at, own, wide, step_q, color, nothing, under)
+            _weigh(rows, lanes_of(own), wide, *steps, *shape, rest, under, votes)
+            for j in range(count):
+                pull, weight = _sum_at(votes, lanes_of(own) * wide, np.float32(j))
+                sums[j, 0] += pull
+                sums[j, 1] += weight
         for j in range(count):
-            if votes[j, 1] < MIN_VOTES:
+            if sums[j, 1] < MIN_VOTES:
                 continue
             if not drawn:
                 near, far = (j + 0.5) / places, (count - j - 0.5) / places
                 if length * min(near * room[e, 1], far * room[e, 2]) < CLEAR_SIGMA * sigma:
                     continue
-            out[e, j, OFFSET] = sigma * votes[j, 0] / votes[j, 1]
-            out[e, j, VARIANCE] = noise**2 * sigma**2 / (strength * votes[j, 1])
+            out[e, j, OFFSET] = sigma * sums[j, 0] / sums[j, 1]
+            out[e, j, VARIANCE] = noise**2 * sigma**2 / (strength * sums[j, 1])
     return out
 
 

@@ -11,6 +11,7 @@ from .mesh import Mesh
 from .sampling import sample_patch
 
 WITNESSES = 80  # faces that say which turn is that of the markers
+MIN_WITNESSES = 4  # of each turn
 
 
 @compiled
@@ -38,11 +39,31 @@ def connected(neighbours, member):  # type: ignore[no-untyped-def]
     return part
 
 
+@compiled
+def _by_part(neighbours, turn):  # type: ignore[no-untyped-def]
+    """The faces, part by part, the largest first, and where each part begins."""
+    part = connected(neighbours, turn != 0)
+    sizes = np.zeros(part.max() + 1 if part.shape[0] > 0 else 0, np.int64)
+    for i in part:
+        if i >= 0:
+            sizes[i] += 1
+    largest = np.argsort(-sizes, kind="mergesort")  # as found where two are as large
+    begin, filled = np.zeros(sizes.shape[0] + 1, np.int64), np.empty(sizes.shape[0], np.int64)
+    for k in range(sizes.shape[0]):
+        filled[largest[k]] = begin[k]
+        begin[k + 1] = begin[k] + sizes[largest[k]]
+    faces = np.empty(begin[-1], np.int64)
+    for f in range(part.shape[0]):
+        if part[f] >= 0:
+            faces[filled[part[f]]] = f
+            filled[part[f]] += 1
+    return faces, begin
+
+
 def largest_parts(mesh: Mesh, count: int) -> list[NDArray[np.intp]]:
     """The faces of each of the largest connected parts of the mesh, the largest first."""
-    part = connected(mesh.neighbours, mesh.turn != 0)
-    sizes = np.bincount(part[part >= 0])
-    return [np.flatnonzero(part == i) for i in np.argsort(-sizes, kind="stable")[:count]]
+    faces, begin = _by_part(mesh.neighbours, mesh.turn)
+    return [faces[begin[i] : begin[i + 1]] for i in range(min(count, len(begin) - 1))]
 
 
 @compiled
@@ -67,11 +88,12 @@ def innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _brightness(image, center, faces, turn, every):  # type: ignore[no-untyped-def]
-    """(F // every + 1, 2): the turn of every n-th face and its middle's brightness, NaN outside the image."""
+def _front(image, center, faces, turn):  # type: ignore[no-untyped-def]
+    """The turn of the brighter faces; 0 where too few are seen."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    out, color = np.full((turn.shape[0] // every + 1, 2), np.nan), np.zeros(3)
-    number_of = 0
+    every = max(1, int(np.count_nonzero(turn)) // WITNESSES)
+    brightness, color = np.empty((2, turn.shape[0] // every + 1)), np.zeros(3)
+    number_of, count = 0, [0, 0]
     for f in range(turn.shape[0]):
         if turn[f] == 0:
             continue
@@ -86,16 +108,15 @@ def _brightness(image, center, faces, turn, every):  # type: ignore[no-untyped-d
         for k in range(3):
             nearest = min(nearest, np.hypot(center[faces[f, k], 0] - x, center[faces[f, k], 1] - y))
         if sample_patch(flat, height, width, x, y, 0.12 * nearest, color):
-            row = number_of // every - 1
-            out[row, 0], out[row, 1] = turn[f], color.sum()
-    return out
+            side = 1 if turn[f] > 0 else 0
+            brightness[side, count[side]] = color.sum()
+            count[side] += 1
+    if min(count) < MIN_WITNESSES:
+        return 0
+    return 1 if np.median(brightness[1, : count[1]]) > np.median(brightness[0, : count[0]]) else -1
 
 
 def fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
     """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
-    every = max(1, int((mesh.turn != 0).sum()) // WITNESSES)
-    turn, brightness = _brightness(image, cells.center_px, mesh.faces, mesh.turn, every).T
-    plus, minus = brightness[turn == 1], brightness[turn == -1]
-    if len(plus) < 4 or len(minus) < 4:
-        return [1, -1]
-    return [1] if np.median(plus) > np.median(minus) else [-1]
+    front = int(_front(image, cells.center_px, mesh.faces, mesh.turn))
+    return [front] if front != 0 else [1, -1]

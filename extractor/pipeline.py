@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from .attach import attach
 from .cells import Cells, find_cells
-from .color import find_target, nominal_hues_deg, segment, to_colors
+from .color import nominal_hues_deg, to_colors
 from .errors import LayoutError
+from .fit import Seen
 from .image import prepare
 from .mesh import build_mesh
 from .missed import missed
@@ -21,10 +22,12 @@ from .placing import Places, place
 from .presets import PRESETS, Preset
 from .reference import Reference
 from .refine import Refiner
-from .regions import find_seeds, grow, large_enough
+from .regions import NO_CROWD, find_seeds, grow, large_enough
 from .repair import repair
+from .segmentation import segment
 from .sight import Sights
 from .tables import lattice_of
+from .target import find_target
 from .topology import topology_of
 from .triangles import fit_triangles
 from .types import Markers, Origin, Reason
@@ -32,6 +35,8 @@ from .virtual import place_virtual
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
 MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss
+CROWD = 8  # times as many domains as the pattern has cells, and at least
+MIN_CROWD = 2000  # so many are not a pattern's alone
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
 
 
@@ -85,6 +90,7 @@ class Extractor:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._lattice = lattice_of(layout)
         self._mesh = topology_of(layout)
+        self._crowd = max(CROWD * len(self._lattice.ink), MIN_CROWD)
         self._refine = Refiner(self._mesh, preset, layout.virtual_per_edge)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
@@ -138,7 +144,8 @@ class Extractor:
         segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
             return None
-        seeds = stages.done("seeds", find_seeds(segmentation))
+        # at a reduced scale, a crowd is what another scale may tell
+        seeds = stages.done("seeds", find_seeds(segmentation, self._crowd if scale == 1 else NO_CROWD))
         if scale > 1 and not large_enough(seeds):
             return None
         regions = stages.done("grow", grow(segmentation, seeds))
@@ -152,10 +159,16 @@ class Extractor:
         return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
 
     def finish(
-        self, sights: Sights, places: Places, mirrored: bool, origin: Origin, stages: Stages
+        self,
+        sights: Sights,
+        places: Places,
+        mirrored: bool,
+        origin: Origin,
+        stages: Stages,
+        before: Seen | None = None,
     ) -> Markers:
         """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        refined = stages.done("refine", self._refine(sights, places))
+        refined = stages.done("refine", self._refine(sights, places, before))
         repaired = stages.done("repair", repair(refined, places, self._lattice, sights.size))
         virtual = stages.done("virtual", place_virtual(self._mesh, repaired, refined.points))
         return Markers(

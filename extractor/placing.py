@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .gradients import whole_gradients
+from .gradients import whole_slopes
 from .numbering import Numbering
 from .tables import Lattice
 
@@ -53,17 +53,18 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     Args:
         size: width and height of the image.
     """
-    slope = whole_gradients(cells, numbering.cell, lattice, numbering.mirrored)
-    here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
-    cell = numbering.cell[here]
-    ids = lattice.corner_ids[cell]
-    seen = cells.center_px, cells.corner_px, slope, here
-    corner, edge, fitted, inside = _corners(*seen, cell, lattice.arms_mm, numbering.mirrored, *size)
-    sharp = bool(fitted.mean() > SHARP_SHARE) if len(fitted) else False
-    xy, around, there, kept = _merged(
-        ids, corner, edge, fitted, fitted | ~inside, sharp, len(lattice.marker_mm)
+    slope = whole_slopes(
+        cells.center_px,
+        cells.corner_px,
+        numbering.cell,
+        numbering.mirrored,
+        lattice.arms_mm,
+        lattice.slope_tables,
     )
-    return Places(xy, around, ids[kept], *agreement(there, lattice.meeting))
+    seen = cells.center_px, cells.corner_px, slope, numbering.cell
+    corners = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
+    xy, around, there, kept = _merged(corners, len(lattice.marker_mm))
+    return Places(xy, around, kept, *agreement(there, lattice.meeting))
 
 
 def agreement(
@@ -74,57 +75,58 @@ def agreement(
 
 
 @compiled
-def _corners(center, triangle, slope, here, cell, arms_mm, mirrored, width, height):  # type: ignore[no-untyped-def]
-    """(N, 3, 2) corners 0, 1, 2 of the cells ``here``, (N,) their mean edges, and (N,) where a triangle matched, and
-    which lie well inside the image.
+def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, width, height):  # type: ignore[no-untyped-def]
+    """Of the N numbered cells with a slope: (N, 3) the ids of corners 0, 1, 2, (N, 3, 2) these, (N,) the mean edges,
+    (N,) where a triangle matched, (N,) which matched or are cut off by the border, and whether most matched.
 
     Clockwise in the image a cell's corners run 0, 2, 1, seen from the back 0, 1, 2.
     """
-    count = here.shape[0]
-    corner, edge = np.empty((count, 3, 2)), np.zeros(count)
-    fitted, inside = np.zeros(count, np.bool_), np.ones(count, np.bool_)
+    here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
+    count, matched = here.shape[0], 0
+    ids, corner, edge = np.empty((count, 3), np.int32), np.empty((count, 3, 2)), np.zeros(count)
+    fitted, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     for n in range(count):
-        i, arms, place = here[n], arms_mm[cell[n]], corner[n]
+        i = here[n]
+        arms, place, inside = arms_mm[cell_of[i]], corner[n], True
+        ids[n] = corner_ids[cell_of[i]]
         for k in range(3):
             for axis in range(2):
                 place[k, axis] = center[i, axis]
                 place[k, axis] += slope[i, axis, 0] * arms[k, 0] + slope[i, axis, 1] * arms[k, 1]
             x, y = place[k]
-            near = min(x, y, width - 1 - x, height - 1 - y)
-            inside[n] = inside[n] and near >= BORDER_PX
+            inside = inside and min(x, y, width - 1 - x, height - 1 - y) >= BORDER_PX
         for k in range(3):
-            j = (k + 1) % 3
-            edge[n] += np.hypot(place[k, 0] - place[j, 0], place[k, 1] - place[j, 1]) / 3
-        best, first, step = MAX_CORNER_MISFIT * edge[n], -1, 1 if mirrored else 2
+            edge[n] += np.sqrt(_square(place[k], place[(k + 1) % 3])) / 3
+        best, first, step = (MAX_CORNER_MISFIT * edge[n]) ** 2, -1, 1 if mirrored else 2
         for shift in range(3):
             worst = 0.0
             for k in range(3):
-                j = (shift + step * k) % 3
-                apart = np.hypot(triangle[i, j, 0] - place[k, 0], triangle[i, j, 1] - place[k, 1])
-                worst = apart if not apart <= worst else worst  # a NaN stays
+                square = _square(triangle[i, (shift + step * k) % 3], place[k])
+                worst = square if not square <= worst else worst  # a NaN stays
             if worst < best:
                 best, first = worst, shift
         if first >= 0:
             fitted[n] = True
+            matched += 1
             for k in range(3):
                 place[k] = triangle[i, (first + step * k) % 3]
-    return corner, edge, fitted, inside
+        kept[n] = fitted[n] or not inside
+    return ids, corner, edge, fitted, kept, matched > SHARP_SHARE * count
 
 
 @compiled
-def _shortest(corner):  # type: ignore[no-untyped-def]
-    """The shortest edge of a triangle."""
-    shortest = np.inf
-    for k in range(3):
-        j = (k + 1) % 3
-        shortest = min(shortest, np.hypot(corner[k, 0] - corner[j, 0], corner[k, 1] - corner[j, 1]))
-    return shortest
+def _square(a, b):  # type: ignore[no-untyped-def]
+    """The squared distance of two points."""
+    x, y = a[0] - b[0], a[1] - b[1]
+    return x * x + y * y
 
 
 @compiled
-def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-untyped-def]
+def _merged(corners, count):  # type: ignore[no-untyped-def]
     """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
-    triangles agree there; (N,) the cells whose corners are all known, where most are sharp only those ``kept``."""
+    triangles agree there; (C, 3) the ids of the cells whose corners are all known, where most are sharp only of those
+    ``kept``. ``corners`` as ``_corners`` gives them."""
+    ids, corner, edge, fitted, kept, sharp = corners
     sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
@@ -141,15 +143,22 @@ def _merged(ids, corner, edge, fitted, kept, sharp, count):  # type: ignore[no-u
             around[m] = sums[m, EDGE] / sums[m, WEIGHT]
     mean = xy.copy()
     for n in range(ids.shape[0]):
+        if not fitted[n]:
+            continue
+        shortest = np.inf
+        for k in range(3):
+            shortest = min(shortest, _square(corner[n, k], corner[n, (k + 1) % 3]))
         for k in range(3):
             m = ids[n, k]
-            apart = np.hypot(corner[n, k, 0] - mean[m, 0], corner[n, k, 1] - mean[m, 1])
-            if fitted[n] and apart > MAX_SPREAD * around[m]:
+            apart = _square(corner[n, k], mean[m])
+            if apart > (MAX_SPREAD * around[m]) ** 2:
                 xy[m] = np.nan
-            there[m] += fitted[n] and apart < AGREED_SPREAD * _shortest(corner[n])
-    whole = np.ones(ids.shape[0], np.bool_)
+            there[m] += apart < AGREED_SPREAD**2 * shortest
+    whole, rows = np.empty(ids.shape, np.int32), 0
     for n in range(ids.shape[0]):
-        whole[n] = kept[n] or not sharp
-        for k in range(3):
-            whole[n] = whole[n] and np.isfinite(xy[ids[n, k], 0])
-    return xy, around, there, whole
+        a, b, c = ids[n]
+        known = np.isfinite(xy[a, 0]) and np.isfinite(xy[b, 0]) and np.isfinite(xy[c, 0])
+        if known and (kept[n] or not sharp):
+            whole[rows] = ids[n]
+            rows += 1
+    return xy, around, there, whole[:rows]

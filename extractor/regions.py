@@ -7,11 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import HUES, Segmentation
-from .engine import compiled
+from .color import HUES
+from .engine import compiled, vectorized
+from .segmentation import Segmentation
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
 MIN_DOMAIN_PX = 4
+# In a crowd, a cell has edges of 5 px at least, and of its area no less than a convex shape has for the spread of its
+# pixels (the root of their covariance's determinant): a triangle 10.4 times, an ellipse 12.6 times.
+MIN_CROWDED_PX = 12
+MIN_SOLIDITY = 8.0
+NO_CROWD = 1 << 62
 SAFE_AREA_PX = 20  # a cell with edges of 7 px
 MAX_SMALL = 0.1  # of the domains
 MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
@@ -26,12 +32,14 @@ class Seeds:
         center: (N, 2) float64, the domain's geometric center.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) int64, the domain's area.
+        crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
     """
 
     xy: NDArray[np.int32]
     center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
+    crowded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +67,9 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
     count = 0
     for y in range(label.shape[0]):
         row = label[y]
-        before = 0
-        for ink in row:
-            count += (ink != before) & (ink != 0)
-            before = ink
+        count += row[0] != 0
+        for x in range(1, label.shape[1]):
+            count += (row[x] != row[x - 1]) & (row[x] != 0)
     return count
 
 
@@ -79,28 +86,28 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 def _runs(label):  # type: ignore[no-untyped-def]
     """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
 
-    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 with the first run of each run's domain.
+    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 an earlier run of each run's domain, or itself.
     """
     height, width = label.shape
     runs = np.empty((_count_runs(label) + 1, 4), np.int32)
+    begin = np.empty(width + 1, np.int32)  # where the stretches of a row begin, those without ink among them
     count = 0
     for y in range(height):
         row = label[y]
-        before = np.uint8(0)
-        for x in range(width):
-            ink = row[x]
-            if ink != before:
-                if before != 0:
-                    runs[count, 2] = x - 1
-                    count += 1
-                if ink != 0:
-                    runs[count, 0] = y
-                    runs[count, 1] = x
-                    runs[count, 3] = ink
-                before = ink
-        if before != 0:
-            runs[count, 2] = width - 1
-            count += 1
+        begin[0], stretches = 0, 1
+        for x in range(1, width):
+            begin[stretches] = x
+            stretches += row[x] != row[x - 1]
+        begin[stretches] = width
+        for n in range(stretches):
+            ink = row[begin[n]]
+            runs[count, 0], runs[count, 1], runs[count, 2], runs[count, 3] = (
+                y,
+                begin[n],
+                begin[n + 1] - 1,
+                ink,
+            )
+            count += ink != 0
     parent = np.arange(count).astype(np.int32)
     above = 0
     for i in range(count):
@@ -113,59 +120,127 @@ def _runs(label):  # type: ignore[no-untyped-def]
                 a, b = _root(parent, i), _root(parent, other)
                 parent[max(a, b)] = min(a, b)
             other += 1
-    for i in range(count):
-        parent[i] = parent[parent[i]]
     return runs[:count], parent
 
 
 @compiled
-def _seeds(runs, root):  # type: ignore[no-untyped-def]
+def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
+    """(R,) int32 the domain of each run, -1 where that is too small, or there are more than ``crowd`` and it is none a
+    cell could be; the areas of the others; and whether there are more."""
+    domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
+    count = 0
+    for i in range(runs.shape[0]):
+        if parent[i] == i:
+            domain[i] = count
+            count += 1
+        else:
+            domain[i] = domain[parent[i]]
+        area[domain[i]] += runs[i, 2] - runs[i, 1] + 1
+    area = area[:count]
+    crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
+    area = _keep(domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
+    if crowded:
+        area = _keep(domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
+    return domain, area, crowded
+
+
+@compiled
+def _keep(domain, area, keep):  # type: ignore[no-untyped-def]
+    """Number the domains to keep anew, in place, with -1 for the others; their areas."""
+    number = np.where(keep, np.cumsum(keep) - 1, -1)
+    for i in range(domain.shape[0]):
+        if domain[i] >= 0:
+            domain[i] = number[domain[i]]
+    return area[keep]
+
+
+@compiled
+def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
+    """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
+    sums = np.zeros((area.shape[0], 5))
+    for i in np.flatnonzero(domain >= 0):
+        row, y, length = sums[domain[i]], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
+        x = 0.5 * (runs[i, 1] + runs[i, 2])
+        row[0] += length * x
+        row[1] += length * y
+        row[2] += length * (x * x + (length * length - 1) / 12.0)
+        row[3] += length * x * y
+        row[4] += length * y * y
+    sums /= area.reshape(-1, 1)
+    x, y = sums[:, 0], sums[:, 1]
+    # a pixel is a square, not a point: it adds 1/12 to each variance
+    xx, xy, yy = sums[:, 2] - x * x + 1.0 / 12.0, sums[:, 3] - x * y, sums[:, 4] - y * y + 1.0 / 12.0
+    return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0))
+
+
+@compiled
+def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
     """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
-    number = np.full(runs.shape[0], -1, np.int32)
-    domains = 0
+    count = area.shape[0]
+    ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
     for i in range(runs.shape[0]):
-        if root[i] == i:
-            number[i] = domains
-            domains += 1
-    area = np.zeros(domains, np.int64)
-    sums = np.zeros((domains, 2))
-    ink = np.zeros(domains, np.uint8)
+        d = domain[i]
+        if d >= 0:
+            length = runs[i, 2] - runs[i, 1] + 1
+            ink[d] = runs[i, 3]
+            center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
+            center[d, 1] += length * runs[i, 0]
+    for d in range(count):
+        center[d] /= area[d]
+    best = np.full(count, np.inf)
+    xy = np.zeros((count, 2), np.int32)
     for i in range(runs.shape[0]):
-        d = number[root[i]]
-        length = runs[i, 2] - runs[i, 1] + 1
-        area[d] += length
-        sums[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
-        sums[d, 1] += length * runs[i, 0]
-        ink[d] = runs[i, 3]
-    best = np.full(domains, np.inf)
-    xy = np.zeros((domains, 2), np.int32)
-    for i in range(runs.shape[0]):
-        d = number[root[i]]
-        cx = sums[d, 0] / area[d]
+        d = domain[i]
+        if d < 0:
+            continue
+        cx, cy = center[d]
         x = min(max(round(cx), runs[i, 1]), runs[i, 2])
-        distance = (x - cx) ** 2 + (runs[i, 0] - sums[d, 1] / area[d]) ** 2
+        distance = (x - cx) ** 2 + (runs[i, 0] - cy) ** 2
         if distance < best[d]:
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    for d in range(domains):
-        sums[d] /= area[d]
-    return xy, sums, ink, area
+    return xy, center, ink, area
 
 
-def find_seeds(segmentation: Segmentation) -> Seeds:
+def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
     """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
+
+    Args:
+        crowd: where there are more domains than this, small and ragged ones are clutter, too: an image of noise has
+            many times more than any pattern.
     """
-    xy, center, ink, area = _seeds(*_runs(segmentation.label))
-    keep = area >= MIN_DOMAIN_PX
-    return Seeds(xy=xy[keep], center=center[keep], ink=ink[keep], area_px=area[keep])
+    runs, parent = _runs(segmentation.label)
+    domain, area, crowded = _domains(runs, parent, crowd)
+    xy, center, ink, area_px = _seeds(runs, domain, area)
+    return Seeds(xy, center, ink, area_px, crowded)
 
 
 def large_enough(seeds: Seeds) -> bool:
     """Whether at most a few of the domains are too small to be recognised safely."""
     return len(seeds.ink) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
+
+
+@vectorized
+def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
+    """Write the moments of pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+    m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(x_of.shape[0]):
+        x, y = float(x_of[i] - x0), float(y_of[i] - y0)
+        xx, xy, yy = x * x, x * y, y * y
+        m1 += x
+        m2 += y
+        m3 += xx
+        m4 += xy
+        m5 += yy
+        m6 += xx * x
+        m7 += xx * y
+        m8 += x * yy
+        m9 += yy * y
+    out[0], out[1], out[2], out[3], out[4] = x_of.shape[0], m1, m2, m3, m4
+    out[5], out[6], out[7], out[8], out[9] = m5, m6, m7, m8, m9
 
 
 @compiled
@@ -174,8 +249,8 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     height, width = label.shape
     owner = np.zeros((height, width), np.int32)
     owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
-    last = height * width
-    queue = np.empty((limit_px + 2, 2), np.int32)  # a pixel's place in the flat image, and its x
+    across = np.empty(limit_px + 2, np.int32)  # a queue of pixels: their x
+    down = np.empty(limit_px + 2, np.int32)  # and y
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
     half = HUES // 2
@@ -184,7 +259,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
         first = sy * width + sx
         if owners[first] != 0:
             continue
-        queue[0, 0], queue[0, 1] = first, sx
+        across[0], down[0] = sx, sy
         owners[first] = region + 1
         h0 = float(colors[3 * first])
         sum_h, sum_s, sum_v = 0.0, float(colors[3 * first + 1]), float(colors[3 * first + 2])
@@ -193,12 +268,13 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
         while begin < end and end <= limit_px:
             wave_end = end
             for i in range(begin, wave_end):
-                at, x = queue[i, 0], queue[i, 1]
+                x, y = across[i], down[i]
                 for side in range(4):
-                    step = 1 if side == 0 else -1 if side == 1 else width if side == 2 else -width
-                    to = at + step
-                    if to < 0 or to >= last or (side == 0 and x == width - 1) or (side == 1 and x == 0):
+                    nx = x + (1 if side == 0 else -1 if side == 1 else 0)
+                    ny = y + (1 if side == 2 else -1 if side == 3 else 0)
+                    if nx < 0 or ny < 0 or nx == width or ny == height:
                         continue
+                    to = ny * width + nx
                     if owners[to] != 0 or end > limit_px or (labels[to] != ink and labels[to] != 0):
                         continue
                     h, s, v = float(colors[3 * to]), float(colors[3 * to + 1]), float(colors[3 * to + 2])
@@ -210,8 +286,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                     if dh * dh + ds * ds + dv * dv >= limit2 * scale:
                         continue
                     owners[to] = region + 1
-                    queue[end, 0] = to
-                    queue[end, 1] = x + step if side < 2 else x
+                    across[end], down[end] = nx, ny
                     end += 1
                     away = h - h0
                     sum_h += away + (HUES if away < -half else -HUES if away >= half else 0.0)
@@ -223,20 +298,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
-        m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(end):
-            x, y = float(queue[i, 1] - sx), float((queue[i, 0] - queue[i, 1]) // width - sy)
-            xx, xy, yy = x * x, x * y, y * y
-            m1 += x
-            m2 += y
-            m3 += xx
-            m4 += xy
-            m5 += yy
-            m6 += xx * x
-            m7 += xx * y
-            m8 += x * yy
-            m9 += yy * y
-        moments[region] = (float(end), m1, m2, m3, m4, m5, m6, m7, m8, m9)
+        _add_moments(across[:end], down[:end], sx, sy, moments[region])
     return owner, moments
 
 

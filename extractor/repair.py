@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from .arcs import by_layer
 from .engine import compiled
 from .fit import Refined
-from .neighbourhood import INNER, MIN_QUADRATIC, deviant, predict
+from .neighbourhood import MIN_QUADRATIC, deviant, predict, predicted, strays
 from .placing import AGREED, Places
+from .sampling import clamp
 from .tables import Lattice
 from .types import Status
 
@@ -48,6 +49,8 @@ MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadrat
 # to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
 MILD_ERROR = 2.0
 HEAVY_ERROR = 1.4
+LOST, MEASURED = np.uint8(Status.LOST), np.uint8(Status.MEASURED)
+REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,41 +71,32 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    shortest = _shortest(xy, lattice.neighbours[:, INNER], places.edge_px)
-    places = replace(places, edge_px=np.where(places.agreed, places.edge_px, shortest))
-    _drop_outliers(xy, cov, places, refined.explained, lattice)
-    _drop_frayed(xy, cov, places, refined.explained, lattice)
-    _drop_slid(xy, cov, refined.free_px, places, lattice)
-    measured, edge = xy.copy(), _filled(shortest, lattice)
-    outside = ~_inside(xy, size)
-    xy[outside], cov[outside] = np.nan, np.nan
-    status = np.where(outside, Status.LOST, Status.MEASURED).astype(np.uint8)
-    if status[lattice.present].all():
-        return Repaired(xy, cov, status)
-    for place, variance, kind in (
-        (*_by_neighbours(measured, edge, lattice), Status.REPAIRED),
-        (*_by_cells(measured, places, edge, lattice, size), Status.REPAIRED),
-        (*_by_layer(measured, edge, lattice), Status.FITTED),
-    ):
-        use = (status == Status.LOST) & _inside(place, size) & lattice.present
-        xy[use] = place[use]
-        cov[use] = np.eye(2) * variance[use, None, None]
-        status[use] = kind
-    return Repaired(xy, cov, status)
-
-
-def _inside(xy: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Places within the image, out to the edges of its pixels; NaN not."""
-    return np.asarray((xy >= -0.5).all(axis=1) & (xy <= np.array(size) - 0.5).all(axis=1))
+    places = replace(places, edge_px=_edges(xy, lattice.ring, places.edge_px, places.agreed))
+    edge_px, believed = places.edge_px, refined.explained | places.agreed
+    near = edge_px * np.where(refined.explained, MAX_DEVIATION, MAX_AGREED_ALONE * places.agreed)
+    slide = cov, refined.free_px, places.xy_px, edge_px, lattice.rim
+    rings = lattice.ring_weights, lattice.neighbours
+    if _sound(xy, near, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
+        return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
+    kinds = believed, refined.explained, places.whole
+    _drop_outliers(xy, cov, edge_px, near, kinds, *rings, lattice.marker_mm)
+    _drop_frayed(xy, cov, places, lattice)
+    _drop_slid(xy, cov, _slid(xy, *slide), places, lattice)
+    tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
+    return Repaired(
+        xy, cov, _fill(xy, cov, _filled(edge_px, lattice.neighbours), places.xy_px, *tables, size)
+    )
 
 
 @compiled
-def _shortest(xy, around, edge):  # type: ignore[no-untyped-def]
-    """(M,) the way from each marker to the nearest of its known neighbours, or its edge where that is shorter: what
-    lies off by a share of a longer one is another's."""
+def _edges(xy, ring, edge, agreed):  # type: ignore[no-untyped-def]
+    """(M,) the edges at each marker; where no triangles agree, the way to the nearest of its known neighbours, if that
+    is shorter: a share of a longer edge may reach half-way to another marker."""
     out = edge.copy()
     for m in range(xy.shape[0]):
-        for n in around[m]:
+        if agreed[m]:
+            continue
+        for n in ring[m]:
             if n >= 0:
                 apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
                 if apart < out[m]:
@@ -110,56 +104,84 @@ def _shortest(xy, around, edge):  # type: ignore[no-untyped-def]
     return out
 
 
-def _drop_outliers(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    places: Places,
-    explained: NDArray[np.bool_],
-    lattice: Lattice,
-) -> None:
+@compiled
+def _sound(xy, near, slide, rings, inner_rings, present, size):  # type: ignore[no-untyped-def]
+    """Whether every marker of the pattern is known and none of the rules below could drop it: as a rule, all are."""
+    cov, free, start, edge, rim = slide
+    weights, table = rings
+    inner_weights, inner = inner_rings
+    for m in range(xy.shape[0]):
+        x, y = xy[m]
+        if np.isnan(x):
+            if present[m]:
+                return False
+            continue
+        if not _inside(x, y, size):
+            return False
+        if strays(xy, m, near[m], weights, table):
+            return False
+        if inner[m, 0] >= 0 and strays(xy, m, FRAYED[0] * edge[m], inner_weights, inner):
+            return False
+        if rim[m] and _slides(xy, m, cov, free, start, edge):
+            return False
+    return True
+
+
+@compiled
+def _inside(x, y, size):  # type: ignore[no-untyped-def]
+    """Whether a place is within the image, out to the edges of its pixels; NaN is not."""
+    return x >= -0.5 and y >= -0.5 and x <= size[0] - 0.5 and y <= size[1] - 0.5
+
+
+@compiled
+def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # type: ignore[no-untyped-def]
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
 
     What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
     lie farther off.
     """
-    table, edge, believed = lattice.neighbours, places.edge_px, explained | places.agreed
-    limit = np.where(explained, MAX_DEVIATION, MAX_AGREED_ALONE) * edge * believed
+    believed, explained, whole = kinds
+    excess, stale = np.zeros(edge.shape[0]), np.ones(edge.shape[0], np.bool_)
     for _ in range(ROUNDS):
-        known = np.isfinite(xy[:, 0])
-        # only what may be too far is looked at closely
-        doubtful = deviant(xy, limit, lattice.ring_weights, table)
-        if not doubtful.any():
+        # only what may be too far is looked at closely, and again where a neighbour has been dropped
+        doubtful = deviant(xy, near, weights, table) & stale
+        place, variance, leverage, support = predicted(xy, doubtful, marker_mm, table)
+        for m in np.flatnonzero(stale):
+            excess[m] = 0.0
+            if not doubtful[m]:
+                continue
+            sigma = np.sqrt(variance[m] * (1 + leverage[m]))
+            allowed = MAX_DEVIATION
+            if whole[m]:
+                allowed = MAX_AGREED
+            elif not believed[m]:
+                allowed = MAX_UNEXPLAINED
+            elif not explained[m]:
+                allowed = MAX_AGREED_ALONE
+            elif support[m] >= MILD_SUPPORT:
+                allowed = clamp(SIGMAS * sigma / edge[m], MAX_DEVIATION, MAX_TOLERANCE)
+            apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+            if np.isfinite(apart / (edge[m] * allowed)):
+                excess[m] = apart / (edge[m] * allowed)
+            if not (believed[m] or sigma < MAX_UNEXPLAINED * edge[m]):  # they do not know themselves
+                excess[m] = np.inf
+        worst = np.flatnonzero(excess > 1.0)
+        if worst.shape[0] == 0:
             break
-        place, variance, leverage, support = predict(xy, doubtful, lattice.marker_mm, table)
-        sigma = np.sqrt(variance * (1 + leverage))
-        apart = xy - place
-        deviation = np.hypot(apart[:, 0], apart[:, 1])
-        with np.errstate(invalid="ignore"):
-            allowed = np.where(support >= MILD_SUPPORT, SIGMAS * sigma / edge, 0.0)
-            usual = np.clip(allowed, MAX_DEVIATION, MAX_TOLERANCE)
-            allowed = np.where(believed, usual, MAX_UNEXPLAINED)
-            allowed = np.where(believed & ~explained, np.minimum(allowed, MAX_AGREED_ALONE), allowed)
-            allowed = np.where(places.whole, MAX_AGREED, allowed)
-            excess = deviation / (edge * allowed)
-        excess[~np.isfinite(excess)] = 0.0
-        with np.errstate(invalid="ignore"):
-            vouched = sigma < MAX_UNEXPLAINED * edge
-        excess[known & ~believed & ~vouched & doubtful] = np.inf
-        if not (excess > 1.0).any():
-            break
-        around = np.where(table >= 0, excess[table], 0.0).max(axis=1)
-        bad = (excess > 1.0) & (excess >= around)
-        xy[bad] = np.nan
-        cov[bad] = np.nan
+        stale[:] = False
+        for m in worst:
+            largest = True
+            for n in table[m]:
+                largest = largest and (n < 0 or excess[m] >= excess[n])
+            stale[m] = largest
+        for m in np.flatnonzero(stale):
+            xy[m], cov[m] = np.nan, np.nan
+            for n in table[m]:
+                if n >= 0:
+                    stale[n] = True
 
 
-def _drop_frayed(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    places: Places,
-    explained: NDArray[np.bool_],
-    lattice: Lattice,
-) -> None:
+def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
     """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
@@ -180,7 +202,7 @@ def _drop_frayed(
 def _drop_slid(
     xy: NDArray[np.float64],
     cov: NDArray[np.float64],
-    free_px: NDArray[np.float64],
+    slid: NDArray[np.bool_],
     places: Places,
     lattice: Lattice,
 ) -> None:
@@ -190,22 +212,19 @@ def _drop_slid(
 
     Where two gridlines end that may bend, the corner between them slides along both.
     """
-    slid = _slid(
-        xy, cov, free_px, places.xy_px, places.edge_px, lattice.neighbours[:, INNER], lattice.present
-    )
     if not slid.any():
         return
     expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
     # at the corners of the rim two rings hold fewer than a quadratic takes, but the layers inside do not
     few = slid & (support < MIN_QUADRATIC)
     if few.any():
-        inside, _, _, known = predict(xy, few, lattice.marker_mm, lattice.inner)
-        expected[few], support[few] = inside[few], known[few]
+        inside, _, _, enough = predict(xy, few, lattice.marker_mm, lattice.inner)
+        expected[few], support[few] = inside[few], enough[few]
     after, before = (np.hypot(*(start - expected).T) for start in (xy, places.xy_px))
     with np.errstate(invalid="ignore"):
-        near, enough = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
-        stays = (after < before) & (after < near) & enough
-        back = slid & ~stays & (before < near) & enough & places.agreed
+        near, known = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
+        stays = (after < before) & (after < near) & known
+        back = slid & ~stays & (before < near) & known & places.agreed
     bad = slid & ~stays & ~back
     xy[bad], cov[bad] = np.nan, np.nan
     xy[back] = places.xy_px[back]
@@ -213,80 +232,95 @@ def _drop_slid(
 
 
 @compiled
-def _slid(xy, cov, free, start, edge, around, present):  # type: ignore[no-untyped-def]
-    """(M,) bool: markers of the rim that lie far from their ``start`` and are not sure, or their gridlines bend
-    (``free``, px)."""
+def _slides(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
+    """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
+    limit = VAGUE * edge[m]
+    if not (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
+        return False
+    dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+    return dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+
+
+@compiled
+def _slid(xy, cov, free, start, edge, rim):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers of the rim that slide."""
     out = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
-        inside = True
-        for n in around[m]:
-            inside = inside and n >= 0 and present[n]
-        limit = VAGUE * edge[m]
-        if not inside and (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
-            dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-            out[m] = dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+        out[m] = rim[m] and _slides(xy, m, cov, free, start, edge)
     return out
 
 
-def _filled(edge: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
-    """The edges at each marker; where none was seen, the mean of its neighbours'."""
-    around = np.where(lattice.neighbours >= 0, edge[lattice.neighbours], np.nan)
-    count = np.isfinite(around).sum(axis=1)
-    mean = np.nansum(around, axis=1) / np.maximum(count, 1)
-    return np.where(np.isfinite(edge), edge, np.where(count > 0, mean, np.nan))
+@compiled
+def _filled(edge, table):  # type: ignore[no-untyped-def]
+    """(M,) the edges at each marker; where none was seen, the mean of its neighbours', or NaN."""
+    out = edge.copy()
+    for m in np.flatnonzero(np.isnan(edge)):
+        total, count = 0.0, 0
+        for n in table[m]:
+            if n >= 0 and not np.isnan(edge[n]):
+                total += edge[n]
+                count += 1
+        out[m] = total / count if count > 0 else np.nan
+    return out
 
 
-def _by_neighbours(
-    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) places by the two rings around each lost marker, NaN where not safe, and their (M,) variances."""
+@compiled
+def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
+    """Write the places and covariances of the lost markers that can be told, NaN for those outside the image; (M,)
+    uint8 the status of all."""
     lost = np.isnan(xy[:, 0])
-    place, variance, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
-    nearer = predict(xy, lost, lattice.marker_mm, lattice.neighbours[:, INNER])[0]
-    with np.errstate(invalid="ignore"):
-        # where the inner ring alone says something else, the surface is too bent for either to be believed
-        alone = np.isnan(nearer[:, 0])
-        doubt = np.where(alone, (UNSEEN * edge) ** 2, ((place - nearer) ** 2).sum(axis=1) / 4)
-        at_most = variance * (1 + leverage) + (MODEL_SIGMA * edge) ** 2 + doubt
-        safe = (support >= MILD_SUPPORT) & (leverage < MAX_LEVERAGE) & (at_most < (MAX_SIGMA * edge) ** 2)
-    hidden = np.where(alone, 0.25 * (UNSEEN * edge) ** 2, 0.0)
-    return np.where(safe[:, None], place, np.nan), (MILD_ERROR * leverage) ** 2 * variance + hidden
+    if lost.any():
+        near = predicted(xy, lost, marker_mm, table)
+        nearer = predicted(xy, lost, marker_mm, ring)[0]
+        along, doubt = by_layer(xy, layers)
+    status = np.where(lost, LOST, MEASURED)
+    for m in range(xy.shape[0]):
+        if lost[m] and present[m]:
+            variance = _by_neighbours(m, near, nearer, edge[m])
+            if variance >= 0.0 and _inside(near[0][m, 0], near[0][m, 1], size):
+                xy[m], status[m] = near[0][m], REPAIRED
+            else:
+                variance = _by_cells(m, near, implied, edge[m], size)
+                if variance >= 0.0 and _inside(implied[m, 0], implied[m, 1], size):
+                    xy[m], status[m] = implied[m], REPAIRED
+                elif doubt[m] + (3 * MODEL_SIGMA * edge[m]) ** 2 < (MAX_FITTED_SIGMA * edge[m]) ** 2:
+                    variance = HEAVY_ERROR * doubt[m] + (MODEL_SIGMA * edge[m]) ** 2
+                    xy[m], status[m] = along[m], FITTED
+            cov[m] = variance * np.eye(2)
+        if not _inside(xy[m, 0], xy[m, 1], size):
+            xy[m], cov[m], status[m] = np.nan, np.nan, LOST
+    return status
 
 
-def _by_cells(
-    xy: NDArray[np.float64],
-    places: Places,
-    edge: NDArray[np.float64],
-    lattice: Lattice,
-    size: tuple[int, int],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) the corners that the cells around each lost marker imply, averaged (the article's eq. 6), and their (M,)
-    variance; NaN where the markers around say something else, and at the image's border, which cuts cells.
+@compiled
+def _by_neighbours(m, near, nearer, edge):  # type: ignore[no-untyped-def]
+    """The variance of a lost marker's place by the two rings around it; NaN where that is not safe."""
+    place, spread, leverage, support = near
+    dx, dy = place[m, 0] - nearer[m, 0], place[m, 1] - nearer[m, 1]
+    # where the inner ring alone says something else, the surface is too bent for either to be believed
+    alone = np.isnan(nearer[m, 0])
+    doubt = (UNSEEN * edge) ** 2 if alone else (dx * dx + dy * dy) / 4
+    at_most = spread[m] * (1 + leverage[m]) + (MODEL_SIGMA * edge) ** 2 + doubt
+    if support[m] < MILD_SUPPORT or not (leverage[m] < MAX_LEVERAGE and at_most < (MAX_SIGMA * edge) ** 2):
+        return np.nan
+    hidden = 0.25 * (UNSEEN * edge) ** 2 if alone else 0.0
+    return (MILD_ERROR * leverage[m]) ** 2 * spread[m] + hidden
+
+
+@compiled
+def _by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
+    """The variance of the corners that the cells around a lost marker imply, averaged (the article's eq. 6); NaN where
+    the markers around say something else, and at the image's border, which cuts cells.
 
     Where gridlines bend sharply, the markers around tell little more than that.
     """
-    lost = np.isnan(xy[:, 0])
-    expected, spread, leverage, support = predict(xy, lost, lattice.marker_mm, lattice.neighbours)
-    apart = places.xy_px - expected
-    squares = (apart**2).sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        deep = np.minimum(places.xy_px, np.array(size) - 1 - places.xy_px).min(axis=1) > BORDER * edge
-        use = lost & deep & (support >= RIM_SUPPORT) & (squares < (MAX_IMPLIED * edge) ** 2)
-        known = spread * (1 + leverage)
-        use &= (
-            (leverage < RIM_LEVERAGE)
-            & (known < (MAX_IMPLIED * edge) ** 2)
-            & (squares < 4 * (known + (IMPLIED_SIGMA * edge) ** 2))
-        )
-    variance = 0.25 * squares + (IMPLIED_SIGMA * edge) ** 2
-    return np.where(use[:, None], places.xy_px, np.nan), np.where(use, variance, np.nan)
-
-
-def _by_layer(
-    xy: NDArray[np.float64], edge: NDArray[np.float64], lattice: Lattice
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(M, 2) places by the markers of each lost marker's layer, NaN where not safe, and their (M,) variances."""
-    place, variance = by_layer(xy, lattice.layers)
-    with np.errstate(invalid="ignore"):
-        safe = variance + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_FITTED_SIGMA * edge) ** 2
-    return np.where(safe[:, None], place, np.nan), HEAVY_ERROR * variance + (MODEL_SIGMA * edge) ** 2
+    expected, spread, leverage, support = near
+    x, y = implied[m]
+    square = (x - expected[m, 0]) ** 2 + (y - expected[m, 1]) ** 2
+    deep = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER * edge
+    if not (deep and support[m] >= RIM_SUPPORT and square < (MAX_IMPLIED * edge) ** 2):
+        return np.nan
+    known, own = spread[m] * (1 + leverage[m]), (IMPLIED_SIGMA * edge) ** 2
+    if not (leverage[m] < RIM_LEVERAGE and known < (MAX_IMPLIED * edge) ** 2 and square < 4 * (known + own)):
+        return np.nan
+    return 0.25 * square + own

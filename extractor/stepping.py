@@ -158,26 +158,31 @@ def shown(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-
 
 
 @compiled
-def moved(xy, shift, diagonal, least, beyond):  # type: ignore[no-untyped-def]
-    """(M, 2) the markers after a step, the same with NaN where the image hardly shows them (``least``, as ``shown``
-    gives it), and the largest step of those that are not ``beyond`` in standard deviations with all other markers
-    known."""
+def strides(step, diagonal, beyond):  # type: ignore[no-untyped-def]
+    """(M,) how far each marker stepped in standard deviations with all others known; 0 for those ``beyond``."""
+    out = np.zeros(step.shape[0])
+    for m in range(step.shape[0]):
+        xx, cross, yy = diagonal[m]
+        dx, dy = step[m]
+        if not beyond[m]:
+            out[m] = np.sqrt(max(dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy, 0.0))
+    return out
+
+
+@compiled
+def moved(xy, shift, least):  # type: ignore[no-untyped-def]
+    """(M, 2) the markers after a step, and the same with NaN where the image hardly shows them (``least``, as ``shown``
+    gives it)."""
     count = xy.shape[0]
     measured, guiding = np.empty((count, 2)), np.empty((count, 2))
-    largest = 0.0
-    for m in range(count):
-        xx, cross, yy = diagonal[m]
-        dx, dy = shift[m]
-        measured[m, 0], measured[m, 1] = xy[m, 0] + dx, xy[m, 1] + dy
-        if not beyond[m]:
-            largest = max(largest, dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy)
     seen = least[least > 3 * PRIOR_BEYOND_PX**-2]
     limit = WEAK * np.median(seen) if seen.shape[0] > 0 else np.inf
     for m in range(count):
+        measured[m, 0], measured[m, 1] = xy[m, 0] + shift[m, 0], xy[m, 1] + shift[m, 1]
         weak = least[m] < limit
         guiding[m, 0] = np.nan if weak else measured[m, 0]
         guiding[m, 1] = np.nan if weak else measured[m, 1]
-    return measured, guiding, np.sqrt(largest)
+    return measured, guiding
 
 
 @compiled

@@ -1,31 +1,31 @@
-"""The pattern is drawn from its current markers, and what the image shows beyond it is read along the gridlines.
+"""What the image shows beyond the pattern as it is drawn (``painting``) is read along the gridlines.
 
-A pixel of the drawing is the share of each cell under a Gaussian (the optics' blur and the pixel's box in one) times
-the cell's level over black. The three sides of a cell are half planes, where two of them are near they form a wedge
-(``gaussian``); inclusion and exclusion joins them:
-
-    share = wedge01 + wedge12 + wedge20 - side0 - side1 - side2 + 1.
-
-Every pixel near a gridline then votes with the derivative of the drawing by the gridline's offset, which sinks towards
+Every pixel near a gridline votes with the derivative of the drawing by the gridline's offset, which sinks towards
 its two ends as 1 - t and t: the gradient of the log-likelihood, and its curvature.
 """
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .engine import compiled, vectorized
-from .gaussian import REACH, normal, side_of_wedge
-from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
+from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
+from .painting import draw_cells as draw_cells
+from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur
-CHUNK = 1024  # pixels that vote at once, at most
 
 # columns of what is read along a gridline: sums over its pixels
 AA, AB, BB, A, B, SHARE_A, SHARE_B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(11)
 AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
 SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
 SUMS = 24
+KEEP, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # weights of pixels
+
+_kept = threading.local()
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -47,152 +47,6 @@ def clear(model, box):  # type: ignore[no-untyped-def]
     """Zeros inside the box (x from, y from, x to, y to)."""
     for y in range(box[1], box[3]):
         model[y, box[0] : box[2]] = np.float32(0.0)
-
-
-@compiled
-def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
-    """A cell's side in units of the blur: d = out[0] + out[1] x + out[2] y inside, t from its first corner likewise.
-
-    out: 0-2 distance, 3-5 place along, 6 length, 7 and 8 slopes at its first and second corner, positive inwards.
-    """
-    line = lines[e]
-    ux, uy, length = line[UX], line[UY], line[LENGTH]
-    nx, ny = -uy * sense * inverse, ux * sense * inverse
-    out[0], out[1], out[2] = -(nx * line[X] + ny * line[Y]), nx, ny
-    ux, uy = ux * inverse, uy * inverse
-    along = -(ux * line[X] + uy * line[Y])
-    out[6] = length * inverse
-    if forward:
-        out[3], out[4], out[5] = along, ux, uy
-        out[7], out[8] = sense * line[LEAVE], sense * line[ARRIVE]
-    else:
-        out[3], out[4], out[5] = out[6] - along, -ux, -uy
-        out[7], out[8] = -sense * line[ARRIVE], -sense * line[LEAVE]
-
-
-@compiled
-def _sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
-    """Fill in a cell's three sides; how far they can lie off their chords."""
-    bulge = 0.0
-    for k in range(3):
-        e = cell_edges[k]
-        forward = edges[e, 0] == cell[k]
-        _side(lines, e, forward, turn if forward else -turn, inverse, side[k])
-        bulge = max(bulge, (0.25 * side[k, 6] + REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
-    return bulge
-
-
-@compiled
-def _opening(side, other):  # type: ignore[no-untyped-def]
-    """The angle at the corner between a side's end and the next one's start, over 2 pi."""
-    ax, ay = -side[4], -side[5]
-    bx, by = other[4], other[5]
-    # the first side bows inwards with slope 8 along its direction; seen from the corner that turns it outwards
-    angle = np.arccos(min(max((ax * bx + ay * by) / (np.hypot(ax, ay) * np.hypot(bx, by)), -1.0), 1.0))
-    return (angle + np.arctan(side[8]) - np.arctan(other[7])) / (2.0 * np.pi)
-
-
-@compiled
-def _columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
-    """The columns of row y that lie less than ``far`` outside of every side."""
-    low, high = left, right
-    for k in range(3):
-        rest = side[k, 0] + side[k, 2] * y + far
-        if side[k, 1] > 0.0:
-            low = max(low, np.ceil(-rest / side[k, 1]))
-        elif side[k, 1] < 0.0:
-            high = min(high, np.floor(-rest / side[k, 1]))
-        elif rest < 0.0:
-            high = low - 1.0
-    return low, high
-
-
-@compiled
-def _wedge(opening, end, d, back, start, other, t):  # type: ignore[no-untyped-def]
-    """Share of the wedge between the end of one side (distance d, ``back`` from the corner, slope ``end``) and the
-    start of the next (distance ``other``, place t, slope ``start``)."""
-    return opening + side_of_wedge(d, back - end * d) + side_of_wedge(other, t + start * other)
-
-
-@compiled
-def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, model):  # type: ignore[no-untyped-def]
-    """Add the drawn cells' levels over black to the model."""
-    inverse = 1.0 / sigma
-    side = np.zeros((3, 9))
-    flat, width = model.reshape(-1), model.shape[1]
-    one, two = np.uint64(1), np.uint64(2)
-    for i in range(cells.shape[0]):
-        if (
-            lines[cell_edges[i, 0], KNOWN] * lines[cell_edges[i, 1], KNOWN] * lines[cell_edges[i, 2], KNOWN]
-            == 0.0
-        ):
-            continue
-        a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
-        turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
-        bulge = _sides(cells[i], cell_edges[i], edges, lines, turn, inverse, side)
-        angle0, angle1, angle2 = (
-            _opening(side[2], side[0]),
-            _opening(side[0], side[1]),
-            _opening(side[1], side[2]),
-        )
-        length0, length1, length2 = side[0, 6], side[1, 6], side[2, 6]
-        leave0, leave1, leave2 = side[0, 7], side[1, 7], side[2, 7]
-        arrive0, arrive1, arrive2 = side[0, 8], side[1, 8], side[2, 8]
-        short0, short1, short2 = 1.0 / length0, 1.0 / length1, 1.0 / length2
-        step0, step1, step2 = side[0, 1], side[1, 1], side[2, 1]
-        walk0, walk1, walk2 = side[0, 4], side[1, 4], side[2, 4]
-        cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        far = REACH + bulge
-        top = max(int(np.ceil(min(a[1], b[1], c[1]) - far * sigma)), box[1])
-        bottom = min(int(max(a[1], b[1], c[1]) + far * sigma), box[3] - 1)
-        left = max(np.ceil(min(a[0], b[0], c[0]) - far * sigma), float(box[0]))
-        right = min(np.floor(max(a[0], b[0], c[0]) + far * sigma), box[2] - 1.0)
-        g0, g1, g2 = slopes[i, 0, 0], slopes[i, 1, 0], slopes[i, 2, 0]
-        for y in range(top, bottom + 1):
-            low, high = _columns(side, y, far, left, right)
-            if high < low:
-                continue
-            l0 = levels[i, 0] + slopes[i, 0, 1] * (y - cy) - g0 * cx
-            l1 = levels[i, 1] + slopes[i, 1, 1] * (y - cy) - g1 * cx
-            l2 = levels[i, 2] + slopes[i, 2, 1] * (y - cy) - g2 * cx
-            off0, way0 = side[0, 0] + side[0, 2] * y, side[0, 3] + side[0, 5] * y
-            off1, way1 = side[1, 0] + side[1, 2] * y, side[1, 3] + side[1, 5] * y
-            off2, way2 = side[2, 0] + side[2, 2] * y, side[2, 3] + side[2, 5] * y
-            at = np.uint64((y * width + int(low)) * 3)
-            for x in range(int(low), int(high) + 1):
-                here = at
-                at += np.uint64(3)
-                d0, d1, d2 = off0 + step0 * x, off1 + step1 * x, off2 + step2 * x
-                t0, t1, t2 = way0 + walk0 * x, way1 + walk1 * x, way2 + walk2 * x
-                if d0 < far:
-                    d0 -= bow(t0 * short0, length0, leave0, arrive0)
-                if d1 < far:
-                    d1 -= bow(t1 * short1, length1, leave1, arrive1)
-                if d2 < far:
-                    d2 -= bow(t2 * short2, length2, leave2, arrive2)
-                if min(d0, d1, d2) <= -REACH:
-                    continue
-                share = 1.0
-                near0, near1, near2 = d0 < REACH, d1 < REACH, d2 < REACH
-                if near0:
-                    if near1:
-                        share = _wedge(angle1, arrive0, d0, length0 - t0, leave1, d1, t1)
-                        if near2:
-                            share += 1.0 - normal(d0) - normal(d1) - normal(d2)
-                            share += _wedge(angle2, arrive1, d1, length1 - t1, leave2, d2, t2)
-                            share += _wedge(angle0, arrive2, d2, length2 - t2, leave0, d0, t0)
-                            share = max(share, 0.0)
-                    elif near2:
-                        share = _wedge(angle0, arrive2, d2, length2 - t2, leave0, d0, t0)
-                    else:
-                        share = normal(d0)
-                elif near1:
-                    share = _wedge(angle2, arrive1, d1, length1 - t1, leave2, d2, t2) if near2 else normal(d1)
-                elif near2:
-                    share = normal(d2)
-                flat[here] += np.float32(share * (l0 + g0 * x))
-                flat[here + one] += np.float32(share * (l1 + g1 * x))
-                flat[here + two] += np.float32(share * (l2 + g2 * x))
 
 
 @compiled
@@ -224,7 +78,7 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
     return out
 
 
-@vectorized
+@compiled
 def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
     """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
     gridline's place by those of its start and end."""
@@ -249,18 +103,38 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@vectorized
-def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums):  # type: ignore[no-untyped-def]
-    """Add ``count`` pixels to a gridline's sums: their places along and aside of its chord, their residuals.
+@compiled
+def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
+    """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
-    The votes' weights are polynomials close to the derivative of the drawing, the normal density by its distance and
-    the blurred ends of 1 - t and t: any weights give unbiased votes, and loops without branches and tables are fast.
+    They are polynomials close to the derivative of the drawing, the normal density by its distance and the blurred
+    ends of 1 - t and t: any weights give unbiased votes, and loops without branches and tables are fast.
     """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    for j in range(wide):
+        out, step = weights[j * lanes :], np.float32(j)
+        for i in range(lanes):
+            along, aside = rows[ALONG + i] + step * du, rows[ASIDE + i] + step * dv
+            within = (step >= rows[FROM + i]) & (step <= rows[TO + i])
+            keep = one if within & (along >= -reach) & (along <= length + reach) else zero
+            z, g, to_a, to_b = _weights(along, aside, inverse, short, slack, length, leave, arrive)
+            ga, gb = keep * g * to_a, keep * g * to_b
+            gc = ga * to_b
+            out[KEEP + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
+            out[TO_BLUR + i] = z * (ga + gb)
+            out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
+
+
+@vectorized
+def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
+    """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
-    aa, ab, bb, sa, sb, wa, wb, blur, curvature = zero, zero, zero, zero, zero, zero, zero, zero, zero
+    blur, curvature, misfit, pixels, wa, wb = zero, zero, zero, zero, zero, zero
+    # what moves the markers is summed so that the order of summing hardly matters
+    fine = np.float64(0.0)
+    aa, ab, bb, sa, sb = fine, fine, fine, fine, fine
     for k in range(count):
-        z, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
-        ga, gb = g * to_a, g * to_b
+        ga, gb, gz = weights[TO_A + k], weights[TO_B + k], weights[TO_BLUR + k]
         aa += ga * ga
         ab += ga * gb
         bb += gb * gb
@@ -268,9 +142,10 @@ def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arriv
         sb += gb * rest[k]
         wa += ga
         wb += gb
-        gz = z * (ga + gb)
         blur += rest[k] * gz
         curvature += gz * gz
+        misfit += weights[KEEP + k] * squares[k]
+        pixels += weights[KEEP + k]
     sums[AA] += aa
     sums[AB] += ab
     sums[BB] += bb
@@ -280,21 +155,18 @@ def _vote(along, aside, rest, count, inverse, short, slack, length, leave, arriv
     sums[SHARE_B] += wb
     sums[BLUR] += blur
     sums[BLUR_CURVATURE] += curvature
+    sums[MISFIT] += misfit
+    sums[PIXELS] += pixels
 
 
 @vectorized
-def _vote_bending(  # type: ignore[no-untyped-def]
-    along, aside, rest, count, inverse, short, slack, length, leave, arrive, sums
-):
+def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending, with weights t (1 - t) and t (1 - t) (1 - 2 t)."""
     zero = np.float32(0.0)
     ac, ad, bc, bd, cc, cd = zero, zero, zero, zero, zero, zero
     dd, sc, sd, wc, wd = zero, zero, zero, zero, zero
     for k in range(count):
-        _, g, to_a, to_b = _weights(along[k], aside[k], inverse, short, slack, length, leave, arrive)
-        ga, gb = g * to_a, g * to_b
-        gc = ga * to_b
-        gd = gc * (to_a - to_b)
+        ga, gb, gc, gd = weights[TO_A + k], weights[TO_B + k], weights[TO_C + k], weights[TO_D + k]
         ac += ga * gc
         ad += ga * gd
         bc += gb * gc
@@ -320,7 +192,49 @@ def _vote_bending(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  # type: ignore[no-untyped-def]
+def _area(lines, reach, box):  # type: ignore[no-untyped-def]
+    """The part of the box (x from, y from, x to, y to) that the bands along known gridlines lie in."""
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for e in range(lines.shape[0]):
+        if lines[e, KNOWN] != 0.0:
+            # a band may be bowed by as much as its length, times its slopes, over 4
+            wide = 2.0 * reach + lines[e, LENGTH] * max(abs(lines[e, LEAVE]), abs(lines[e, ARRIVE]))
+            x, y = lines[e, X], lines[e, Y]
+            end_x, end_y = x + lines[e, LENGTH] * lines[e, UX], y + lines[e, LENGTH] * lines[e, UY]
+            low_x, high_x = min(low_x, min(x, end_x) - wide), max(high_x, max(x, end_x) + wide)
+            low_y, high_y = min(low_y, min(y, end_y) - wide), max(high_y, max(y, end_y) + wide)
+    if not low_x <= high_x:
+        return box[0], box[1], box[0], box[1]
+    return (
+        max(box[0], min(int(low_x), box[2])),
+        max(box[1], min(int(low_y), box[3])),
+        min(box[2], max(int(high_x) + 2, box[0])),
+        min(box[3], max(int(high_y) + 2, box[1])),
+    )
+
+
+@vectorized
+def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
+    """Write image - model within the area into the flat ``residual``."""
+    width = 3 * (area[2] - area[0])
+    for y in range(area[1], area[3]):
+        seen = image[y].reshape(-1)[3 * area[0] : 3 * area[2]]
+        drawn = model[y].reshape(-1)[3 * area[0] : 3 * area[2]]
+        own = residual[(y - area[1]) * width :]
+        for k in range(seen.shape[0]):
+            own[k] = np.float32(seen[k]) - drawn[k]
+
+
+def read_gridlines(
+    image: NDArray[np.uint8],
+    model: NDArray[np.float32],
+    lines: NDArray[np.float64],
+    contrasts: NDArray[np.float64],
+    black: NDArray[np.float64],
+    sigma: float,
+    box: NDArray[np.int64],
+    loose: NDArray[np.bool_],
+) -> NDArray[np.float64]:
     """(E, 24) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
@@ -328,62 +242,63 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  #
     per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
     likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere.
     """
+    size = 3 * int(max(box[2] - box[0], 0) * max(box[3] - box[1], 0))
+    residual = getattr(_kept, "residual", None)
+    if residual is None or len(residual) < size:  # fresh memory would cost more than what is written to it
+        residual = _kept.residual = np.empty(size, np.float32)
+    return np.asarray(_read(image, model, lines, contrasts, black, sigma, box, loose, residual))
+
+
+@compiled
+def _read(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
+    """Everything of ``read_gridlines``; ``residual`` is room for the pixels in the box."""
     out = np.zeros((lines.shape[0], SUMS))
     inverse, reach = 1.0 / sigma, BAND * sigma
-    seen, drawn, width = image.reshape(-1), model.reshape(-1), image.shape[1]
-    one, two = np.uint64(1), np.uint64(2)
-    alongs, asides = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.float32)
-    rests = np.empty(CHUNK, np.float32)
+    area = _area(lines, reach, box)
+    _subtract(image, model, area, residual)
+    width, height = area[2] - area[0], area[3] - area[1]
+    at, rows, weights = (
+        np.empty(CHUNK, np.int64),
+        np.empty(4 * CHUNK, np.float32),
+        np.empty(6 * CHUNK, np.float32),
+    )
+    rest, squares = np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
     for e in range(lines.shape[0]):
-        u0, u1, u2 = np.float32(contrasts[e, 0]), np.float32(contrasts[e, 1]), np.float32(contrasts[e, 2])
-        strength = u0 * u0 + u1 * u1 + u2 * u2
+        color = np.float32(contrasts[e, 0]), np.float32(contrasts[e, 1]), np.float32(contrasts[e, 2])
+        strength = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
+        beneath = np.float32(black[e, 0]), np.float32(black[e, 1]), np.float32(black[e, 2])
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
-        x0, y0, leave, arrive = lines[e, X], lines[e, Y], lines[e, LEAVE], lines[e, ARRIVE]
-        b0, b1, b2 = np.float32(black[e, 0]), np.float32(black[e, 1]), np.float32(black[e, 2])
-        flat = abs(ux) > abs(uy)  # then columns of pixels are walked through, else rows
-        # p counts along the longer axis, q along the other
-        p0, q0, up, uq = (x0, y0, ux, uy) if flat else (y0, x0, uy, ux)
-        sense = 1.0 if flat else -1.0
-        lower, upper = (box[0], box[2] - 1) if flat else (box[1], box[3] - 1)
-        side_low, side_high = (box[1], box[3] - 1) if flat else (box[0], box[2] - 1)
-        first = max(int(np.ceil(min(p0, p0 + length * up) - reach)), lower)
-        last = min(int(np.floor(max(p0, p0 + length * up) + reach)), upper)
-        half, lean, per_length = reach / abs(up), uq / up, 1.0 / (up * length)
-        stride = np.uint64(3 * width) if flat else np.uint64(3)
-        misfit, pixels, filled, sums = np.float32(0.0), 0, 0, out[e]
+        x0, y0, leave, arrive = (
+            lines[e, X] - area[0],
+            lines[e, Y] - area[1],
+            lines[e, LEAVE],
+            lines[e, ARRIVE],
+        )
+        # columns of pixels are walked through where it runs along x rather than along y, else rows
+        along_x = abs(ux) > abs(uy)
+        p0, q0, up, uq = (x0, y0, ux, uy) if along_x else (y0, x0, uy, ux)
+        p_end, q_end = (width, height) if along_x else (height, width)
+        step_p, step_q = (3, 3 * width) if along_x else (3 * width, 3)
+        first = max(int(np.ceil(min(p0, p0 + length * up) - reach)), 0)
+        last = min(int(np.floor(max(p0, p0 + length * up) + reach)), p_end - 1)
+        half = reach / abs(up)
+        wide, most = row_sizes(half, q_end)
+        sums, sense = out[e], 1.0 if along_x else -1.0
         small = np.float32(inverse), np.float32(1.0 / length), np.float32(END_BELL * sigma / length)
         shape = np.float32(length), np.float32(leave), np.float32(arrive)
-        for p in range(first, last + 1):
-            middle = q0 + (p - p0) * lean + sense * bow((p - p0) * per_length, length, leave, arrive) / up
-            start = max(int(np.ceil(middle - half)), side_low)
-            end = min(int(np.floor(middle + half)), side_high)
-            if filled + end - start + 1 > CHUNK:
-                _vote(alongs, asides, rests, filled, *small, *shape, sums)
-                if loose[e]:
-                    _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
-                filled = 0
-            at = np.uint64((start * width + p if flat else p * width + start) * 3)
-            along = (p - p0) * up + (start - q0) * uq
-            aside = sense * ((start - q0) * up - (p - p0) * uq)
-            for _ in range(min(end - start + 1, CHUNK)):
-                if along >= -reach and along <= length + reach:
-                    r0 = np.float32(seen[at]) - drawn[at] - b0
-                    r1 = np.float32(seen[at + one]) - drawn[at + one] - b1
-                    r2 = np.float32(seen[at + two]) - drawn[at + two] - b2
-                    rests[filled] = u0 * r0 + u1 * r1 + u2 * r2
-                    alongs[filled], asides[filled] = along, aside
-                    misfit += r0 * r0 + r1 * r1 + r2 * r2
-                    filled += 1
-                    pixels += 1
-                at += stride
-                along += uq
-                aside += sense * up
-        _vote(alongs, asides, rests, filled, *small, *shape, sums)
-        if loose[e]:
-            _vote_bending(alongs, asides, rests, filled, *small, *shape, sums)
-        sums[MISFIT], sums[PIXELS] = misfit, pixels
+        steps = np.float32(uq), np.float32(sense * up), np.float32(reach)
+        line = (p0, q0, up, uq, length, leave, arrive, half)
+        for begin in range(first, last + 1, most):
+            count = min(most, last + 1 - begin)
+            lanes = lanes_of(count)
+            lay_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, False, at, rows)
+            gather_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
+            _weigh(rows, lanes, wide, *steps, *small, *shape, weights)
+            _vote(rest, squares, weights, lanes * wide, sums)
+            if loose[e]:
+                _vote_bending(rest, weights, lanes * wide, sums)
         for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
             sums[k] *= strength * inverse * inverse
         for k in (A, B, BLUR, C, D):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .lattice import SIX, axial, layer_of, marker_id
-from .neighbourhood import inner_table, neighbour_table, ring_weights
+from .neighbourhood import INNER, inner_table, neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
 UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
@@ -70,6 +70,21 @@ class Lattice:
     def meeting(self) -> NDArray[np.int64]:
         """(M,) how many colored cells meet at each marker."""
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
+
+    @cached_property
+    def slope_tables(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], int]:
+        """What a local map from the layout to the image needs of the layout."""
+        return self.center_mm, self.axial, self.cell_of, self.layers
+
+    @cached_property
+    def ring(self) -> NDArray[np.int32]:
+        """(M, 6) the markers around each, -1 beyond the pattern."""
+        return np.ascontiguousarray(self.neighbours[:, INNER])
+
+    @cached_property
+    def rim(self) -> NDArray[np.bool_]:
+        """(M,) the markers that have not all six around them."""
+        return np.asarray(~((self.ring >= 0) & self.present[self.ring]).all(axis=1))
 
     @cached_property
     def arms_mm(self) -> NDArray[np.float64]:

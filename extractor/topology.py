@@ -24,7 +24,7 @@ class Topology(NamedTuple):
         cell_edges: (K, 3) int32, edge k runs between the corners k and k + 1.
         black: (B, 3) int32 marker ids of the black cells.
         edge_cells: (E, 2) int32, the drawn cells on an edge's two sides, in no order.
-        spokes: (M, 6) int32, the edges that end at a marker.
+        spokes: (M, 6) int32, the edges that end at a marker, once around it.
         near: (M, 18) int32, the markers of its two rings.
         offset: (M, 18, 2) float64, their places relative to it in the layout, in units of the mean edge, y up.
         stencil: (M, 2, 18) float64: weights that give the map's derivatives from the differences to these markers
@@ -72,7 +72,7 @@ def topology_of(layout: Reference) -> Topology:
         cell_edges=cell_edges.astype(np.int32),
         black=layout.cell_corners[~drawn].astype(np.int32).reshape(-1, 3),
         edge_cells=edge_cells,
-        spokes=spokes,
+        spokes=_around(spokes, edges, xy),
         near=near,
         offset=offset,
         stencil=_stencil(near, offset),
@@ -89,6 +89,17 @@ def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most
     out = np.full((count, most), -1, np.int32)
     out[owner, place] = item
     return out
+
+
+def _around(
+    spokes: NDArray[np.int32], edges: NDArray[np.int64], xy: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """(M, 6) int32: the edges at each marker in the order of their directions."""
+    marker = np.arange(len(spokes))[:, None]
+    other = np.where(spokes >= 0, edges[spokes].sum(axis=2) - marker, 0)
+    away = xy[other] - xy[:, None]
+    angle = np.where(spokes >= 0, np.arctan2(away[..., 1], away[..., 0]), np.inf)
+    return np.take_along_axis(spokes, np.argsort(angle, axis=1, kind="stable"), axis=1)
 
 
 def _ahead(ring: NDArray[np.int32], xy: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int32]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .displacement import Rest, rest_at
 from .errors import ImageError
+from .fit import Seen
 from .image import prepare
 from .pipeline import Extractor, Stages
 from .proof import examine
@@ -76,12 +77,14 @@ class Tracked:
 
 @dataclass(frozen=True, eq=False)
 class _Memory:
-    """What a frame leaves to the next: positions, which of them were measured, those before, and every cell's look."""
+    """What a frame leaves to the next: positions, which of them were measured, those before, every cell's look, and how
+    the image looks to refinement."""
 
     xy_px: NDArray[np.float64]
     known: NDArray[np.bool_]
     before_px: NDArray[np.float64] | None
     look: NDArray[np.float64]
+    seen: Seen | None
     mirrored: bool
     expected: int  # markers of the last cold start, or more
     age: int  # frames since
@@ -200,7 +203,8 @@ class Tracker:
         memory = self._memory
         assert memory is not None
         origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages)
+        seen = memory.seen and memory.seen.relit(memory.look, start.look)
+        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages, seen)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT * memory.expected:
             return None
@@ -211,7 +215,10 @@ class Tracker:
         last = self._memory
         before = last.xy_px if last is not None and not last.gap else None
         known = markers.status == Status.MEASURED
-        self._memory = _Memory(markers.xy_px, known, before, look, bool(markers.mirrored), expected, age)
+        seen = markers.stages["refine"].seen
+        self._memory = _Memory(
+            markers.xy_px, known, before, look, seen, bool(markers.mirrored), expected, age
+        )
 
     def _booked(
         self,

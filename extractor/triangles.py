@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .regions import Regions
-from .sampling import clamp, sample_inside, sample_patch
+from .sampling import MARGIN, clamp, fixed, fixed_step, sample_fixed, sample_patch
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
 # radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
 CORNER_RADIUS = np.sqrt(8.0)
 THIRD_MOMENT = 8.0**1.5 / 10.0
+HALF_ROOT = np.sqrt(0.75)
 MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a square have 0
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4
@@ -88,13 +89,26 @@ def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
         angle = np.arctan2(imaginary, real) / 3.0
         # growing stops where the blurred rim darkens; the domain, cut nearer to the half level, tells the size
         radius = CORNER_RADIUS * np.sqrt(min(max(domain_px[i] / n, 1.0), MAX_GROWTH))
+        u, v = radius * np.cos(angle), radius * np.sin(angle)
         for k in range(3):
-            u = radius * np.cos(angle + k * 2.0 * np.pi / 3.0)
-            v = radius * np.sin(angle + k * 2.0 * np.pi / 3.0)
             corners[i, k, 0] = seed[i, 0] + mx + a * u
             corners[i, k, 1] = seed[i, 1] + my + b * u + c * v
+            u, v = -0.5 * u - HALF_ROOT * v, HALF_ROOT * u - 0.5 * v  # turned by 120 degrees
         good[i] = True
     return corners, good
+
+
+@compiled
+def _profile(flat, width, x, y, dx, dy, red, green, blue, zero):  # type: ignore[no-untyped-def]
+    """The area under a profile from (x, y) in steps of (dx, dy), held between -0.2 and 1.2, in steps."""
+    at_x, at_y, by_x, by_y = fixed(x), fixed(y), fixed_step(dx), fixed_step(dy)
+    area = 0.0
+    for m in range(2 * HALF_PROFILE + 1):
+        f = clamp(sample_fixed(flat, width, at_x, at_y, red, green, blue) - zero, -0.2, 1.2)
+        area += 0.5 * f if m == 0 or m == 2 * HALF_PROFILE else f
+        at_x += by_x
+        at_y += by_y
+    return area
 
 
 @compiled
@@ -127,18 +141,12 @@ def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # 
     if not (
         min(x0, x1) >= wide
         and min(y0, y1) >= high
-        and max(x0, x1) + wide < width - 1.0
-        and max(y0, y1) + high < height - 1.0
+        and max(x0, x1) + wide < width - 1.0 - MARGIN
+        and max(y0, y1) + high < height - 1.0 - MARGIN
     ):
         return False  # a profile leaves the image
-    first, second = 0.0, 0.0
-    for m in range(-HALF_PROFILE, HALF_PROFILE + 1):
-        sx, sy = m * step * ux, m * step * uy
-        weight = 0.5 if abs(m) == HALF_PROFILE else 1.0
-        f = sample_inside(flat, width, x0 + sx, y0 + sy, u0, u1, u2) - zero
-        first += weight * clamp(f, -0.2, 1.2)
-        f = sample_inside(flat, width, x1 + sx, y1 + sy, u0, u1, u2) - zero
-        second += weight * clamp(f, -0.2, 1.2)
+    first = _profile(flat, width, x0 - share * ux, y0 - share * uy, step * ux, step * uy, u0, u1, u2, zero)
+    second = _profile(flat, width, x1 - share * ux, y1 - share * uy, step * ux, step * uy, u0, u1, u2, zero)
     first, second = depth * (first * step - share), depth * (second * step - share)
     slope = (second - first) / (1.0 - 2 * FIRST)
     off_a, off_b = first - FIRST * slope, second + FIRST * slope

@@ -27,6 +27,7 @@ MIN_SHARE = 0.95  # of the cells in view that must agree with the image
 MIN_PREDICTED = 0.8  # of the cells in view whose middles must still show their ink before anything is fitted
 MIN_MIDDLE = 0.3  # of its ink a frame ago that a middle must show for that
 WINDOW = 0.9  # of an edge, the radius around a cell's middle in which its ink is looked for
+ROWS = 8  # of pixels at least are looked at there
 MIN_SHOWN = 0.2  # of an ink, for a pixel to count as it
 MIN_INK = 0.4  # of a cell's area that must be found there
 MAX_SHIFT = 0.35  # of an edge, how far a cell may lie from where it was predicted
@@ -119,7 +120,8 @@ def _shifts(image, xy, corners, ink, nearest, look):  # type: ignore[no-untyped-
         high, lean = uy * uy + vy * vy, ux * uy + vx * vy
         top = WINDOW * np.sqrt(high)
         sums[:] = 0.0
-        for y in range(max(int(np.ceil(cy - top)), 0), min(int(np.floor(cy + top)), height - 1) + 1):
+        every = max(int(2.0 * top / ROWS), 1)
+        for y in range(max(int(np.ceil(cy - top)), 0), min(int(np.floor(cy + top)), height - 1) + 1, every):
             off = (y - cy) / high
             half = abs(area) * np.sqrt(max(WINDOW * WINDOW / high - off * off, 0.0))
             start = max(int(np.ceil(cx + lean * off - half)), 0)
@@ -127,7 +129,7 @@ def _shifts(image, xy, corners, ink, nearest, look):  # type: ignore[no-untyped-
             if start <= end:
                 line = flat[3 * (y * width + start) : 3 * (y * width + end + 1)]
                 _add_ink(line, start - cx, y - cy, row[0], row[1], row[2], zero, sums)
-        if sums[0] > MIN_INK * CELL_SHARE * abs(area):
+        if every * sums[0] > MIN_INK * CELL_SHARE * abs(area):
             shift[i, 0], shift[i, 1] = sums[1] / sums[0], sums[2] / sums[0]
     return shift
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .lattice import SIX, turned
+from .lattice import SIX, layer_of, marker_id, turned_place
 from .sampling import sample_patch
-from .tables import UNKNOWN, Lattice, cells_at
+from .tables import UNKNOWN, Lattice
 from .whitecell import white_cell
 
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
@@ -42,6 +42,10 @@ OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
 WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
+RINGS = [
+    (STEPS[(low < DISTANCES) & (high >= DISTANCES)], OFFSETS[(low < DISTANCES) & (high >= DISTANCES)])
+    for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False)
+]
 
 
 class Way(NamedTuple):
@@ -49,13 +53,14 @@ class Way(NamedTuple):
 
     Attributes:
         cell: (N,) int32, the layout's cell of each cell of the image, or -1.
-        outside: how many of the walked ones have no place in it.
+        inside, outside: how many of the walked ones have a place in it, and how many have none.
         white_px: (2,) the middle of what would be the white cell.
         white: how white that is: its weakest channel, against the ink that has most of it.
         touching: cells beside the white one were walked to.
     """
 
     cell: NDArray[np.int32]
+    inside: int
     outside: int
     white_px: NDArray[np.float64]
     white: float
@@ -71,56 +76,67 @@ def ways_from_white(
         image: (H, W, 3) uint8 BGR, at full scale.
         at: (N, 2) axial coordinates of the cells, up to turns and shifts; ``UNKNOWN`` for those not walked to.
     """
-    known = np.flatnonzero(at[:, 0] != UNKNOWN)
-    basis = _bases(cells.center_px, at, int(np.abs(at[known]).max(initial=0)) + 1)[known]
-    whole = np.isfinite(basis[:, 0, 0])
-    known, basis = known[whole], basis[whole]
+    known, basis = _bases(cells.center_px, at)
     # more cells than the layout has do not fit into it anywhere
     if len(known) == 0 or len(known) - len(lattice.ink) > MAX_OUTSIDE * len(known):
         return []
-    for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False):
-        steps = (low < DISTANCES) & (high >= DISTANCES)
-        far = low >= WHITE_REACHES[0]
-        tables = cells.center_px, cells.area_px, cells.ink, at, known, basis, STEPS[steps], OFFSETS[steps]
-        places, mean, white, votes, seen, inks = _whiteness(image, *tables, far)
-        if low == 0.0 and not _dark(mean, votes):
+    seen = cells.center_px, cells.area_px, cells.ink, at, known, basis
+    for number, ring in enumerate(RINGS):
+        far = number > 0
+        places, mean, white, votes, color, inks = _whiteness(image, *seen, *ring, far)
+        if not far and not _dark(mean, votes):
             return []
-        mean[white < (MIN_FAR if far else MIN_WEAKEST)] = 0.0
-        bright = np.flatnonzero(mean > WHITE_RATIO)
-        bright = bright[np.argsort(-mean[bright], kind="stable")][:MAX_WHITES]
-        black = np.median(seen[votes == votes.max(initial=0)], axis=0)
+        bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
+        if len(bright) == 0:
+            continue
+        black = np.median(color[votes == votes.max()], axis=0)
         found: list[tuple[float, Way]] = []
         for place in bright:
-            moved = np.full_like(at, UNKNOWN)
-            moved[known] = _from_white(at[known], places[place])
-            cell = cells_at(moved, lattice)
-            outside = len(known) - int((cell >= 0).sum())
+            cell, inside = _put(at, known, places[place], lattice.cell_of, lattice.layers)
+            outside = len(known) - inside
             if outside <= MAX_OUTSIDE * len(known):
                 middle = white_cell(image, cells, cell, lattice, inks, black)
                 if middle is not None:
-                    found.append((mean[place], Way(cell, outside, middle, float(white[place]), not far)))
+                    way = Way(cell, inside, outside, middle, float(white[place]), not far)
+                    found.append((mean[place], way))
         if found:
             return [way for brightness, way in found if brightness > SAME_WHITE * found[0][0]]
     return []
 
 
-def _dark(brightness: NDArray[np.float64], votes: NDArray[np.int64]) -> bool:
+@compiled
+def _dark(brightness, votes):  # type: ignore[no-untyped-def]
     """Whether it is dark between the inks, as in the pattern; what lies beside a part of it may be anything."""
-    between = brightness[votes == 3]
-    if len(between) < MIN_BETWEEN:
-        between = brightness
-    return float(np.mean(between < BLACK_RATIO)) >= BLACK_SHARE
+    every = np.count_nonzero(votes == 3) < MIN_BETWEEN
+    between, dark = 0, 0
+    for i in range(votes.shape[0]):
+        if every or votes[i] == 3:
+            between += 1
+            dark += brightness[i] < BLACK_RATIO
+    return between > 0 and dark / between >= BLACK_SHARE
 
 
 @compiled
-def _bases(center, at, reach):  # type: ignore[no-untyped-def]
-    """(N, 2, 2) image step per axial step, by least squares over the six neighbours of each cell."""
+def _brightest(brightness, white, least):  # type: ignore[no-untyped-def]
+    """The places bright enough that are at least so white, at most ``MAX_WHITES``, the brightest first."""
+    bright = np.flatnonzero((brightness > WHITE_RATIO) & (white >= least))
+    return bright[np.argsort(-brightness[bright], kind="mergesort")][:MAX_WHITES]
+
+
+@compiled
+def _bases(center, at):  # type: ignore[no-untyped-def]
+    """(K,) the cells with a place and neighbours that say which way the lattice runs, and (K, 2, 2) how: the image step
+    per axial step, by least squares over the six neighbours of each."""
+    reach, found = 1, 0
+    for i in range(at.shape[0]):
+        if at[i, 0] != UNKNOWN:
+            reach = max(reach, abs(at[i, 0]) + 1, abs(at[i, 1]) + 1)
     side = 2 * reach + 1
     holder = np.full((side, side), -1, np.int32)
     for i in range(center.shape[0]):
         if at[i, 0] != UNKNOWN:
             holder[at[i, 0] + reach, at[i, 1] + reach] = i
-    basis = np.full((center.shape[0], 2, 2), np.nan)
+    known, basis = np.empty(center.shape[0], np.int64), np.empty((center.shape[0], 2, 2))
     for i in range(center.shape[0]):
         if at[i, 0] == UNKNOWN:
             continue
@@ -129,7 +145,7 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
         for k in range(6):
             dq, dr = SIX[k, 0], SIX[k, 1]
             q, r = at[i, 0] + dq + reach, at[i, 1] + dr + reach
-            if q < 0 or r < 0 or q >= side or r >= side or holder[q, r] < 0:
+            if holder[q, r] < 0:
                 continue
             dx = center[holder[q, r], 0] - center[i, 0]
             dy = center[holder[q, r], 1] - center[i, 1]
@@ -142,11 +158,13 @@ def _bases(center, at, reach):  # type: ignore[no-untyped-def]
             yr += dy * dr
         determinant = nqq * nrr - nqr * nqr
         if determinant > 0.5:
-            basis[i, 0, 0] = (xq * nrr - xr * nqr) / determinant
-            basis[i, 0, 1] = (xr * nqq - xq * nqr) / determinant
-            basis[i, 1, 0] = (yq * nrr - yr * nqr) / determinant
-            basis[i, 1, 1] = (yr * nqq - yq * nqr) / determinant
-    return basis
+            basis[found, 0, 0] = (xq * nrr - xr * nqr) / determinant
+            basis[found, 0, 1] = (xr * nqq - xq * nqr) / determinant
+            basis[found, 1, 0] = (yq * nrr - yr * nqr) / determinant
+            basis[found, 1, 1] = (yr * nqq - yq * nqr) / determinant
+            known[found] = i
+            found += 1
+    return known[:found], basis[:found]
 
 
 @compiled
@@ -197,12 +215,14 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             if votes == 0.0:
                 continue
             seen_by[found] = int(votes)
-            x, y, radius, level = sums[q, r, :4] / votes
+            x, y, radius = sums[q, r, 0] / votes, sums[q, r, 1] / votes, sums[q, r, 2] / votes
+            level = sums[q, r, 3] / votes
             places[found, 0], places[found, 1] = q + low_q, r + low_r
             if sample_patch(flat, height, width, x, y, radius, own):
                 brightness = own.sum() / max(level, 1.0)
                 seen[found] = own
-                own /= np.maximum(strongest, 1.0)
+                for channel in range(3):
+                    own[channel] /= max(strongest[channel], 1.0)
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
@@ -210,11 +230,19 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
     return places, ratio, white, seen_by, seen, inks
 
 
-def _from_white(at: NDArray[np.int32], white: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Axial coordinates turned and shifted so that a down-cell becomes (0, 0) with red to its right.
+@compiled
+def _put(at, known, white, cell_of, layers):  # type: ignore[no-untyped-def]
+    """(N,) int32 the layout's cell of each known cell, or -1, where a down-cell at the axial place ``white`` is the
+    white one; and how many have one.
 
     The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
     the right, to the left or above, and a turn by 0, 120 or 240 degrees brings it to the right.
     """
-    turn = int(white[0] - white[1]) % 3
-    return turned((at - white + np.array([turn, 0])).astype(np.int32), turn)
+    turn, inside = (white[0] - white[1]) % 3, 0
+    cell = np.full(at.shape[0], -1, np.int32)
+    for i in known:
+        q, r = turned_place(at[i, 0] - white[0] + turn, at[i, 1] - white[1], turn)
+        if layer_of(q, r) <= layers:
+            cell[i] = cell_of[marker_id(q, r)]
+            inside += cell[i] >= 0
+    return cell, inside

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from pictures import picture
 
 from extractor import parse_layout
-from extractor.color import Segmentation, Target, find_hues, find_target, nominal_hues_deg, segment, to_colors
+from extractor.color import find_hues, hue_weights, nominal_hues_deg, to_colors
 from extractor.image import estimate_noise
 from extractor.regions import GROW_THRESHOLD, find_seeds, grow
+from extractor.segmentation import Segmentation, segment
+from extractor.target import Target, find_target
 
 Image = NDArray[np.uint8]
 NOMINAL_DEG = nominal_hues_deg(dict(small_layout().palette))
@@ -53,21 +55,34 @@ def test_nominal_hues_are_the_palettes() -> None:
 @pytest.mark.parametrize("shift_deg", [-30, -8, -1, 0, 1, 8, 30])
 def test_hues_are_found_where_the_light_puts_them(shift_deg: int) -> None:
     """Red wanders over the wrap at 0; the hues are those of the image, not the palette's."""
-    histogram = np.zeros((180, 256), np.int64)
+    weight = np.zeros(180)
     true_deg = NOMINAL_DEG + shift_deg
     for hue in true_deg:
         for away in range(-3, 4):
-            histogram[round(hue / 2 + away) % 180, 150] += 100 - 20 * abs(away)
-    found = find_hues(histogram, NOMINAL_DEG)
+            weight[round(hue / 2 + away) % 180] += 100 - 20 * abs(away)
+    found = find_hues(weight, NOMINAL_DEG)
     assert found is not None and (found >= 0).all() and (found < 360).all()
     assert hue_distance(found, true_deg).max() <= 1.01
 
 
 def test_without_one_of_the_inks_there_are_no_hues() -> None:
-    histogram = np.zeros((180, 256), np.int64)
-    assert find_hues(histogram, NOMINAL_DEG) is None
-    histogram[[round(hue / 2) % 180 for hue in NOMINAL_DEG[:2]], 150] = 100
-    assert find_hues(histogram, NOMINAL_DEG) is None
+    weight = np.zeros(180)
+    assert find_hues(weight, NOMINAL_DEG) is None
+    weight[[round(hue / 2) % 180 for hue in NOMINAL_DEG[:2]]] = 100
+    assert find_hues(weight, NOMINAL_DEG) is None
+
+
+@pytest.mark.parametrize("strongest", [60, 130, 255])
+def test_hues_weigh_what_is_not_pale(strongest: int) -> None:
+    """All but 2 % of the colored pixels have less chroma than what counts as strong; an eighth of that is pale."""
+    rng = np.random.default_rng(strongest)
+    hue = rng.integers(0, 180, (70, 90)).astype(np.uint8)
+    chroma = rng.integers(0, strongest + 1, hue.shape).astype(np.uint8)
+    colored = np.sort(chroma[chroma >= 12])
+    strong = int(colored[np.ceil(0.98 * len(colored)).astype(int) - 1])
+    kept = chroma >= max(12, strong // 8)
+    expected = np.bincount(hue[kept], chroma[kept], minlength=180)
+    np.testing.assert_array_equal(hue_weights(hue, chroma), expected)
 
 
 @pytest.mark.parametrize("shift_deg", [-12, 0, 12])
@@ -163,6 +178,24 @@ def test_domains_are_4_connected_components(seed: int, height: int, width: int, 
         stats = cv2.connectedComponentsWithStats((label == ink).astype(np.uint8), connectivity=4)[2]
         expected += [(ink, int(area)) for area in stats[1:, cv2.CC_STAT_AREA] if area >= 4]
     assert sorted(zip(seeds.ink.tolist(), seeds.area_px.tolist(), strict=True)) == sorted(expected)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_in_a_crowd_what_is_convex_is_left(seed: int) -> None:
+    """A triangle, which has the least area of all convex shapes for the spread of its pixels, beside a comb."""
+    rng = np.random.default_rng(seed)
+    label = np.zeros((60, 140), np.uint8)
+    angles = rng.uniform(0, 2 * np.pi) + np.cumsum([0, *rng.uniform(1.6, 2.6, 2)])
+    corners = 28 + rng.uniform(8, 25) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    cv2.fillConvexPoly(label, np.rint(corners).astype(np.int32), 1)
+    label[5:8, 70:130] = label[8:50, 70:130:6] = 2
+    label[55, 70:75] = 3  # too small
+    segmentation = segmentation_of(np.zeros((*label.shape, 3), np.uint8), label)
+    assert set(find_seeds(segmentation, crowd=3).ink.tolist()) == {1, 2, 3}
+    seeds = find_seeds(segmentation, crowd=2)
+    assert seeds.crowded and seeds.ink.tolist() == [1]
+    assert seeds.area_px[0] == (label == 1).sum()
 
 
 def plain_growing(

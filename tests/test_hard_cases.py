@@ -35,15 +35,17 @@ from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
-from extractor.color import Segmentation
+from extractor.drawing import Draughtsman
 from extractor.fit import Refined
-from extractor.information import covariances, overlap, solve
+from extractor.information import covariances, solve
+from extractor.meeting import overlap
 from extractor.mesh import build_mesh
 from extractor.neighbourhood import predict
 from extractor.placing import Places
 from extractor.presets import PRESETS
 from extractor.regions import find_seeds, grow
 from extractor.repair import repair
+from extractor.segmentation import Segmentation
 from extractor.tables import lattice_of
 from extractor.topology import topology_of
 from extractor.triangles import fit_triangles
@@ -166,6 +168,32 @@ def test_regions_of_one_pixel_are_clutter() -> None:
     assert sound(extractor().extract(image), seen).mean() > 0.95
 
 
+@pytest.mark.parametrize("pattern", ["honeycomb", "round"])
+def test_a_pattern_amid_colored_noise_is_read(pattern: str) -> None:
+    """Thousands of domains all around, so many that only what looks like a cell is looked at."""
+    seen = render(scene(pattern), size=SIZE)
+    rng = np.random.default_rng(2)
+    image = np.clip(rng.normal(110, 60, (600, 800, 3)), 0, 255).astype(np.uint8)
+    image = cv2.GaussianBlur(image, (0, 0), 0.7)
+    within = cv2.convexHull(np.rint(seen.truth.marker_xy_px).astype(np.int32))
+    mask = cv2.dilate(cv2.fillConvexPoly(np.zeros(SIZE[::-1], np.uint8), within, 1), np.ones((15, 15)))
+    image[: SIZE[1], : SIZE[0]][mask > 0] = seen.image[mask > 0]
+    markers = extractor(pattern).extract(image)
+    assert markers.stages["seeds"].crowded
+    assert sound(markers, seen).all() and rms(markers, seen) < 0.05
+
+
+def test_of_an_image_of_noise_hardly_any_domain_becomes_a_cell() -> None:
+    grain = np.random.default_rng(1).standard_normal((480, 640, 3), dtype=np.float32)
+    grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), 1.0))
+    image = np.clip(127 + 70 * grain / grain.std(), 0, 255).astype(np.uint8)
+    markers = extractor().extract(image)
+    assert not sound(markers).any() and markers.reason is not None
+    assert markers.stages["seeds"].crowded
+    everything = find_seeds(markers.stages["segment"])
+    assert len(markers.stages["cells"].ink) < 0.2 * len(everything.ink)
+
+
 def test_collinear_corners_are_no_triangle() -> None:
     """Regions one pixel wide: the determinant of their covariance is that of the pixel alone, or 0."""
     for mask in (np.eye(64, dtype=bool), np.arange(64)[:, None] == np.full(64, 31), np.zeros((64, 64), bool)):
@@ -199,7 +227,7 @@ def test_gridlines_seen_nearly_parallel(tilt_deg: float) -> None:
 
 def test_two_gridlines_on_one_line_overlap_finitely() -> None:
     for cosine in (1.0, 1.0 - 1e-15, -1.0, -1.0 + 1e-15, 1.0 + 1e-15, -1.0 - 1e-15):
-        assert np.isfinite(overlap(cosine, 20.0, 20.0, 1.0)).all()
+        assert np.isfinite(overlap(cosine, 0.05, 0.05, 1.0)).all()
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -217,7 +245,14 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 
 def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
     return Refined(
-        xy_px, cov_px2, np.ones(len(xy_px), np.bool_), np.zeros(len(xy_px)), 1.0, 2.0, np.empty((0, 0, 3))
+        xy_px,
+        cov_px2,
+        np.ones(len(xy_px), np.bool_),
+        np.zeros(len(xy_px)),
+        1.0,
+        2.0,
+        None,
+        np.empty((0, 0, 3)),
     )
 
 
@@ -240,7 +275,8 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    monkeypatch.setattr(type(double._refine), "_buffer", lambda self, shape: np.zeros(shape))
+    kept: dict[tuple[int, ...], NDArray[np.float64]] = {}
+    monkeypatch.setattr(Draughtsman, "picture", lambda self, shape: kept.setdefault(shape, np.zeros(shape)))
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))

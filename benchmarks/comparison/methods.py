@@ -17,9 +17,11 @@ from benchmarks.article.graph import connect
 from benchmarks.article.numbering import lattice_of, number
 from benchmarks.scenes import BOARD_LAYERS, Case, extractor_of, reference_of
 from extractor import Extractor
-from extractor.color import find_target, nominal_hues_deg, segment, to_colors
+from extractor.color import nominal_hues_deg, to_colors
 from extractor.presets import Preset
 from extractor.regions import find_seeds, grow
+from extractor.segmentation import segment
+from extractor.target import find_target
 
 Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
