@@ -7,16 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import cholesky_solve
-from .bridge import MESHED, PREDICTED, unbridged
+from .bridge import unbridged
 from .cells import Cells
 from .engine import compiled
+from .gradients import gradients
 from .mesh import Mesh
 from .near import bucketed, nearest
 from .numbering import Numbering
-from .parts import connected
 from .tables import Lattice
+from .touch import edge_of, spread, turn_like
+from .types import Origin
 
-ROUNDS = 12
+ROUNDS = 40
+NEAR = 1.7  # what is not farther from a numbered cell, in cells, is numbered together,
+FARTHER = 1.25  # and what is not so much farther than the nearest
 WITNESSES = 20  # numbered cells through which a quadratic map to the layout is laid
 MIN_WITNESSES = 8
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
@@ -32,46 +36,25 @@ TERMS = 6  # 1, x, y, xx, xy, yy
 def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> Numbering:
     """Number what is not connected with the reference by any face of the mesh.
 
-    The numbered cells around must map the cell near a free place of the layout that holds its ink, with little doubt,
-    and no other cell may claim it. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What
-    does not fit across the gap, or across damaged cells by which the mesh hung together, loses its number.
+    Cells that share a corner with a numbered one are its neighbours. For the others, the numbered cells around must map
+    the cell near a free place of the layout that holds its ink, with little doubt, and no other cell may claim it; the
+    nearest come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What does not fit
+    across the gap, or across damaged cells by which the mesh hung together, loses its number.
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    core = _core(mesh.faces, mesh.neighbours, mesh.turn, cells.whole, numbering.cell)
-    meshed = numbering.cell.copy()
-    meshed[unbridged(cells, core, meshed, lattice, MESHED)] = -1
-    cell = meshed
+    by_white = numbering.white_px if numbering.origin is Origin.WHITE else None
+    cell = numbering.cell.copy()
+    cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
     free, candidates = _candidates(cells.ink, cell, lattice.ink)
     if candidates.any():
-        seen = cells.center_px, cells.ink, cells.area_px
-        layout = lattice.center_mm, lattice.ink, lattice.size_mm
-        cell = _attached(*seen, cells.whole, candidates, cell, free, *layout)
-        cell[unbridged(cells, meshed, cell, lattice, PREDICTED)] = -1
+        slope = gradients(cells.center_px, cell, lattice)
+        seen = cells.center_px, cells.corner_px, cells.ink, cells.area_px
+        layout = lattice.center_mm, lattice.ink, lattice.size_mm, lattice.arms_mm, lattice.beside
+        step = 1 if numbering.mirrored else 2
+        cell = _attached(*seen, cells.whole, slope, candidates, cell, free, layout, step)
+        cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
     return replace(numbering, cell=cell)
-
-
-@compiled
-def _core(faces, neighbours, turn, whole, cell):  # type: ignore[no-untyped-def]
-    """The numbers of the cells in the largest part of the mesh that hangs together without damaged ones; else -1.
-
-    Across damaged cells it hangs together by chance.
-    """
-    core, member = np.full(cell.shape[0], -1, np.int32), np.zeros(turn.shape[0], np.bool_)
-    for f in range(turn.shape[0]):
-        member[f] = turn[f] != 0
-        for i in faces[f]:
-            member[f] = member[f] and whole[i] and cell[i] >= 0
-    part = connected(neighbours, member)
-    if not member.any():
-        return core
-    sizes = np.bincount(part[member])
-    largest = sizes.argmax()
-    for f in range(turn.shape[0]):
-        if part[f] == largest:
-            for i in faces[f]:
-                core[i] = cell[i]
-    return core
 
 
 @compiled
@@ -92,18 +75,38 @@ def _candidates(ink, cell, ink_of):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _attached(center_px, ink, area_px, whole, candidates, cell, free, center_mm, ink_of, size_mm):  # type: ignore[no-untyped-def]
+def _attached(center_px, corner_px, ink, area_px, whole, slope, candidates, cell, free, layout, step):  # type: ignore[no-untyped-def]
     """The numbers of the cells with those of the candidates, round by round outward from the numbered ones."""
+    center_mm, ink_of, size_mm, arms_mm, beside = layout
     cell, free = cell.copy(), free.copy()
     loose = np.flatnonzero(candidates)
+    shaped = np.flatnonzero(candidates & whole & np.isfinite(corner_px[:, 0, 0]))
     claim = np.full(loose.shape[0], -1, np.int32)  # the place of the layout that a loose cell would take
-    reach2 = np.full(
-        loose.shape[0], np.inf
-    )  # the squared distance of its farthest witness: a nearer one changes it
+    gap = np.full(loose.shape[0], np.inf)  # how far it is from the next numbered one, in cells
+    # the squared distance of its farthest witness: a nearer one changes it
+    reach2 = np.full(loose.shape[0], np.inf)
     fresh = np.flatnonzero((cell >= 0) & whole)
+    turn, maps = np.full(cell.shape[0], -1, np.int64), np.full((cell.shape[0], 2, 2), np.nan)
+    for i in fresh:
+        turn[i] = turn_like(center_px[i], corner_px[i], arms_mm[cell[i]], step, slope[i], maps[i])
     claims = np.zeros(free.shape[0], np.int32)
     index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
     for _ in range(ROUNDS):
+        touched = spread(
+            center_px,
+            corner_px,
+            area_px,
+            ink,
+            shaped,
+            cell,
+            free,
+            turn,
+            maps,
+            fresh,
+            (center_mm, ink_of, arms_mm, beside),
+            step,
+        )
+        fresh = np.concatenate((fresh, touched))
         known = np.flatnonzero((cell >= 0) & whole)
         if known.shape[0] < MIN_WITNESSES:
             break
@@ -113,22 +116,32 @@ def _attached(center_px, ink, area_px, whole, candidates, cell, free, center_mm,
         for n in range(loose.shape[0]):
             i = loose[n]
             if cell[i] >= 0:
+                claim[n] = -1
                 continue
+            if claim[n] >= 0 and not free[claim[n]]:
+                claim[n] = -1
             if _touched(center_px, i, fresh, reach2[n]):
                 count = nearest(xy, grid, center_px[i, 0], center_px[i, 1], index, square)
                 reach2[n] = square[count - 1] if count == WITNESSES else np.inf
                 near = known[index[:count]]
-                claim[n] = -1
+                claim[n], gap[n] = -1, np.sqrt(square[0]) / edge_of(area_px[near[0]])
                 # far beyond reach, whatever the map
-                if square[0] < 4.0 * REACH**2 * 4.0 / np.sqrt(3.0) * area_px[near[0]]:
+                if gap[n] < 2.0 * REACH:
                     x, y, size = _predicted(center_px, i, near, square, cell, center_mm, size_mm)
                     claim[n] = _nearest_free(x, y, MAX_MISFIT * size, ink[i], center_mm, ink_of, free)
             if claim[n] >= 0:
                 claims[claim[n]] += 1
-        fresh = _numbered(loose, claim, claims, cell, free)
+        fresh = _numbered(loose, claim, gap, claims, cell, free)
         if fresh.shape[0] == 0:
             break
         fresh = fresh[whole[fresh]]
+        for i in fresh:
+            count = nearest(xy, grid, center_px[i, 0], center_px[i, 1], index, square)
+            for k in range(count):
+                j = known[index[k]]
+                if turn[j] >= 0:
+                    turn[i] = turn_like(center_px[i], corner_px[i], arms_mm[cell[i]], step, maps[j], maps[i])
+                    break
     return cell
 
 
@@ -142,19 +155,20 @@ def _touched(center_px, i, fresh, reach2):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _numbered(loose, claim, claims, cell, free):  # type: ignore[no-untyped-def]
-    """Number the loose cells that alone claim a place, in place; the cells that were."""
+def _numbered(loose, claim, gap, claims, cell, free):  # type: ignore[no-untyped-def]
+    """Number the nearest of the loose cells that alone claim a place, in place; the cells that were."""
+    limit = np.inf
+    for n in range(loose.shape[0]):
+        if claim[n] >= 0 and claims[claim[n]] == 1:
+            limit = min(limit, gap[n])
+    limit = max(NEAR, FARTHER * limit)
     fresh, count = np.empty(loose.shape[0], np.int64), 0
     for n in range(loose.shape[0]):
-        i, place = loose[n], claim[n]
-        if cell[i] < 0 and place >= 0 and claims[place] == 1:
-            cell[i] = place
-            free[place] = False
-            fresh[count] = i
+        if claim[n] >= 0 and claims[claim[n]] == 1 and gap[n] <= limit:
+            cell[loose[n]] = claim[n]
+            free[claim[n]] = False
+            fresh[count] = loose[n]
             count += 1
-    for n in range(loose.shape[0]):
-        if claim[n] >= 0 and not free[claim[n]]:
-            claim[n] = -1
     return fresh[:count]
 
 

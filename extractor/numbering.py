@@ -61,12 +61,13 @@ class Numbering:
 
 class _Candidate(NamedTuple):
     """A numbering with what speaks for it: cells inside the layout, those less what speaks against it, how white the
-    white cell is, and which part of the mesh it is."""
+    white cell is, which part of the mesh it is, and whether that touches the white cell."""
 
     inside: int
     score: int
     white: float
     part: int
+    touching: bool
     numbering: Numbering
 
 
@@ -188,7 +189,8 @@ def _settled(found: list[_Candidate], least: float, apart_px: float) -> _Candida
     elsewhere is nearly as good."""
     white = WHITER * max((one.white for one in found), default=0.0)
     found = [one for one in found if one.white >= white]
-    best = max((one for one in found if one.inside >= least), key=lambda one: one.score, default=None)
+    large = [one for one in found if one.inside >= least]
+    best = max(large, key=lambda one: (one.touching, one.score), default=None)
     if best is None:
         return None
     middle = best.numbering.white_px
@@ -220,9 +222,8 @@ def _least_cells(cells: Cells, mesh: Mesh, lattice: Lattice) -> float:
 
 def _candidate(way: Way, front: int, conflicts: int, part: int) -> _Candidate:
     score = way.inside - 3 * way.outside - conflicts
-    return _Candidate(
-        way.inside, score, way.white, part, Numbering(way.cell, front < 0, way.white_px, conflicts)
-    )
+    numbering = Numbering(way.cell, front < 0, way.white_px, conflicts)
+    return _Candidate(way.inside, score, way.white, part, way.touching, numbering)
 
 
 def _with_outline(
@@ -237,4 +238,4 @@ def _with_outline(
     cell[known] = settled
     inside, middle = int((settled >= 0).sum()), cells.center_px[known].mean(axis=0)
     numbering = Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE)
-    return _Candidate(inside, inside, 0.0, 0, numbering)
+    return _Candidate(inside, inside, 0.0, 0, False, numbering)

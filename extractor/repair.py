@@ -7,7 +7,7 @@ sextant, read at equidistant places. What neither can tell within a tenth of an 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where th
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
+MAX_AGREED_ALONE = 0.14  # in edges, where two triangles agree and the drawing explains nothing
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
 IMPLIED_SIGMA = 0.02  # in edges
@@ -35,6 +36,7 @@ BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
+MAX_FITTED_SIGMA = 0.05  # the same of a fitted one: a layer's quadratic is wrong where the surface is bent
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
@@ -69,12 +71,15 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
+    places = replace(places, edge_px=_edges(xy, lattice.ring, places.edge_px, places.agreed))
     edge_px, believed = places.edge_px, refined.explained | places.agreed
+    near = edge_px * np.where(refined.explained, MAX_DEVIATION, MAX_AGREED_ALONE * places.agreed)
     slide = cov, refined.free_px, places.xy_px, edge_px, lattice.rim
     rings = lattice.ring_weights, lattice.neighbours
-    if _sound(xy, believed, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
+    if _sound(xy, near, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
         return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
-    _drop_outliers(xy, cov, edge_px, believed, places.whole, *rings, lattice.marker_mm)
+    kinds = believed, refined.explained, places.whole
+    _drop_outliers(xy, cov, edge_px, near, kinds, *rings, lattice.marker_mm)
     _drop_frayed(xy, cov, places, lattice)
     _drop_slid(xy, cov, _slid(xy, *slide), places, lattice)
     tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
@@ -84,7 +89,23 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
 
 
 @compiled
-def _sound(xy, believed, slide, rings, inner_rings, present, size):  # type: ignore[no-untyped-def]
+def _edges(xy, ring, edge, agreed):  # type: ignore[no-untyped-def]
+    """(M,) the edges at each marker; where no triangles agree, the way to the nearest of its known neighbours, if that
+    is shorter: a share of a longer edge may reach half-way to another marker."""
+    out = edge.copy()
+    for m in range(xy.shape[0]):
+        if agreed[m]:
+            continue
+        for n in ring[m]:
+            if n >= 0:
+                apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
+                if apart < out[m]:
+                    out[m] = apart
+    return out
+
+
+@compiled
+def _sound(xy, near, slide, rings, inner_rings, present, size):  # type: ignore[no-untyped-def]
     """Whether every marker of the pattern is known and none of the rules below could drop it: as a rule, all are."""
     cov, free, start, edge, rim = slide
     weights, table = rings
@@ -97,7 +118,7 @@ def _sound(xy, believed, slide, rings, inner_rings, present, size):  # type: ign
             continue
         if not _inside(x, y, size):
             return False
-        if strays(xy, m, MAX_DEVIATION * edge[m] if believed[m] else 0.0, weights, table):
+        if strays(xy, m, near[m], weights, table):
             return False
         if inner[m, 0] >= 0 and strays(xy, m, FRAYED[0] * edge[m], inner_weights, inner):
             return False
@@ -113,13 +134,13 @@ def _inside(x, y, size):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _drop_outliers(xy, cov, edge, believed, whole, weights, table, marker_mm):  # type: ignore[no-untyped-def]
+def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # type: ignore[no-untyped-def]
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
 
     What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
     lie farther off.
     """
-    near = np.where(believed, MAX_DEVIATION * edge, 0.0)
+    believed, explained, whole = kinds
     excess, stale = np.zeros(edge.shape[0]), np.ones(edge.shape[0], np.bool_)
     for _ in range(ROUNDS):
         # only what may be too far is looked at closely, and again where a neighbour has been dropped
@@ -129,18 +150,20 @@ def _drop_outliers(xy, cov, edge, believed, whole, weights, table, marker_mm):  
             excess[m] = 0.0
             if not doubtful[m]:
                 continue
+            sigma = np.sqrt(variance[m] * (1 + leverage[m]))
             allowed = MAX_DEVIATION
             if whole[m]:
                 allowed = MAX_AGREED
             elif not believed[m]:
                 allowed = MAX_UNEXPLAINED
+            elif not explained[m]:
+                allowed = MAX_AGREED_ALONE
             elif support[m] >= MILD_SUPPORT:
-                sigma = np.sqrt(variance[m] * (1 + leverage[m]))
                 allowed = clamp(SIGMAS * sigma / edge[m], MAX_DEVIATION, MAX_TOLERANCE)
             apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
             if np.isfinite(apart / (edge[m] * allowed)):
                 excess[m] = apart / (edge[m] * allowed)
-            if not (believed[m] or np.isfinite(place[m, 0])):
+            if not (believed[m] or sigma < MAX_UNEXPLAINED * edge[m]):  # they do not know themselves
                 excess[m] = np.inf
         worst = np.flatnonzero(excess > 1.0)
         if worst.shape[0] == 0:
@@ -192,6 +215,11 @@ def _drop_slid(
     if not slid.any():
         return
     expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
+    # at the corners of the rim two rings hold fewer than a quadratic takes, but the layers inside do not
+    few = slid & (support < MIN_QUADRATIC)
+    if few.any():
+        inside, _, _, enough = predict(xy, few, lattice.marker_mm, lattice.inner)
+        expected[few], support[few] = inside[few], enough[few]
     after, before = (np.hypot(*(start - expected).T) for start in (xy, places.xy_px))
     with np.errstate(invalid="ignore"):
         near, known = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
@@ -255,7 +283,7 @@ def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size)
                 variance = _by_cells(m, near, implied, edge[m], size)
                 if variance >= 0.0 and _inside(implied[m, 0], implied[m, 1], size):
                     xy[m], status[m] = implied[m], REPAIRED
-                elif doubt[m] + (3 * MODEL_SIGMA * edge[m]) ** 2 < (MAX_SIGMA * edge[m]) ** 2:
+                elif doubt[m] + (3 * MODEL_SIGMA * edge[m]) ** 2 < (MAX_FITTED_SIGMA * edge[m]) ** 2:
                     variance = HEAVY_ERROR * doubt[m] + (MODEL_SIGMA * edge[m]) ** 2
                     xy[m], status[m] = along[m], FITTED
             cov[m] = variance * np.eye(2)

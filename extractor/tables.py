@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
-from .lattice import axial, layer_of, marker_id
+from .lattice import SIX, axial, layer_of, marker_id
 from .neighbourhood import INNER, inner_table, neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
@@ -59,6 +59,12 @@ class Lattice:
         corners = self.marker_mm[self.corner_ids]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(sides.mean(axis=1))
+
+    @cached_property
+    def beside(self) -> NDArray[np.int32]:
+        """(U, 6) int32 the colored cells that share a corner with each, in the order of ``SIX``; -1 for none."""
+        at = self.axial[:, None] + SIX
+        return cells_at(at.reshape(-1, 2), self).reshape(-1, 6)
 
     @cached_property
     def meeting(self) -> NDArray[np.int64]:

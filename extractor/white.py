@@ -1,7 +1,8 @@
 """Where the white cell stands: it fixes the turn and the origin of a numbering that is right up to these.
 
 The white cell is a down-cell, one of those that are black elsewhere. So it is looked for where down-cells must be, in
-the middle between three numbered cells first, and farther off only when it is not found there.
+the middle between three numbered cells first, and farther off only when it is not found there. It fills its triangle
+and ends with it, which hardly any dirt or reflection on a black cell does.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from .engine import compiled
 from .lattice import SIX, layer_of, marker_id, turned_place
 from .sampling import sample_patch
 from .tables import UNKNOWN, Lattice
+from .whitecell import white_cell
 
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a half even in heavy blur; the white of a dim print is still brighter than any ink.
@@ -29,7 +31,8 @@ SAME_WHITE = 0.6  # of the brightest; a squeezed black cell that blur has filled
 # color is. The weakest channel so, and against the strongest.
 MIN_WEAKEST = 0.5
 MIN_BALANCE = 0.4
-MAX_WHITES = 8
+MAX_WHITES = 16
+MIN_FAR = 0.75  # the weakest channel, where no walked cell touches it
 MAX_OUTSIDE = 0.02  # of a part's cells, where it is put into the layout
 # The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
 STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
@@ -53,6 +56,7 @@ class Way(NamedTuple):
         inside, outside: how many of the walked ones have a place in it, and how many have none.
         white_px: (2,) the middle of what would be the white cell.
         white: how white that is: its weakest channel, against the ink that has most of it.
+        touching: cells beside the white one were walked to.
     """
 
     cell: NDArray[np.int32]
@@ -60,6 +64,7 @@ class Way(NamedTuple):
     outside: int
     white_px: NDArray[np.float64]
     white: float
+    touching: bool
 
 
 def ways_from_white(
@@ -77,21 +82,26 @@ def ways_from_white(
         return []
     seen = cells.center_px, cells.area_px, cells.ink, at, known, basis
     for number, ring in enumerate(RINGS):
-        places, where, mean, white, votes = _whiteness(image, *seen, *ring, number > 0)
-        if number == 0 and not _dark(mean, votes):
+        far = number > 0
+        places, mean, white, votes, color, inks = _whiteness(image, *seen, *ring, far)
+        if not far and not _dark(mean, votes):
             return []
-        bright = _brightest(mean, white)
-        if len(bright):
-            break
-    else:
-        return []
-    found = []
-    for place in bright:
-        cell, inside = _put(at, known, places[place], lattice.cell_of, lattice.layers)
-        outside = len(known) - inside
-        if outside <= MAX_OUTSIDE * len(known):
-            found.append(Way(cell, inside, outside, where[place], float(white[place])))
-    return found
+        bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
+        if len(bright) == 0:
+            continue
+        black = np.median(color[votes == votes.max()], axis=0)
+        found: list[tuple[float, Way]] = []
+        for place in bright:
+            cell, inside = _put(at, known, places[place], lattice.cell_of, lattice.layers)
+            outside = len(known) - inside
+            if outside <= MAX_OUTSIDE * len(known):
+                middle = white_cell(image, cells, cell, lattice, inks, black)
+                if middle is not None:
+                    way = Way(cell, inside, outside, middle, float(white[place]), not far)
+                    found.append((mean[place], way))
+        if found:
+            return [way for brightness, way in found if brightness > SAME_WHITE * found[0][0]]
+    return []
 
 
 @compiled
@@ -107,14 +117,9 @@ def _dark(brightness, votes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _brightest(brightness, white):  # type: ignore[no-untyped-def]
-    """The places nearly as bright as the brightest that are white, at most ``MAX_WHITES``, the brightest first; none
-    where it is not bright enough."""
-    brightness = np.where(white < MIN_WEAKEST, 0.0, brightness)
-    brightest = brightness.max() if brightness.shape[0] > 0 else 0.0
-    if not brightest > WHITE_RATIO:
-        return np.empty(0, np.int64)
-    bright = np.flatnonzero(brightness > SAME_WHITE * brightest)
+def _brightest(brightness, white, least):  # type: ignore[no-untyped-def]
+    """The places bright enough that are at least so white, at most ``MAX_WHITES``, the brightest first."""
+    bright = np.flatnonzero((brightness > WHITE_RATIO) & (white >= least))
     return bright[np.argsort(-brightness[bright], kind="mergesort")][:MAX_WHITES]
 
 
@@ -164,8 +169,8 @@ def _bases(center, at):  # type: ignore[no-untyped-def]
 
 @compiled
 def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """The down-cells at these steps from numbered cells: axial places, (D, 2) px, brightness against the inks, how
-    white, 0 where it is colored, and how many cells tell.
+    """The down-cells at these steps from numbered cells: axial places, brightness against the inks, how white, 0 where
+    it is colored, how many cells tell, (D, 3) their colors; and (4, 3) those of the inks, 0 where there is none.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
@@ -194,12 +199,14 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             cell[2] += radius
             cell[3] += own.sum()
             cell[4] += 1.0
+    inks = np.zeros((4, 3))
     for channel in range(3):
         for c in range(1, 4):
             if count[c] > 0:
-                strongest[channel] = max(strongest[channel], np.median(colors[c, : count[c], channel]))
+                inks[c, channel] = np.median(colors[c, : count[c], channel])
+                strongest[channel] = max(strongest[channel], inks[c, channel])
     found = int((sums[:, :, 4] > 0.0).sum())
-    places, where = np.empty((found, 2), np.int32), np.empty((found, 2))
+    places, seen = np.empty((found, 2), np.int32), np.zeros((found, 3))
     ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
     found = 0
     for q in range(rows):
@@ -211,16 +218,16 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
             x, y, radius = sums[q, r, 0] / votes, sums[q, r, 1] / votes, sums[q, r, 2] / votes
             level = sums[q, r, 3] / votes
             places[found, 0], places[found, 1] = q + low_q, r + low_r
-            where[found, 0], where[found, 1] = x, y
             if sample_patch(flat, height, width, x, y, radius, own):
                 brightness = own.sum() / max(level, 1.0)
+                seen[found] = own
                 for channel in range(3):
                     own[channel] /= max(strongest[channel], 1.0)
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
             found += 1
-    return places, where, ratio, white, seen_by
+    return places, ratio, white, seen_by, seen, inks
 
 
 @compiled

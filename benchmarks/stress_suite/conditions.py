@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from benchmarks.stress_suite.around import AROUND
 from benchmarks.stress_suite.damage import DIRTY, MISSING, NO_WHITE
+from benchmarks.stress_suite.drawn import DRAWN
 from benchmarks.stress_suite.empty import EMPTY
 from benchmarks.stress_suite.frames import PATTERNS, Frame
 from benchmarks.stress_suite.imaging import IMAGING, LIGHT
 from benchmarks.stress_suite.kinds import Case, Kind, frame_of
 from benchmarks.stress_suite.view import SURFACE, VIEW
 
-KINDS = (*IMAGING, *LIGHT, *VIEW, *SURFACE, *MISSING, *DIRTY, *NO_WHITE, *AROUND, *EMPTY)
+KINDS = (*IMAGING, *LIGHT, *VIEW, *SURFACE, *MISSING, *DIRTY, *NO_WHITE, *DRAWN, *AROUND, *EMPTY)
 BY_NAME: dict[str, Kind] = {kind.name: kind for kind in KINDS}
 LARGE_PX = 3_000_000
 

@@ -40,10 +40,12 @@ def clusters(frame: Frame, share: float) -> Frame:
     """Groups of neighbours fall out until the share is reached."""
     free, centre = droppable(frame.layout), centres(frame.layout)
     gone: set[int] = set()
+    order, turn = frame.rng.permuted(free), 0
     while len(gone) < share * len(free):
-        middle = centre[frame.rng.permuted(free)[len(gone)]]
+        middle = centre[order[turn]]
         distance = np.linalg.norm(centre[free] - middle, axis=1)
         gone.update(int(cell) for cell in free[np.argsort(distance)[:CLUSTER]])
+        turn = max(turn + 1, len(gone))  # a group may have been gone before
     return without(frame, np.array(sorted(gone)))
 
 

@@ -1,0 +1,183 @@
+"""Whether a bright place is the white cell: it is white all over, nowhere beyond, and lies between its own inks.
+
+Where it must be, and how large, the numbered cells say, by a quadratic map of the layout to the image. A scratch across
+a black cell, where two scratches cross, a drop or a reflection do not look so, nor does the white cell a step aside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .algebra import cholesky_solve, dot
+from .cells import Cells
+from .engine import compiled
+from .sampling import sample_patch
+from .tables import Lattice
+
+WITNESSES = 16  # numbered cells, the nearest, that say where it is
+MIN_WITNESSES = 5
+RIDGE = 0.02  # holds the map's curvature where the witnesses lie on one side
+MAX_SIGMA = 0.15  # of the map there, in edges
+MAX_ASIDE = 0.3  # in edges, of the white's centroid from where the map puts it; the next black cell is at 1
+# The shape, from 0 for the paler one of ink and black to 1 for the middle.
+MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE = 0.5, 0.25, 0.5
+SAME_INK = 0.9  # cosine between a color and an ink, both above black
+FAINT = 0.3  # of an ink's strength above black: black, where its cell is missing
+TERMS = 6  # 1, x, y, xx, xy, yy
+# The corners of a down-cell from its middle, in axial steps: below, right above and left above.
+CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
+MARKERS = [0, 2, 1]  # at them
+INKS = np.array([2, 3, 1])  # of the cells opposite to them
+# In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
+INSIDE = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
+SIDES = [
+    one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
+]
+OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(SIDES) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]])
+GRID, GRID_REACH = 4, 0.8  # places over which the centroid is taken
+
+
+def white_cell(
+    image: NDArray[np.uint8],
+    cells: Cells,
+    cell: NDArray[np.int32],
+    lattice: Lattice,
+    inks: NDArray[np.float64],
+    black: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """(2,) px the middle of the white cell, where these numbers put it; None where it is not.
+
+    Args:
+        cell: (N,) the layout's cell of each cell of the image, or -1.
+        inks: (4, 3) the colors of red, green and blue from row 1 on. black: (3,) the color between them.
+    """
+    known = np.flatnonzero(cell >= 0)
+    corners = lattice.marker_mm[MARKERS]
+    middle = corners.mean(axis=0)
+    # from axial steps to mm, for this cell
+    to_mm = (corners[:2] - middle).T @ np.linalg.inv(CORNERS[:2].T)
+    where, slope = _map_at(cells.center_px[known], lattice.center_mm[cell[known]] - middle, to_mm)
+    if np.isnan(where[0]):
+        return None
+    found: NDArray[np.float64] = _middle(image, where, slope @ to_mm, inks, black)
+    return None if np.isnan(found[0]) else found
+
+
+@compiled
+def _map_at(center_px, place_mm, to_mm):  # type: ignore[no-untyped-def]
+    """Where the map of the layout to the image through the cells nearest to the origin puts this, (2,) px, NaN where
+    that is doubtful; and (2, 2) px per mm there."""
+    squares = (place_mm**2).sum(axis=1)
+    near = np.argsort(squares)[:WITNESSES]
+    nowhere = np.full(2, np.nan), np.full((2, 2), np.nan)
+    count = near.shape[0]
+    if count < MIN_WITNESSES:
+        return nowhere
+    scale2 = squares[near].mean()
+    scale = np.sqrt(scale2)
+    rows, weight = np.empty((count, TERMS)), np.empty(count)
+    normal, right = np.zeros((TERMS, TERMS)), np.zeros((3, TERMS))
+    right[2, 0] = 1.0
+    about = center_px[near[0]].copy()
+    for k in range(count):
+        x, y = place_mm[near[k], 0] / scale, place_mm[near[k], 1] / scale
+        rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
+        rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
+        weight[k] = 1.0 / (0.3 + x * x + y * y)
+        for a in range(TERMS):
+            for axis in range(2):
+                right[axis, a] += weight[k] * rows[k, a] * (center_px[near[k], axis] - about[axis])
+            for b in range(a + 1):
+                normal[a, b] += weight[k] * rows[k, a] * rows[k, b]
+    total = weight.sum()
+    for a in range(3, TERMS):
+        normal[a, a] += RIDGE * total
+    cholesky_solve(normal, right, TERMS)
+    if not normal[2, 2] ** 2 > 1e-4 * total:
+        return nowhere
+    left = 0.0
+    for k in range(count):
+        for axis in range(2):
+            left += weight[k] * (center_px[near[k], axis] - about[axis] - (rows[k] * right[axis]).sum()) ** 2
+    slope = right[:2, 1:3] / scale
+    axial = slope @ to_mm
+    edge2 = abs(axial[0, 0] * axial[1, 1] - axial[0, 1] * axial[1, 0]) * 2.0 / np.sqrt(3.0)
+    if not left / (2.0 * total) * (1.0 + right[2, 0] * total / count) < MAX_SIGMA**2 * edge2:
+        return nowhere
+    return about + right[:2, 0], slope
+
+
+@compiled
+def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
+    """(2,) px the centroid of the white cell expected here, (2, 2) px per axial step; NaN where there is none."""
+    strongest, nowhere = np.ones(3), np.full(2, np.nan)
+    for channel in range(3):
+        strongest[channel] = max(inks[:, channel].max(), 1.0)
+    ground = (black / strongest).min()  # the whiteness of black, or of the palest ink
+    for c in range(1, 4):
+        ground = max(ground, (inks[c] / strongest).min())
+    u, v = _centroid(image, where, slope, ground, strongest)
+    if not u * u + u * v + v * v <= MAX_ASIDE**2:
+        return nowhere
+    middle = where + slope @ np.array([u, v])
+    if _fills(image, middle, slope, ground, strongest) and _amid_inks(image, middle, slope, inks, black):
+        return middle
+    return nowhere
+
+
+@compiled
+def _sampled(image, middle, slope, u, v, out):  # type: ignore[no-untyped-def]
+    """Write the mean color around this axial way from the middle; False outside the image."""
+    radius = 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
+    px = middle[0] + slope[0, 0] * u + slope[0, 1] * v
+    py = middle[1] + slope[1, 0] * u + slope[1, 1] * v
+    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, radius, out)
+
+
+@compiled
+def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
+    """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
+    total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
+    for a in range(-GRID, GRID + 1):
+        for b in range(-GRID, GRID + 1):
+            u, v = GRID_REACH * a / GRID, GRID_REACH * b / GRID
+            if abs(a + b) <= GRID and _sampled(image, where, slope, u, v, own):
+                weight = max((own / strongest).min() - ground, 0.0)
+                total, q, r = total + weight, q + weight * u, r + weight * v
+    return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
+
+
+@compiled
+def _fills(image, middle, slope, ground, strongest):  # type: ignore[no-untyped-def]
+    """Whether it is white all over the cell and nowhere around it; outside the image nothing is."""
+    own = np.empty(3)
+    if not _sampled(image, middle, slope, 0.0, 0.0, own):
+        return False
+    reach = max((own / strongest).min() - ground, 1e-3)
+    for n in range(INSIDE.shape[0]):
+        if not _sampled(image, middle, slope, INSIDE[n, 0], INSIDE[n, 1], own):
+            return False
+        least = MIN_CORNER if n < CORNERS.shape[0] else MIN_INSIDE
+        if (own / strongest).min() - ground < least * reach:
+            return False
+    for n in range(OUTSIDE.shape[0]):
+        seen = _sampled(image, middle, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
+        if seen and (own / strongest).min() - ground > MAX_OUTSIDE * reach:
+            return False
+    return True
+
+
+@compiled
+def _amid_inks(image, middle, slope, inks, black):  # type: ignore[no-untyped-def]
+    """Whether the three cells beside it show their inks, or black where one is missing."""
+    own = np.empty(3)
+    for k in range(3):
+        if not _sampled(image, middle, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):
+            continue
+        ink = inks[INKS[k]] - black
+        own -= black
+        strength, size = dot(ink, ink), np.sqrt(dot(own, own))
+        if size > FAINT * np.sqrt(strength) and dot(own, ink) < SAME_INK * size * np.sqrt(strength):
+            return False
+    return True

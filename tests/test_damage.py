@@ -1,0 +1,109 @@
+"""Random damage on random surfaces: no marker is wrong, and the benchmark of it counts and names what is."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.damage import Read, alone, case_of, drawn, main, name_of, table, taken_for_others, totals
+from benchmarks.stress_suite.conditions import BY_NAME
+from benchmarks.stress_suite.drawn import DRAWN
+from benchmarks.stress_suite.frames import PATTERNS, Frame, plain
+from benchmarks.stress_suite.kinds import frame_of
+from benchmarks.stress_suite.reading import extractor_of, read
+
+IMAGES, SEED = 42, 300  # every kind in every pattern, twice
+
+
+def test_no_marker_is_wrong() -> None:
+    wrong, kept, sure = [], 0, 0
+    for case in drawn(IMAGES, SEED):
+        result = read(case, 1, timing=False)[0]
+        assert not result.raised, name_of(case)
+        if result.score.wrong:
+            wrong.append((name_of(case), result.score.wrong))
+        if not result.reason:
+            kept, sure = kept + result.score.kept, sure + result.score.sure
+    assert wrong == []
+    assert kept >= 0.97 * sure > 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "random clusters missing/round/5033",  # the white cell seen from beyond a hole, a cell aside
+        "random scratches/elliptical/5098",  # seen by two parts of the mesh that disagree
+        "random damage/round/5790",  # hidden, and a reflection on a black cell
+        "random fragments/elliptical/6611",  # hidden, and two scratches that cross on a black cell
+        "random blobs/round/6143",  # a block behind damaged cells, linked with the rest by chance
+        "random blobs/elliptical/5352",  # the same, the rest of it linked well
+        "random scratches/honeycomb/6659",  # a block beyond a scratch, numbered one step aside
+        "random cells missing/elliptical/100039",  # errors that grew from map to map
+    ],
+)
+def test_what_has_been_read_wrong_once(name: str) -> None:
+    result = read(case_of(name), 1, timing=False)[0]
+    assert result.score.wrong == 0 and not result.raised
+
+
+def test_drawn_cases_are_all_kinds_in_all_patterns_and_the_same_again() -> None:
+    cases = drawn(IMAGES, SEED)
+    assert {(case.kind, case.pattern) for case in cases} == {(k.name, p) for k in DRAWN for p in PATTERNS}
+    assert len({case.seed for case in cases}) == IMAGES
+    case = cases[20]
+    kind = BY_NAME[case.kind]
+    first, again = frame_of(case, kind), frame_of(case, kind)
+    other = kind.change(plain(case.pattern, case.seed + 1), 0)
+    assert isinstance(first, Frame) and isinstance(again, Frame) and isinstance(other, Frame)
+    assert first.scene.damage == again.scene.damage != other.scene.damage
+    np.testing.assert_array_equal(first.shoot().image, again.shoot().image)
+
+
+def test_names_lead_back_to_their_images() -> None:
+    for case in drawn(21, 7):
+        assert case_of(name_of(case)) == case
+    for name in ("blur/round/3", "random blobs/square/3", "random blobs/round/x", "random blobs"):
+        with pytest.raises(ValueError, match="no image is named"):
+            case_of(name)
+
+
+def test_markers_taken_for_others_are_told_from_moved_ones() -> None:
+    shot = plain("honeycomb", 0).shoot()
+    found = extractor_of("honeycomb", 11).extract(shot.image)
+    true_px = shot.truths[0].marker_xy_px.copy()
+    assert taken_for_others(shot, replace(found, xy_px=true_px)) == 0
+    moved = true_px.copy()
+    moved[5] += [8.0, 0.0]  # of 20
+    assert taken_for_others(shot, replace(found, xy_px=moved)) == 0
+    moved[[7, 8]] = moved[[8, 7]]
+    assert taken_for_others(shot, replace(found, xy_px=moved)) == 2
+
+
+def test_totals_name_the_images_with_wrong_markers() -> None:
+    case = drawn(1, 11)[0]
+    result = read(case, 1, timing=False)[0]
+    bad = replace(result, score=replace(result.score, wrong=3))
+    rows = totals([Read(result, 0), Read(bad, 2)])
+    assert [row.kind for row in rows] == [case.kind, "together"]
+    assert (rows[-1].images, rows[-1].wrong, rows[-1].others) == (2, 3, 2)
+    assert rows[-1].kept == 2 * result.score.kept
+    assert f"WRONG    3  {name_of(case)}" in table(rows)
+    silent = replace(result, reason="reference_lost")
+    assert totals([Read(silent, 0)])[-1].unread == 1 and totals([Read(silent, 0)])[-1].sure == 0
+
+
+def test_a_run_prints_and_writes_and_one_image_is_saved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "rows.json"
+    assert main(["--images", "3", "--seed", "300", "--processes", "1", "--json", str(out)]) == 0
+    assert "3 images, seeds 300 to 302" in capsys.readouterr().out
+    assert [row["images"] for row in json.loads(out.read_text())] == [1, 1, 1, 3]
+    assert alone(case_of("random scratches/honeycomb/300"), tmp_path).score.wrong == 0
+    assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png"}
+    with pytest.raises(SystemExit):
+        main(["--only", "nothing"])
