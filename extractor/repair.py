@@ -24,6 +24,7 @@ from .types import Status
 ROUNDS = 40  # at most; each drops the worst of every neighbourhood, until none is left
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
+MAX_FRAYED = 0.35  # of the shortest edge there, in any case
 FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
 MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
 VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
@@ -195,7 +196,8 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
             # the worse a quadratic fits the layers inside, the less it tells beyond them
             allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
             apart = np.hypot(*(xy - place).T)
-            bad = (apart > allowed * edge) & (support >= MIN_QUADRATIC)
+            shortest = _edges(xy, lattice.ring, edge, np.zeros(len(edge), np.bool_))
+            bad = (apart > np.minimum(allowed * edge, MAX_FRAYED * shortest)) & (support >= MIN_QUADRATIC)
         xy[bad], cov[bad] = np.nan, np.nan
 
 

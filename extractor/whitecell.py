@@ -16,7 +16,7 @@ from .sampling import sample_patch
 from .tables import Lattice
 
 WITNESSES = 16  # numbered cells, the nearest, that say where it is
-MIN_WITNESSES = 5
+MIN_WITNESSES = 3
 RIDGE = 0.02  # holds the map's curvature where the witnesses lie on one side
 MAX_SIGMA = 0.15  # of the map there, in edges
 MAX_ASIDE = 0.3  # in edges, of the white's centroid from where the map puts it; the next black cell is at 1

@@ -1,4 +1,4 @@
-"""The white cell is a cell: what is as white on a black one, but is no triangle of its size there, is not taken for it."""
+"""The white cell is a cell: what is as white on a black one, but no triangle of its size, is not taken for it."""
 
 from __future__ import annotations
 
