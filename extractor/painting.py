@@ -176,7 +176,9 @@ def _more_sides(sides, count, opening, pixels, corners, out):  # type: ignore[no
             continue
         share = np.float32(1.0)
         for side in range(3):
-            share += np.float32(opening[side]) + corners[BEFORE + laid] - normal(sides[side * OF_SIDE + D + k])
+            share += (
+                np.float32(opening[side]) + corners[BEFORE + laid] - normal(sides[side * OF_SIDE + D + k])
+            )
             laid += 1
         out[SHARE + k] = max(share, np.float32(0.0))
 
@@ -201,7 +203,22 @@ def _add(flat, at, first, count, shares, level, slope):  # type: ignore[no-untyp
 
 @compiled
 def _fill(  # type: ignore[no-untyped-def]
-    flat, width, runs, filled, count, level, slope, center, side, far, opening, places, sides, shares, pixels, corners
+    flat,
+    width,
+    runs,
+    filled,
+    count,
+    level,
+    slope,
+    center,
+    side,
+    far,
+    opening,
+    places,
+    sides,
+    shares,
+    pixels,
+    corners,
 ):
     """Add the pixels laid out in ``places``: ``runs`` (n, 3) x, y and number of pixels in a row of the image."""
     padded = (count + LANES - 1) // LANES * LANES
