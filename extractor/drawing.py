@@ -16,21 +16,28 @@ from numpy.typing import NDArray
 from .bending import hidden_misfit
 from .engine import compiled
 from .fit import Fit
-from .gridlines import KNOWN
-from .levels import Levels, black_at, cell_means, smooth_levels
+from .gridlines import KNOWN, LENGTH
+from .levels import Levels, black_at, cell_means, level_change, smooth_levels
 from .offsets import Reading, foot_of
+from .painting import draw_cells
 from .presets import Steps
 from .sight import Frame, Sight
 from .step import Judged, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import box_of, middles, trust, votes, widening
-from .synthesis import clear, draw_cells, edge_contrasts, read_gridlines
+from .synthesis import clear, edge_contrasts, read_gridlines
 from .topology import Topology
 
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
-SAME_LEVELS = 0.015  # likewise, of the levels
+NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
+SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle together, which takes
+WIDE_EFFORT = 2.0  # times the effort
+SAME_LEVELS = 0.006  # likewise, of the levels
+LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
+USUAL_EDGE_PX = 10.0
+MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
@@ -73,23 +80,27 @@ class Draughtsman:
             kept = self._kept.picture = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
-    def steps(self, view: Sight, fit: Fit, steps: Steps) -> Fit:
-        """The fit after as many steps as it takes, or as a preset allows."""
+    def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
+        """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
-        for step in range(steps.synthesis):
-            near = steps.near * drawing.sigma
-            anew, moving = still_moving(
-                fit.measured, drawing.xy, fit.strides, near, steps.enough, self._mesh.edges
-            )
-            other = _looks_other(fit, drawing)
-            if not (other or (moving and step + 1 < steps.synthesis)):
+        wide = drawing.sigma > SMALL_BLUR * edge_px
+        allowed = (WIDE_EFFORT if wide else 1.0) * steps.effort
+        size = float(np.median(drawing.lines[:, LENGTH]))
+        spent = _effort(size)
+        for step in range(MAX_STEPS - 1):
+            near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
+            about = fit.measured, drawing.xy, fit.strides
+            anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
+            everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
+            spent += _effort(size, None if everything else moving / len(anew))
+            if not (everything or moving) or (step > 0 and spent > allowed):
                 break
             fit = roughened(self._mesh, placed(self._mesh, fit))
-            if other or moving > MAX_AGAIN * len(anew):
+            if everything:
                 fit, drawing = self._first(view, fit)
             else:
                 fit, drawing = self._again(view, fit, drawing, anew)
-        return fit
+        return fit._replace(unsettled=unsettled(fit.measured - drawing.xy, drawing.sigma))
 
     def _first(self, view: Sight, fit: Fit) -> tuple[Fit, Drawing]:
         """A step from everything."""
@@ -168,22 +179,17 @@ class Draughtsman:
         return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
 
 
+def _effort(size_px: float, share: float | None = None) -> float:
+    """What a step costs, 1 for everything with edges of ``USUAL_EDGE_PX``: from everything, or around a share of it."""
+    pixels = min((size_px / USUAL_EDGE_PX) ** 2, 4.0)
+    return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
+
+
 def _looks_other(fit: Fit, drawing: Drawing) -> bool:
     """Whether the blur or the levels were found to be others than those drawn."""
     if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
         return True
     return bool(level_change(drawing.levels.cell, drawing.bettered.cell) > SAME_LEVELS)
-
-
-@compiled
-def level_change(before, now):  # type: ignore[no-untyped-def]
-    """The cells' median change of level (K, 3), over their median level."""
-    sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
-    for i in range(before.shape[0]):
-        for channel in range(3):
-            sizes[i] = max(sizes[i], abs(before[i, channel]))
-            changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
-    return np.median(changes) / max(np.median(sizes), 1e-9)
 
 
 @compiled
@@ -200,6 +206,19 @@ def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore
     if found:
         beside(moving, edges, out)
     return out, np.sum(out)
+
+
+@compiled
+def unsettled(shift, sigma):  # type: ignore[no-untyped-def]
+    """(M, 2, 2) px^2, what the last step may have left of a ``shift`` (M, 2) from where the markers are drawn: the
+    drawing answers to shifts of the size of the blur as it would to smaller ones."""
+    out = np.zeros((shift.shape[0], 2, 2))
+    for m in range(shift.shape[0]):
+        x, y = shift[m]
+        share = min(LEFT * np.hypot(x, y) / sigma, MOST_LEFT)
+        out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
+        out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
+    return out
 
 
 @compiled

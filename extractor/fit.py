@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .information import Information
-from .levels import Levels
+from .levels import Levels, level_change
 from .offsets import Reading
+
+MUCH_BLUR, MUCH_LIGHT = 0.06, 0.03  # of the blur and the levels, that no start can take for granted
 
 
 class Seen(NamedTuple):
@@ -21,6 +23,23 @@ class Seen(NamedTuple):
     sigma: float
     noise: float
     levels: Levels
+
+    def relit(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Seen:
+        """The same in another light.
+
+        Args:
+            before, now: (2, C, 3) some cells' inks over black, and their black, in the light then and now.
+        """
+        gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
+        black = self.levels.black.copy()
+        black[:, 0] += (now[1] - before[1]).mean(axis=0)
+        cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
+        return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
+
+    def near(self, other: Seen) -> bool:
+        """Whether blur and levels are nearly the same."""
+        blur = abs(self.sigma - other.sigma) < MUCH_BLUR * other.sigma
+        return blur and bool(level_change(other.levels.cell, self.levels.cell) < MUCH_LIGHT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +85,7 @@ class Fit(NamedTuple):
         bend: (E, 2) px, by how much they do.
         strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
         reading: what that step saw.
+        unsettled: (M, 2, 2) px^2, what it may have left; None where nothing is drawn.
     """
 
     xy: NDArray[np.float64]
@@ -82,6 +102,7 @@ class Fit(NamedTuple):
     bend: NDArray[np.float64]
     strides: NDArray[np.float64]
     reading: Reading | None
+    unsettled: NDArray[np.float64] | None = None
 
 
 class Across(NamedTuple):

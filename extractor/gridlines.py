@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .algebra import cholesky_solve
-from .engine import compiled
+from .engine import compiled, vectorized
 
 # columns of a gridline
 X, Y, UX, UY, LENGTH, LEAVE, ARRIVE, KNOWN = range(8)
@@ -31,25 +31,31 @@ def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
     for m in range(count):
         if not np.isfinite(xy[m, 0]):
             continue
+        # there are weights where both rings are whole
         whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
-        xu, xv, yu, yv = 0.0, 0.0, 0.0, 0.0
-        for k in range(near.shape[1]):
-            n = near[m, k]
-            if not whole or n < 0:
-                whole = False
-                break
-            dx, dy = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
-            u, v = stencil[m, 0, k], stencil[m, 1, k]
-            xu += u * dx
-            xv += v * dx
-            yu += u * dy
-            yv += v * dy
-        if whole and np.isfinite(xu):
-            out[m, :, 2:] = 0.0
+        xu, xv, yu, yv = _cubic(xy, m, near, stencil) if whole else (np.nan, np.nan, np.nan, np.nan)
+        if np.isfinite(xu):
             out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
+            for k in range(2, 5):
+                out[m, 0, k], out[m, 1, k] = 0.0, 0.0
         elif _quadratic(xy, m, near[m], offset[m], gram, right):
             out[m] = right
     return out
+
+
+@vectorized
+def _cubic(xy, m, near, stencil):  # type: ignore[no-untyped-def]
+    """The first derivatives of x and y at marker m; NaN where a neighbour is unknown."""
+    xu, xv, yu, yv = 0.0, 0.0, 0.0, 0.0
+    x, y = xy[m, 0], xy[m, 1]
+    for k in range(near.shape[1]):
+        n = np.uint64(near[m, k])
+        dx, dy, u, v = xy[n, 0] - x, xy[n, 1] - y, stencil[m, 0, k], stencil[m, 1, k]
+        xu += u * dx
+        xv += v * dx
+        yu += u * dy
+        yv += v * dy
+    return xu, xv, yu, yv
 
 
 @compiled
@@ -116,7 +122,7 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
     for e in range(edges.shape[0]):
         a, b = edges[e]
         dx, dy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
-        length = np.hypot(dx, dy)
+        length = np.sqrt(dx * dx + dy * dy)
         if not length > 1.0:
             continue
         ux, uy = dx / length, dy / length
@@ -125,9 +131,9 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
         leave, arrive = np.nan, np.nan
         for k in range(FIRST_RING):
             if near[a, k] == b:
-                leave = _slope(maps[a], offset[a, k, 0], offset[a, k, 1], ux, uy)
+                leave = _slope(maps, a, offset[a, k, 0], offset[a, k, 1], ux, uy)
             if near[b, k] == a:
-                arrive = _slope(maps[b], -offset[b, k, 0], -offset[b, k, 1], ux, uy)
+                arrive = _slope(maps, b, -offset[b, k, 0], -offset[b, k, 1], ux, uy)
         # where one end's direction is unknown the gridline is a parabola, where both are, straight
         if not np.isfinite(arrive):
             arrive = -leave
@@ -139,9 +145,9 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _slope(derivatives, u, v, ux, uy):  # type: ignore[no-untyped-def]
-    tx = derivatives[0, 0] * u + derivatives[0, 1] * v
-    ty = derivatives[1, 0] * u + derivatives[1, 1] * v
+def _slope(maps, m, u, v, ux, uy):  # type: ignore[no-untyped-def]
+    tx = maps[m, 0, 0] * u + maps[m, 0, 1] * v
+    ty = maps[m, 1, 0] * u + maps[m, 1, 1] * v
     along = tx * ux + ty * uy
     slope = (ty * ux - tx * uy) / along
     if not (along > 0.0 and abs(slope) < MAX_SLOPE):

@@ -80,14 +80,14 @@ def gradient(to_a, to_b, lines, edges, count):  # type: ignore[no-untyped-def]
 @compiled
 def _multiply(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-def]
     for m in range(diagonal.shape[0]):
-        x, y = vector[m]
+        x, y = vector[m, 0], vector[m, 1]
         out[m, 0] = diagonal[m, 0] * x + diagonal[m, 1] * y
         out[m, 1] = diagonal[m, 1] * x + diagonal[m, 2] * y
     for e in range(edges.shape[0]):
-        b0, b1, b2, b3 = beside[e]
+        b0, b1, b2, b3 = beside[e, 0], beside[e, 1], beside[e, 2], beside[e, 3]
         if b0 == 0.0 and b3 == 0.0:
             continue
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         out[a, 0] += b0 * vector[b, 0] + b1 * vector[b, 1]
         out[a, 1] += b2 * vector[b, 0] + b3 * vector[b, 1]
         out[b, 0] += b0 * vector[a, 0] + b2 * vector[a, 1]

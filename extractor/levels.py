@@ -8,6 +8,7 @@ shadows, a cell that fell out) the cell's own level stays.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
 DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
+MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
 ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
@@ -282,6 +284,56 @@ def smooth_levels(
         noise: grey levels.
     """
     return Levels(*_smooth(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
+
+
+@compiled
+def _radii(corners):  # type: ignore[no-untyped-def]
+    """The radius of a cell's inscribed circle."""
+    a, b, c = corners
+    area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
+    return area / max(around + np.hypot(a[0] - c[0], a[1] - c[1]), 1e-9)
+
+
+@compiled
+def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
+    """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
+    blur ``assumed``; NaN where the cell is not known."""
+    out = np.full(cells.shape[0], np.nan)
+    for i in range(cells.shape[0]):
+        inscribed = _radii((xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]))
+        if np.isfinite(inscribed):
+            radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * assumed), MIN_RADIUS_PX)
+            # a disc's pixels have a quarter of its squared radius of variance in one direction
+            out[i] = 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
+    return out
+
+
+def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64]) -> Levels:
+    """The levels that means show in which each neighbour has a ``share`` (K,).
+
+    A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
+    (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
+    """
+    usual = float(np.nanmedian(share))
+    own = np.clip(np.where(np.isfinite(share), share, usual), 0.0, MAX_SHARE)[:, None]
+    inks = [levels.cell[color == ink] for ink in range(BLACK)]
+    total = sum(np.median(ink, axis=0) for ink in inks if len(ink)) / (1.0 - 6.0 * min(usual, MAX_SHARE))
+    black = levels.black.copy()
+    black[:, 0] -= min(usual, MAX_SHARE) * total
+    cell = (levels.cell + own * total) / (1.0 - 3.0 * own)
+    return levels._replace(cell=cell, slope=levels.slope / (1.0 - 3.0 * own[:, :, None]), black=black)
+
+
+@compiled
+def level_change(before, now):  # type: ignore[no-untyped-def]
+    """The cells' median change of level (K, 3), over their median level."""
+    sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
+    for i in range(before.shape[0]):
+        for channel in range(3):
+            sizes[i] = max(sizes[i], abs(before[i, channel]))
+            changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
+    return np.median(changes) / max(np.median(sizes), 1e-9)
 
 
 @compiled

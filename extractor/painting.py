@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
+from .engine import compiled
 from .gaussian import REACH, normal, side_of_wedge
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
 
@@ -68,12 +68,11 @@ def _sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore
 
 
 @compiled
-def _opening(side, other):  # type: ignore[no-untyped-def]
+def _opening(side, other, sigma):  # type: ignore[no-untyped-def]
     """The angle at the corner between a side's end and the next one's start, over 2 pi."""
-    ax, ay = -side[4], -side[5]
-    bx, by = other[4], other[5]
+    cosine = -(side[4] * other[4] + side[5] * other[5]) * sigma * sigma
     # the first side bows inwards with slope 8 along its direction; seen from the corner that turns it outwards
-    angle = np.arccos(min(max((ax * bx + ay * by) / (np.hypot(ax, ay) * np.hypot(bx, by)), -1.0), 1.0))
+    angle = np.arccos(min(max(cosine, -1.0), 1.0))
     return (angle + np.arctan(side[8]) - np.arctan(other[7])) / (2.0 * np.pi)
 
 
@@ -92,26 +91,29 @@ def _columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@vectorized
+@compiled
 def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
     """Fill in the pixels' distances from a side; (x0, y0) is what their places count from."""
     zero, one, limit = np.float32(0.0), np.float32(1.0), np.float32(far)
-    d0, dx, dy = np.float32(side[0] + side[1] * x0 + side[2] * y0), np.float32(side[1]), np.float32(side[2])
-    t0, tx, ty = np.float32(side[3] + side[4] * x0 + side[5] * y0), np.float32(side[4]), np.float32(side[5])
+    d0, dx, dy = side[0] + side[1] * x0 + side[2] * y0, side[1], side[2]
+    t0, tx, ty = side[3] + side[4] * x0 + side[5] * y0, side[4], side[5]
     length, short = np.float32(side[6]), np.float32(1.0 / side[6])
-    leave, arrive = np.float32(side[7]), np.float32(side[8])
+    leave, arrive, three = np.float32(side[7]), np.float32(side[8]), np.float32(3.0)
     for k in range(count):
-        d = d0 + dx * places[PX + k] + dy * places[PY + k]
-        t = t0 + tx * places[PX + k] + ty * places[PY + k]
+        x, y = np.float64(places[PX + k]), np.float64(places[PY + k])
+        # what is near is the difference of what is far
+        d, t = np.float32(d0 + dx * x + dy * y), np.float32(t0 + tx * x + ty * y)
         part = t * short
         inside = min(max(part, zero), one)
         off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)
         off += leave * min(part, zero) + arrive * max(part - one, zero)
-        d = d - length * off if d < limit else d
+        # blur draws a curved edge towards the centre of its curvature, by half of that times the squared blur
+        drawn = (three * (leave + arrive) * inside - (leave + leave + arrive)) * short
+        d = d - length * off - drawn if d < limit else d
         out[D + k], out[TO_END + k], out[TO_START + k] = d, length - t - arrive * d, t + leave * d
 
 
-@vectorized
+@compiled
 def _one_side(sides, count, out):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares where one side at most is near, and which they are elsewhere."""
     zero, one = np.float32(0.0), np.float32(1.0)
@@ -138,7 +140,7 @@ def _lay_corner(sides, k, first, corners, at):  # type: ignore[no-untyped-def]
     corners[AFTER + at], corners[FROM_IT + at] = sides[D + b], sides[TO_START + b]
 
 
-@vectorized
+@compiled
 def _wedges(corners, count):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares of the wedges, less those of the openings."""
     for k in range(count):
@@ -257,7 +259,7 @@ def draw_cells(xy, cells, cell_edges, edges, lines, levels, slopes, sigma, box, 
         turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
         bulge = _sides(cells[i], cell_edges[i], edges, lines, turn, inverse, side)
         for k in range(3):
-            opening[k] = _opening(side[k], side[(k + 1) % 3])
+            opening[k] = _opening(side[k], side[(k + 1) % 3], sigma)
         cx, cy, far = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3, REACH + bulge
         top = max(int(np.ceil(min(a[1], b[1], c[1]) - far * sigma)), box[1])
         bottom = min(int(max(a[1], b[1], c[1]) + far * sigma), box[3] - 1)

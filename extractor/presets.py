@@ -19,7 +19,8 @@ class Steps(NamedTuple):
         finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
         sharp: blur, as a share of the edges, below which an image needs no synthesis,
         reduced: unless it could be reduced by so much, which makes synthesis cheap.
-        synthesis: steps of synthesis at most; one more where the blur or the levels are not settled.
+        effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are
+            allowed in any case.
         enough: no more steps once no marker moves by more than so many of its standard deviations
         near: and by more than this share of the blur.
     """
@@ -28,13 +29,13 @@ class Steps(NamedTuple):
     finest: float
     sharp: float
     reduced: float
-    synthesis: int
+    effort: float
     enough: float
     near: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 1, 0.0, 0.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 3, 5.0, 0.08),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 10, 0.7, 0.0),
+    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 0.0, 0.0, 0.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 2.1, 5.0, 0.08),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0),
 }

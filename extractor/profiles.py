@@ -51,7 +51,7 @@ MIN_CONTRAST = 12.0
 CLOSEST = (
     0.45  # of the way to the next gridline that a profile may reach for the blur; 0.41 in a regular cell
 )
-ENOUGH_BLURS = 6
+ENOUGH_BLURS = 12
 # Wide blur mixes the neighbours' inks into the middles that the contrasts are taken from, and the profile looks steeper
 # than it is: the blur it shows, and the true one, in units of the cell's height (rendered honeycombs).
 SHOWN_BLUR = np.array([0.0, 0.092, 0.112, 0.128, 0.137, 0.149, 0.154])
@@ -109,17 +109,36 @@ def unmixing(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, fr
 
 
 @compiled
-def profile_blur(image, lines, weights, room, every):  # type: ignore[no-untyped-def]
-    """The blur (px, sigma) seen across the middle of every n-th gridline, their median; NaN where nothing is seen.
-
-    The integral of f (1 - f) is sigma / sqrt(pi); bilinear samples add to it. So does another gridline near the
-    profile: where enough gridlines have room around their middle only these count, else the least blurred quarter.
-    """
-    blurs, count, roomy = np.empty((lines.shape[0] // every + 1, 2)), 0, 0
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    for e in range(0, lines.shape[0], every):
+def _roomy(lines, room):  # type: ignore[no-untyped-def]
+    """Numbers of the gridlines with a contrast whose middles other gridlines keep away from; of all with a contrast,
+    where these are few."""
+    roomy, known = np.empty(lines.shape[0], np.int64), np.empty(lines.shape[0], np.int64)
+    few, all_of_them = 0, 0
+    for e in range(lines.shape[0]):
         if room[e, 3] == 0.0:
             continue
+        sine = min(room[e, 1], room[e, 2])
+        away = 0.4 * lines[e, LENGTH] * sine / np.sqrt(max(1.0 - sine * sine, 1e-9))
+        if MAX_REACH * room[e, 0] < CLOSEST * away:
+            roomy[few] = e
+            few += 1
+        known[all_of_them] = e
+        all_of_them += 1
+    return (roomy[:few], True) if few >= ENOUGH_BLURS else (known[:all_of_them], False)
+
+
+@compiled
+def profile_blur(image, lines, weights, room, most):  # type: ignore[no-untyped-def]
+    """The blur (px, sigma) seen across the middle of ``most`` gridlines or fewer, their median; NaN where none is seen.
+
+    The integral of f (1 - f) is sigma / sqrt(pi); bilinear samples add to it. So does another gridline near the
+    profile: where too few gridlines have room around their middle, the least blurred quarter of all is taken.
+    """
+    which, roomy = _roomy(lines, room)
+    every = max(which.shape[0] // most, 1)
+    blurs, count = np.empty(which.shape[0] // every + 1), 0
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    for e in which[::every]:
         u0, u1, u2, zero = weights[e]
         nx, ny, length = -lines[e, UY], lines[e, UX], lines[e, LENGTH]
         step = MAX_REACH * room[e, 0] / BLUR_SAMPLES
@@ -136,18 +155,14 @@ def profile_blur(image, lines, weights, room, every):  # type: ignore[no-untyped
             shown = total * np.sqrt(np.pi)
             size = np.sqrt(0.5 * 3**0.5 * length * room[e, 0])  # the height of a regular cell of this area
             share = np.sqrt(max(shown * abs(shown) - BILINEAR_PX2, 0.0)) / size
-            sine = min(room[e, 1], room[e, 2])
-            away = 0.4 * length * sine / np.sqrt(max(1.0 - sine * sine, 1e-9))
-            blurs[count, 0] = size * np.interp(share, SHOWN_BLUR, TRUE_BLUR)
-            blurs[count, 1] = MAX_REACH * room[e, 0] < CLOSEST * away
-            roomy += blurs[count, 1] > 0.0
+            blurs[count] = size * np.interp(share, SHOWN_BLUR, TRUE_BLUR)
             count += 1
-    if roomy >= ENOUGH_BLURS:
-        return np.median(blurs[:count, 0][blurs[:count, 1] > 0.0])
-    return np.partition(blurs[:count, 0], count // 4)[count // 4] if count > 0 else np.nan
+    if count == 0:
+        return np.nan
+    return np.median(blurs[:count]) if roomy else np.partition(blurs[:count], count // 4)[count // 4]
 
 
-@vectorized
+@compiled
 def _weigh(rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, rest, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 beyond the band, and in the place of what they
     show, 1 before and 0 beyond the gridline, what is left of it beyond the blurred step."""
@@ -171,8 +186,9 @@ def _weigh(rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, res
 @vectorized
 def _vote(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums, per unit of contrast and blur."""
-    zero = np.float32(0.0)
-    aa, ab, bb, a, b, squares, pixels = zero, zero, zero, zero, zero, zero, zero
+    # what moves the markers is summed so that the order of summing hardly matters
+    zero, fine = np.float32(0.0), np.float64(0.0)
+    aa, ab, bb, a, b, squares, pixels = fine, fine, fine, fine, fine, zero, zero
     for k in range(count):
         ga, gb = weights[TO_A + k], weights[TO_B + k]
         aa += ga * ga

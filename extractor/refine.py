@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around
-from .drawing import MIN_SIGMA_PX, Draughtsman, beside, touching
+from .drawing import MIN_SIGMA_PX, SMALL_BLUR, Draughtsman, beside, touching
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .image import estimate_noise
 from .information import Information, covariances
-from .levels import cell_means, smooth_levels
+from .levels import bled, cell_means, smooth_levels, unbled
 from .offsets import Reading, measure
 from .placing import AGREED, Places
 from .presets import STEPS, Preset
@@ -30,15 +30,18 @@ from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_EDGE_PX = 5.0  # edges at a reduced scale
+MIN_EDGE_PX = 5.0  # edges at a reduced scale, and
+MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 BLIND_SIGMA_PX = 0.9  # where no gridline shows it
+BLEEDING = 0.002  # of a neighbour's level in the middle of a cell, from which on it is taken out
 BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
 # Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
 # profiles may lie apart, in units of the edges around the marker.
 UNEXPLAINED = 0.015
 MAX_APART = 0.1
+FAR_APART = 0.03  # where all triangles of a marker were found
 JUDGED_BY_SAMPLES = Judged(1, 4, 1.0)
 JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
 ELSEWHERE = 5  # one of so many other gridlines shows how well the pattern is explained where nothing is wrong
@@ -69,7 +72,9 @@ class Refiner:
         if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
             view = sights.at(before.scale)
             fit, across = self._begin(view, places, before)
-            return self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            refined = self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            if refined.seen is not None and refined.seen.near(before):
+                return refined
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
         fit, across = self._begin(view, places)
         scale = self._scale(view.scale * fit.sigma, edge)
@@ -81,7 +86,8 @@ class Refiner:
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
-        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX)))
+        least = MIN_EDGE_PX if sigma_px < SMALL_BLUR * edge_px else MIN_BLURRED_EDGE_PX
+        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / least)))
 
     def _begin(self, view: Sight, places: Places, before: Seen | None = None) -> tuple[Fit, Across]:
         """The inks' levels, the blur, and the first round of profiles."""
@@ -96,8 +102,20 @@ class Refiner:
         lines = lines_of(mesh, fit)
         across = self._across(view, fit, lines)
         if before is None:
-            fit = fit._replace(sigma=self._blur(view, lines, across))
+            fit, across = self._cleared(view, fit, lines, across)
         fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
+        return fit, across
+
+    def _cleared(
+        self, view: Sight, fit: Fit, lines: NDArray[np.float64], across: Across
+    ) -> tuple[Fit, Across]:
+        """The blur, and the levels without what it brings into the middle of a cell from its neighbours."""
+        mesh = self._mesh
+        fit = fit._replace(sigma=self._blur(view, lines, across))
+        share = bled(fit.xy, mesh.cells, fit.sigma, USUAL_SIGMA_PX / view.scale)
+        if np.nanmedian(share) > BLEEDING:
+            fit = fit._replace(levels=unbled(fit.levels, mesh.cell_color, share))
+            across = self._across(view, fit, lines)
         return fit, across
 
     def _look(self, view: Sight, xy: NDArray[np.float64]) -> Seen:
@@ -119,7 +137,7 @@ class Refiner:
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted, places)
-        fit = self._draughtsman.steps(view, start, steps)
+        fit = self._draughtsman.steps(view, start, steps, edge_px)
         return self._result(view, fit, across, places)
 
     def _across(self, view: Sight, fit: Fit, lines: NDArray[np.float64]) -> Across:
@@ -165,8 +183,7 @@ class Refiner:
 
     def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
         """The blur that some of the gridlines show, px."""
-        every = max(1, len(lines) // BLUR_EDGES)
-        sigma = profile_blur(view.image, lines, across.weights, across.room, every)
+        sigma = profile_blur(view.image, lines, across.weights, across.room, BLUR_EDGES)
         return max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else BLIND_SIGMA_PX
 
     def _result(self, view: Sight, fit: Fit, across: Across, places: Places) -> Refined:
@@ -174,7 +191,9 @@ class Refiner:
         xy, cov = self._sure(fit, places)
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            judged, trusted = self._judged(view, placed(self._mesh, fit), across, lost)
+            judged, trusted = self._judged(
+                view, placed(self._mesh, fit._replace(unsettled=None)), across, lost
+            )
             profiled, wide = self._sure(judged, places)
             use = lost & trusted
             xy[use], cov[use] = profiled[use], wide[use]
@@ -211,6 +230,8 @@ class Refiner:
         cov = covariances(*information, mesh.edges, mesh.spokes, 4 * PRIOR_PX**-2)
         cov += HIDDEN**2 * around(fit.loose, mesh.spokes)[:, None, None] * np.eye(2)
         _drop_unsure(xy, cov, places.xy_px, places.edge_px, places.whole)
+        if fit.unsettled is not None:
+            cov += fit.unsettled
         return xy, cov
 
 
@@ -234,7 +255,10 @@ def _doubt(
     apart = np.linalg.norm(xy - places.xy_px, axis=1)
     with np.errstate(invalid="ignore"):
         lost = which & ~(apart < MAX_APART * places.edge_px)
-    xy[which] = 0.5 * (xy[which] + places.xy_px[which])
+    # all triangles around a marker are seldom wrong together: the farther off, the more they count
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(places.whole, 0.5 / (1.0 + (apart / (FAR_APART * places.edge_px)) ** 2), 0.5)
+    xy[which] = (places.xy_px + share[:, None] * (xy - places.xy_px))[which]
     doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
     cov[which] += doubt[which, None, None] * np.eye(2)
     xy[lost], cov[lost] = np.nan, np.nan

@@ -6,11 +6,13 @@ its two ends as 1 - t and t: the gradient of the log-likelihood, and its curvatu
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .engine import compiled, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
-from .painting import draw_cells as draw_cells
 from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
 BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur
@@ -21,6 +23,8 @@ AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
 SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
 SUMS = 24
 KEEP, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # weights of pixels
+
+_kept = threading.local()
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -73,7 +77,7 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
     return out
 
 
-@vectorized
+@compiled
 def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
     """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
     gridline's place by those of its start and end."""
@@ -98,7 +102,7 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@vectorized
+@compiled
 def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
@@ -124,8 +128,10 @@ def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leav
 def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
-    aa, ab, bb, sa, sb, wa, wb = zero, zero, zero, zero, zero, zero, zero
-    blur, curvature, misfit, pixels = zero, zero, zero, zero
+    blur, curvature, misfit, pixels, wa, wb = zero, zero, zero, zero, zero, zero
+    # what moves the markers is summed so that the order of summing hardly matters
+    fine = np.float64(0.0)
+    aa, ab, bb, sa, sb = fine, fine, fine, fine, fine
     for k in range(count):
         ga, gb, gz = weights[TO_A + k], weights[TO_B + k], weights[TO_BLUR + k]
         aa += ga * ga
@@ -184,22 +190,50 @@ def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     sums[SHARE_D] += wd
 
 
-@vectorized
-def _residual(image, model, box):  # type: ignore[no-untyped-def]
-    """image - model within the box (x from, y from, x to, y to)."""
-    height, width = box[3] - box[1], 3 * (box[2] - box[0])
-    out = np.empty((height, width), np.float32)
-    for y in range(height):
-        seen = image[box[1] + y].reshape(-1)[3 * box[0] : 3 * box[2]]
-        drawn = model[box[1] + y].reshape(-1)[3 * box[0] : 3 * box[2]]
-        own = out[y]
-        for k in range(width):
-            own[k] = np.float32(seen[k]) - drawn[k]
-    return out.reshape(-1)
-
-
 @compiled
-def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  # type: ignore[no-untyped-def]
+def _area(lines, reach, box):  # type: ignore[no-untyped-def]
+    """The part of the box (x from, y from, x to, y to) that the bands along known gridlines lie in."""
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for e in range(lines.shape[0]):
+        if lines[e, KNOWN] != 0.0:
+            # a band may be bowed by as much as its length, times its slopes, over 4
+            wide = 2.0 * reach + lines[e, LENGTH] * max(abs(lines[e, LEAVE]), abs(lines[e, ARRIVE]))
+            x, y = lines[e, X], lines[e, Y]
+            end_x, end_y = x + lines[e, LENGTH] * lines[e, UX], y + lines[e, LENGTH] * lines[e, UY]
+            low_x, high_x = min(low_x, min(x, end_x) - wide), max(high_x, max(x, end_x) + wide)
+            low_y, high_y = min(low_y, min(y, end_y) - wide), max(high_y, max(y, end_y) + wide)
+    if not low_x <= high_x:
+        return box[0], box[1], box[0], box[1]
+    return (
+        max(box[0], min(int(low_x), box[2])),
+        max(box[1], min(int(low_y), box[3])),
+        min(box[2], max(int(high_x) + 2, box[0])),
+        min(box[3], max(int(high_y) + 2, box[1])),
+    )
+
+
+@vectorized
+def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
+    """Write image - model within the area into the flat ``residual``."""
+    width = 3 * (area[2] - area[0])
+    for y in range(area[1], area[3]):
+        seen = image[y].reshape(-1)[3 * area[0] : 3 * area[2]]
+        drawn = model[y].reshape(-1)[3 * area[0] : 3 * area[2]]
+        own = residual[(y - area[1]) * width :]
+        for k in range(seen.shape[0]):
+            own[k] = np.float32(seen[k]) - drawn[k]
+
+
+def read_gridlines(
+    image: NDArray[np.uint8],
+    model: NDArray[np.float32],
+    lines: NDArray[np.float64],
+    contrasts: NDArray[np.float64],
+    black: NDArray[np.float64],
+    sigma: float,
+    box: NDArray[np.int64],
+    loose: NDArray[np.bool_],
+) -> NDArray[np.float64]:
     """(E, 24) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
@@ -207,9 +241,21 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  #
     per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
     likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere.
     """
+    size = 3 * int(max(box[2] - box[0], 0) * max(box[3] - box[1], 0))
+    residual = getattr(_kept, "residual", None)
+    if residual is None or len(residual) < size:  # fresh memory would cost more than what is written to it
+        residual = _kept.residual = np.empty(size, np.float32)
+    return np.asarray(_read(image, model, lines, contrasts, black, sigma, box, loose, residual))
+
+
+@compiled
+def _read(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
+    """Everything of ``read_gridlines``; ``residual`` is room for the pixels in the box."""
     out = np.zeros((lines.shape[0], SUMS))
     inverse, reach = 1.0 / sigma, BAND * sigma
-    residual, width, height = _residual(image, model, box), box[2] - box[0], box[3] - box[1]
+    area = _area(lines, reach, box)
+    _subtract(image, model, area, residual)
+    width, height = area[2] - area[0], area[3] - area[1]
     at, rows, weights = (
         np.empty(CHUNK, np.int64),
         np.empty(4 * CHUNK, np.float32),
@@ -223,13 +269,17 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose):  #
             continue
         beneath = np.float32(black[e, 0]), np.float32(black[e, 1]), np.float32(black[e, 2])
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
-        x0, y0, leave, arrive = lines[e, X] - box[0], lines[e, Y] - box[1], lines[e, LEAVE], lines[e, ARRIVE]
+        x0, y0, leave, arrive = (
+            lines[e, X] - area[0],
+            lines[e, Y] - area[1],
+            lines[e, LEAVE],
+            lines[e, ARRIVE],
+        )
         # columns of pixels are walked through where it runs along x rather than along y, else rows
         along_x = abs(ux) > abs(uy)
         p0, q0, up, uq = (x0, y0, ux, uy) if along_x else (y0, x0, uy, ux)
-        p_end, q_end, step_p, step_q = (
-            (width, height, 3, 3 * width) if along_x else (height, width, 3 * width, 3)
-        )
+        p_end, q_end = (width, height) if along_x else (height, width)
+        step_p, step_q = (3, 3 * width) if along_x else (3 * width, 3)
         first = max(int(np.ceil(min(p0, p0 + length * up) - reach)), 0)
         last = min(int(np.floor(max(p0, p0 + length * up) + reach)), p_end - 1)
         half = reach / abs(up)

@@ -203,7 +203,8 @@ class Tracker:
         memory = self._memory
         assert memory is not None
         origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages, memory.seen)
+        seen = memory.seen and memory.seen.relit(memory.look, start.look)
+        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages, seen)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT * memory.expected:
             return None

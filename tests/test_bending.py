@@ -20,7 +20,7 @@ from extractor import Extractor, Status, parse_layout
 from extractor.bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
 from extractor.gridlines import KNOWN, LENGTH, UX, local_maps
 from extractor.placing import Places
-from extractor.repair import _drop_slid
+from extractor.repair import _drop_slid, _slid
 from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, SUMS, A, B, C, D
 from extractor.tables import lattice_of
 from extractor.topology import Topology, topology_of
@@ -166,7 +166,8 @@ def test_a_corner_of_the_rim_that_slid_is_not_believed(
     all_agree = np.full(count, agreed)
     places = Places(found, np.full(count, 20.0), np.empty((0, 3), np.int32), all_agree, all_agree)
     after = xy.copy()
-    _drop_slid(after, cov, np.full(count, free_px), places, lattice)
+    slid = _slid(after, cov, np.full(count, free_px), found, places.edge_px, lattice.rim)
+    _drop_slid(after, cov, slid, places, lattice)
     others = np.arange(count) != corner
     np.testing.assert_array_equal(after[others], flat[others])
     wanted = {"found": found[corner], "refined": xy[corner], "lost": [np.nan, np.nan]}[expected]

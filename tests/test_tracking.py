@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracking_scenes import LAYERS, PITCH_MM, PITCH_PX, SIZE, errors, moving, reference, scene, shot
 
-from cmpdesign.scene import Camera, Light, Press, Rendered, composed, render
+from cmpdesign.scene import Camera, Light, Optics, Press, Rendered, composed, render
 from cmpdesign.scene.camera import homography
 from extractor import Extractor, FrameStatus, StartKind, Status, Tracker
 from extractor.errors import LayoutError
@@ -275,3 +275,20 @@ def test_far_motion_is_followed_by_extrapolation() -> None:
         starts.append(frame.start)
         assert errors(frame.markers.xy_px, rendered).max() < 1
     assert starts[0] is StartKind.COLD and starts.count(StartKind.WARM) >= 5
+
+
+@pytest.mark.parametrize(
+    ("tint", "blur"), [((0.7, 0.7, 0.7), 1.0), ((1.2, 0.8, 1.0), 1.0), ((1.0, 1.0, 1.0), 1.6)]
+)
+def test_light_or_focus_that_jumps_is_seen_anew(tint: tuple[float, float, float], blur: float) -> None:
+    """A warm frame starts from the levels and the blur of the frame before; it ends with its own."""
+    tracker, cold = Tracker(reference()), Extractor(reference())
+    tracker.track(shot(seed=1).image)
+    changed = shot(light=Light(rgb=tint), optics=Optics(blur), seed=2)
+    frame, fresh = tracker.track(changed.image), cold.extract(changed.image)
+    assert frame.start is StartKind.WARM
+    away = np.linalg.norm(frame.markers.xy_px - fresh.xy_px, axis=1)
+    deviation = np.sqrt(np.einsum("mii->m", fresh.cov_px2))
+    assert np.median(away / deviation) < 0.5 and (away < 5 * deviation).all()
+    assert errors(frame.markers.xy_px, changed).max() < 0.1
+    assert frame.markers.stages["refine"].blur_px == pytest.approx(fresh.stages["refine"].blur_px, rel=0.03)

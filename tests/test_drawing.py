@@ -1,0 +1,212 @@
+"""Steps by synthesis: what is drawn anew, what is kept, when it ends, and what it says of what it left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, composed, render
+from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, Status, parse_layout
+from extractor.drawing import Draughtsman, Drawing, beside, chosen, still_moving, touching, unsettled
+from extractor.levels import Levels, bled, unbled
+from extractor.painting import draw_cells
+from extractor.presets import STEPS
+from extractor.refine import Refiner
+
+SIZE = (300, 260)
+LAYERS = 5
+
+
+@cache
+def extractor(pattern: str, preset: str = "balanced") -> Extractor:
+    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, LAYERS))), preset)  # type: ignore[arg-type]
+
+
+def shown(pattern: str = "round", blur: float = 1.0, **changes: Any) -> Rendered:
+    plain = standard_scene(standard_layout(pattern, LAYERS))
+    return render(replace(plain, optics=Optics(blur), **changes), size=SIZE)
+
+
+def dirty(*places_mm: tuple[float, float]) -> Rendered:
+    """Dark blobs: markers beside them take several steps."""
+    blobs = tuple(Blob(at, 0.5, BLACK_RGB) for at in places_mm)
+    return shown("honeycomb", damage=Damage(blobs=blobs))
+
+
+@pytest.mark.parametrize("pattern", ["round", "elliptical", "dirty honeycomb"])
+def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
+    pattern: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cells taken out and drawn elsewhere leave no trace, and gridlines that did not move keep what was read."""
+    plain, parts = Draughtsman._again, []
+
+    def checked(self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_]) -> Any:
+        fit, drawing = plain(self, view, fit, before, anew)
+        mesh, levels = self._mesh, drawing.levels
+        fresh = np.zeros(view.image.shape, np.float32)
+        sides = mesh.cells, mesh.cell_edges, mesh.edges, drawing.lines
+        draw_cells(drawing.xy, *sides, levels.cell, levels.slope, drawing.sigma, drawing.box, fresh)
+        x0, y0, x1, y1 = drawing.box
+        picture = self.picture(view.image.shape)[y0:y1, x0:x1]
+        np.testing.assert_allclose(picture, fresh[y0:y1, x0:x1], atol=2e-3)  # grey levels
+        kept = ~touching(anew, mesh.edges)
+        np.testing.assert_array_equal(drawing.sums[kept], before.sums[kept])
+        np.testing.assert_array_equal(drawing.lines[kept], before.lines[kept])
+        np.testing.assert_array_equal(drawing.xy[~anew], before.xy[~anew])
+        parts.append(int(anew.sum()))
+        return fit, drawing
+
+    monkeypatch.setattr(Draughtsman, "_again", checked)
+    if pattern == "dirty honeycomb":
+        extractor("honeycomb").extract(dirty((1.5, 0.4)).image)
+    else:
+        extractor(pattern).extract(shown(pattern, surface=composed(Press(4.0, 0.6))).image)
+    assert parts and min(parts) > 0
+
+
+def test_steps_in_part_end_where_steps_from_everything_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = shown("round", surface=composed(Press(4.0, 0.6)))
+    preset = STEPS["accurate"]
+    part = extractor("round", "accurate").extract(seen.image)
+    monkeypatch.setattr("extractor.drawing.MAX_AGAIN", -1.0)
+    whole = extractor("round", "accurate").extract(seen.image)
+    deviation = np.sqrt(np.einsum("mii->m", whole.cov_px2))
+    away = np.linalg.norm(part.xy_px - whole.xy_px, axis=1)
+    assert (away < preset.enough * deviation).all() and np.median(away / deviation) < 0.1
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced", "accurate"])
+def test_no_image_takes_more_than_its_preset_allows(preset: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Noise and damage end after the effort of the preset, or two steps, or twice that where blur is wide."""
+    taken: list[str] = []
+    for name in ("_first", "_again"):
+        plain = getattr(Draughtsman, name)
+
+        def counted(self: Draughtsman, *given: Any, _plain: Any = plain, _name: str = name) -> Any:
+            taken.append(_name)
+            return _plain(self, *given)
+
+        monkeypatch.setattr(Draughtsman, name, counted)
+    most = {"fast": 0, "balanced": 5, "accurate": 10}[preset]
+    for seen in (
+        dirty((1.5, 0.4), (-2.0, 1.5), (0.3, -2.4)),
+        shown("honeycomb", blur=2.5),
+        shown("honeycomb"),
+    ):
+        taken.clear()
+        markers = extractor("honeycomb", preset).extract(seen.image)
+        assert (markers.status == Status.MEASURED).any()
+        assert len(taken) <= max(most, 2)
+
+
+@given(
+    share=st.floats(0.0, 3.0),
+    angle=st.floats(0.0, 6.3),
+    sigma=st.floats(0.4, 3.0),
+)
+def test_what_a_step_left_grows_with_it(share: float, angle: float, sigma: float) -> None:
+    """A tenth of the blur leaves a hundredth; never more than half of the step; along it, and symmetric."""
+    along = np.array([np.cos(angle), np.sin(angle)])
+    left = unsettled((share * sigma * along)[None], sigma)[0]
+    expected = min(share, 0.5) * share * sigma
+    np.testing.assert_allclose(left, expected**2 * np.outer(along, along), atol=1e-12)
+
+
+def test_moving_markers_bring_their_neighbours() -> None:
+    edges = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
+    drawn = np.zeros((4, 2))
+    measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
+    strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, edges)
+    np.testing.assert_array_equal(anew, [True, True, False, False])
+    assert count == 2
+    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, edges)
+    assert count == 0 and not anew.any()
+    out = np.zeros(4, np.bool_)
+    beside(np.array([False, False, False, True]), edges, out)
+    np.testing.assert_array_equal(out, [False, False, True, False])
+    np.testing.assert_array_equal(chosen(out, np.ones((4, 2)), np.zeros((4, 2)))[:, 0], [0, 0, 1, 0])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.03])
+def test_what_neighbours_bleed_into_means_is_taken_out(share: float) -> None:
+    """Means of cells and black that were mixed by hand come apart again."""
+    true = np.array([[10.0, 20.0, 140.0], [20.0, 120.0, 10.0], [150.0, 30.0, 20.0], [90.0, 100.0, 95.0]])
+    color, black = np.array([0, 1, 2, 4], np.int32), np.array([16.0, 15.0, 14.0])
+    total = true[:3].sum(axis=0)
+    field = np.zeros((3, 10))
+    field[:, 0] = black + share * total
+    seen = (1 - 3 * share) * true - share * total
+    levels = Levels(seen, np.zeros((4, 3, 2)), field, np.zeros(4, np.bool_))
+    found = unbled(levels, color, np.full(4, share))
+    np.testing.assert_allclose(found.cell, true, rtol=1e-9)
+    np.testing.assert_allclose(found.black[:, 0], black, rtol=1e-9)
+
+
+def test_bleeding_grows_with_blur_and_ends_with_unknown_corners() -> None:
+    xy = np.array([[0.0, 0.0], [20.0, 0.0], [10.0, 17.3], [np.nan, np.nan]])
+    cells = np.array([[0, 1, 2], [0, 1, 3]], np.int32)
+    shares = [bled(xy, cells, sigma, 1.5) for sigma in (1.0, 2.0, 4.0)]
+    assert all(np.isnan(share[1]) for share in shares)
+    assert shares[0][0] < 1e-3 < shares[1][0] < shares[2][0] < 0.15
+
+
+@pytest.mark.parametrize("blur", [0.6, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
+def test_the_first_estimate_of_the_blur_is_close(
+    pattern: str, blur: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Optics and pixel together, before anything is drawn; wide blur is taken for less, never for much more."""
+    ratios: list[float] = []
+    plain = Refiner._cleared
+
+    def noted(self: Refiner, view: Any, *rest: Any) -> Any:
+        fit, across = plain(self, view, *rest)
+        true = np.sqrt(blur**2 + view.scale**2 / 12) / view.scale
+        ratios.append(fit.sigma / true)
+        return fit, across
+
+    monkeypatch.setattr(Refiner, "_cleared", noted)
+    extractor(pattern).extract(shown(pattern, blur).image)
+    assert 0.75 < ratios[-1] < 1.1
+    if blur <= 1.0:
+        assert 0.95 < ratios[-1] < 1.06
+
+
+@pytest.mark.parametrize("bow", [-0.3, -0.1, 0.1, 0.3])
+def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
+    """One cell with a curved side against the same, finely sampled and filtered: blur moves curved edges."""
+    fine, sigma, size = 16, 3.0, 96
+    corners = np.array([[18.0, 70.0], [78.0, 70.0], [48.0, 18.0]])
+    xy, cells = corners, np.array([[0, 1, 2]], np.int32)
+    edges, cell_edges = np.array([[0, 1], [1, 2], [0, 2]], np.int32), np.array([[0, 1, 2]], np.int32)
+    chords = corners[edges[:, 1]] - corners[edges[:, 0]]
+    lengths = np.linalg.norm(chords, axis=1)
+    lines = np.zeros((3, 8))
+    lines[:, :2], lines[:, 2:4] = corners[edges[:, 0]], chords / lengths[:, None]
+    lines[:, 4], lines[:, 7] = lengths, 1.0
+    lines[0, 5:7] = bow, -bow  # a parabola
+    picture = np.zeros((size, size, 3), np.float32)
+    box, level = np.array([0, 0, size, size]), np.full((1, 3), 100.0)
+    draw_cells(xy, cells, cell_edges, edges, lines, level, np.zeros((1, 3, 2)), sigma, box, picture)
+    y, x = np.mgrid[0 : size * fine, 0 : size * fine].astype(np.float32)
+    x, y = (x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5
+    t = np.clip((x - 18.0) / 60.0, 0.0, 1.0)
+    below, apart = y - 18.0, np.abs(x - 48.0) / 30.0 * 52.0
+    mask = ((y < 70.0 + 60.0 * bow * t * (1 - t)) & (apart < below)).astype(np.float32)
+    mask = cv2.GaussianBlur(mask, (0, 0), sigma * fine)
+    true = 100.0 * cv2.resize(mask, (size, size), interpolation=cv2.INTER_AREA)
+    middle = slice(56, 84), slice(38, 59)  # about the curved side, away from the corners
+    assert (
+        np.abs(picture[..., 0] - true)[middle].max() < 0.25
+    )  # 0.8 where blur is taken to leave edges in place
