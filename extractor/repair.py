@@ -82,7 +82,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     kinds = believed, refined.explained, places.whole
     _drop_outliers(xy, cov, edge_px, near, kinds, *rings, lattice.marker_mm)
     _drop_frayed(xy, cov, places, lattice)
-    _drop_slid(xy, cov, _slid(xy, *slide), places, lattice)
+    _drop_slid(xy, cov, refined.free_px, places, lattice)
     tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
     return Repaired(
         xy, cov, _fill(xy, cov, _filled(edge_px, lattice.neighbours), places.xy_px, *tables, size)
@@ -204,7 +204,7 @@ def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Plac
 def _drop_slid(
     xy: NDArray[np.float64],
     cov: NDArray[np.float64],
-    slid: NDArray[np.bool_],
+    free_px: NDArray[np.float64],
     places: Places,
     lattice: Lattice,
 ) -> None:
@@ -214,6 +214,7 @@ def _drop_slid(
 
     Where two gridlines end that may bend, the corner between them slides along both.
     """
+    slid = _slid(xy, cov, free_px, places.xy_px, places.edge_px, lattice.rim)
     if not slid.any():
         return
     expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
