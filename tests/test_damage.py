@@ -16,7 +16,7 @@ from benchmarks.stress_suite.frames import PATTERNS, Frame, plain
 from benchmarks.stress_suite.kinds import frame_of
 from benchmarks.stress_suite.reading import extractor_of, read
 
-IMAGES, SEED = 42, 300  # every kind in every pattern, twice
+IMAGES, SEED = 42, 60000  # every kind in every pattern, twice
 
 
 def test_no_marker_is_wrong() -> None:
