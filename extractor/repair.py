@@ -26,14 +26,20 @@ MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
 MAX_FRAYED = 0.35  # of the shortest edge there, in any case
 FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
-MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
-VAGUE = 0.02  # its standard deviation, or that of its gridlines' bending, is larger than that
+MAX_MOVED, VAGUE = (
+    0.12,
+    0.02,
+)  # in edges, of such a marker by refinement, where its gridlines may bend by more than that
+MAX_MOVED_UNSURE, UNSURE = 0.065, 0.014  # and where its own deviation is larger than that
 BENT_SIGMAS = 10.0  # standard deviations in between
 MAX_AGREED_ALONE = 0.14  # in edges, where two triangles agree and the drawing explains nothing
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
 IMPLIED_SIGMA = 0.02  # in edges
 BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
+MAX_VAGUE = (
+    0.12  # in edges, of the deviation of what neighbours say where only two triangles vouch for a marker
+)
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
@@ -164,7 +170,8 @@ def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # ty
             apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
             if np.isfinite(apart / (edge[m] * allowed)):
                 excess[m] = apart / (edge[m] * allowed)
-            if not (believed[m] or sigma < MAX_UNEXPLAINED * edge[m]):  # they do not know themselves
+            vague = MAX_VAGUE if believed[m] else MAX_UNEXPLAINED
+            if not (explained[m] or whole[m] or sigma < vague * edge[m]):  # they do not know themselves
                 excess[m] = np.inf
         worst = np.flatnonzero(excess > 1.0)
         if worst.shape[0] == 0:
@@ -237,11 +244,15 @@ def _drop_slid(
 @compiled
 def _slides(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
     """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
-    limit = VAGUE * edge[m]
-    if not (cov[m, 0, 0] + cov[m, 1, 1] > limit**2 or free[m] > limit):
+    spread = cov[m, 0, 0] + cov[m, 1, 1]
+    if spread > (UNSURE * edge[m]) ** 2:
+        limit = MAX_MOVED_UNSURE
+    elif free[m] > VAGUE * edge[m]:
+        limit = MAX_MOVED
+    else:
         return False
     dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-    return dx * dx + dy * dy > (MAX_MOVED * edge[m]) ** 2
+    return dx * dx + dy * dy > (limit * edge[m]) ** 2
 
 
 @compiled
