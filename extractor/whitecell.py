@@ -117,6 +117,9 @@ def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
     ground = (black / strongest).min()  # the whiteness of black, or of the palest ink
     for c in range(1, 4):
         ground = max(ground, (inks[c] / strongest).min())
+    # the centroid tells where it is better than the map does, unless something white stands beside it
+    if _fills(image, where, slope, ground, strongest) and _amid_inks(image, where, slope, inks, black):
+        return where.copy()
     u, v = _centroid(image, where, slope, ground, strongest)
     if not u * u + u * v + v * v <= MAX_ASIDE**2:
         return nowhere
