@@ -55,7 +55,7 @@ MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadrat
 # surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
 # to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
 MILD_ERROR = 2.0
-HEAVY_ERROR = 1.4
+HEAVY_ERROR = 1.6
 LOST, MEASURED = np.uint8(Status.LOST), np.uint8(Status.MEASURED)
 REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
 
