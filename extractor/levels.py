@@ -298,7 +298,7 @@ def _radii(corners):  # type: ignore[no-untyped-def]
 @compiled
 def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
     """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
-    blur ``assumed``; NaN where the cell is not known."""
+    blur ``assumed``, NaN where the cell is not known; and the median of that."""
     out = np.full(cells.shape[0], np.nan)
     for i in range(cells.shape[0]):
         inscribed = _radii((xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]))
@@ -306,16 +306,15 @@ def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
             radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * assumed), MIN_RADIUS_PX)
             # a disc's pixels have a quarter of its squared radius of variance in one direction
             out[i] = 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
-    return out
+    return out, np.nanmedian(out)
 
 
-def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64]) -> Levels:
-    """The levels that means show in which each neighbour has a ``share`` (K,).
+def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float) -> Levels:
+    """The levels that means show in which each neighbour has a ``share`` (K,), ``usual`` where it is not known.
 
     A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
     (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
     """
-    usual = float(np.nanmedian(share))
     own = np.clip(np.where(np.isfinite(share), share, usual), 0.0, MAX_SHARE)[:, None]
     inks = [levels.cell[color == ink] for ink in range(BLACK)]
     total = sum(np.median(ink, axis=0) for ink in inks if len(ink)) / (1.0 - 6.0 * min(usual, MAX_SHARE))

@@ -112,9 +112,9 @@ class Refiner:
         """The blur, and the levels without what it brings into the middle of a cell from its neighbours."""
         mesh = self._mesh
         fit = fit._replace(sigma=self._blur(view, lines, across))
-        share = bled(fit.xy, mesh.cells, fit.sigma, USUAL_SIGMA_PX / view.scale)
-        if np.nanmedian(share) > BLEEDING:
-            fit = fit._replace(levels=unbled(fit.levels, mesh.cell_color, share))
+        share, usual = bled(fit.xy, mesh.cells, fit.sigma, USUAL_SIGMA_PX / view.scale)
+        if usual > BLEEDING:
+            fit = fit._replace(levels=unbled(fit.levels, mesh.cell_color, share, usual))
             across = self._across(view, fit, lines)
         return fit, across
 

@@ -89,7 +89,7 @@ def ways_from_white(
         bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
         if len(bright) == 0:
             continue
-        black = np.median(color[votes == votes.max()], axis=0)
+        black = _between(color, votes)
         found: list[tuple[float, Way]] = []
         for place in bright:
             cell, inside = _put(at, known, places[place], lattice.cell_of, lattice.layers)
@@ -102,6 +102,15 @@ def ways_from_white(
         if found:
             return [way for brightness, way in found if brightness > SAME_WHITE * found[0][0]]
     return []
+
+
+@compiled
+def _between(color, votes):  # type: ignore[no-untyped-def]
+    """(3,) the usual color of the places that the most cells surround."""
+    out, among = np.empty(3), np.flatnonzero(votes == votes.max())
+    for channel in range(3):
+        out[channel] = np.median(color[among, channel])
+    return out
 
 
 @compiled

@@ -27,6 +27,7 @@ FAINT = 0.3  # of an ink's strength above black: black, where its cell is missin
 TERMS = 6  # 1, x, y, xx, xy, yy
 # The corners of a down-cell from its middle, in axial steps: below, right above and left above.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
+FROM_CORNERS = np.linalg.inv(CORNERS[:2].T)
 MARKERS = [0, 2, 1]  # at them
 INKS = np.array([2, 3, 1])  # of the cells opposite to them
 # In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
@@ -54,9 +55,9 @@ def white_cell(
     """
     known = np.flatnonzero(cell >= 0)
     corners = lattice.marker_mm[MARKERS]
-    middle = corners.mean(axis=0)
+    middle = (corners[0] + corners[1] + corners[2]) / 3
     # from axial steps to mm, for this cell
-    to_mm = (corners[:2] - middle).T @ np.linalg.inv(CORNERS[:2].T)
+    to_mm = (corners[:2] - middle).T @ FROM_CORNERS
     where, slope = _map_at(cells.center_px[known], lattice.center_mm[cell[known]] - middle, to_mm)
     if np.isnan(where[0]):
         return None

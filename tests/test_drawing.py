@@ -148,7 +148,7 @@ def test_what_neighbours_bleed_into_means_is_taken_out(share: float) -> None:
     field[:, 0] = black + share * total
     seen = (1 - 3 * share) * true - share * total
     levels = Levels(seen, np.zeros((4, 3, 2)), field, np.zeros(4, np.bool_))
-    found = unbled(levels, color, np.full(4, share))
+    found = unbled(levels, color, np.full(4, share), share)
     np.testing.assert_allclose(found.cell, true, rtol=1e-9)
     np.testing.assert_allclose(found.black[:, 0], black, rtol=1e-9)
 
@@ -156,7 +156,7 @@ def test_what_neighbours_bleed_into_means_is_taken_out(share: float) -> None:
 def test_bleeding_grows_with_blur_and_ends_with_unknown_corners() -> None:
     xy = np.array([[0.0, 0.0], [20.0, 0.0], [10.0, 17.3], [np.nan, np.nan]])
     cells = np.array([[0, 1, 2], [0, 1, 3]], np.int32)
-    shares = [bled(xy, cells, sigma, 1.5) for sigma in (1.0, 2.0, 4.0)]
+    shares = [bled(xy, cells, sigma, 1.5)[0] for sigma in (1.0, 2.0, 4.0)]
     assert all(np.isnan(share[1]) for share in shares)
     assert shares[0][0] < 1e-3 < shares[1][0] < shares[2][0] < 0.15
 

@@ -25,7 +25,9 @@ COLUMNS = (
 )
 MARKS = {"flat": "o", "tilt": "^", "bulge": "s", "twist": "D", "round": "h", "elliptical": "p"}
 COLORS = {
+    "cmpdesign, fast, markers only": "#a9d3f5",
     "cmpdesign, fast": "#7fb3e6",
+    "cmpdesign, balanced, markers only": "#5b97d6",
     "cmpdesign, balanced": "#2f78c4",
     "cmpdesign, accurate": "#123f73",
     "the article's AGA corners": "#8a5a2b",
