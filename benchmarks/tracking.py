@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +49,10 @@ from cmpdesign.scene import (
 )
 from cmpdesign.scene.standard import BLACK_RGB, INKS
 from cmpdesign.writers.layout_file import layout_to_json
-from extractor import FrameStatus, StartKind, Tracker, parse_layout
+from extractor import FrameStatus, StartKind, Tracked, Tracker, parse_layout
 
 FRAMES, QUICK_FRAMES = 2000, 120
+AHEAD = 40  # frames that are rendered before they are tracked
 BLOCKS = 10  # rows of the table
 PERIOD = 90  # frames of a whole cycle of motion
 JUMP_EVERY, BLACK_EVERY, BLACK_FRAMES = 97, 331, 4
@@ -156,6 +158,19 @@ class Flow:
         return np.asarray(self._points[:, 0], dtype=np.float64)
 
 
+def tracked(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[tuple[Rendered, Tracked, float]]:
+    """Every frame as tracked and its processor time in ms; frames come in a row, as from a camera, rendered before."""
+    count = 0
+    while part := list(islice(frames, AHEAD)):
+        found = []
+        for rendered in part:
+            cpu = time.thread_time()
+            frame = tracker.track(np.asarray(rendered.image, np.uint8), time_s=count / 30)
+            found.append((rendered, frame, 1e3 * (time.thread_time() - cpu)))
+            count += 1
+        yield from found
+
+
 def measure(name: str, layout: Layout, count: int, jerky: bool) -> Result:
     """Track the sequence both ways."""
     tracker = Tracker(parse_layout(layout_to_json(layout)))
@@ -163,11 +178,8 @@ def measure(name: str, layout: Layout, count: int, jerky: bool) -> Result:
     times: dict[str, list[float]] = {"warm": [], "cpu": [], "cold": []}
     flow: Flow | None = None
     flow_s, step_px, failed, before = 0.0, 0.0, 0, None
-    for index, rendered in enumerate(sequence(layout, count, jerky)):
+    for index, (rendered, frame, cpu) in enumerate(tracked(tracker, sequence(layout, count, jerky))):
         true, image = rendered.truth.marker_xy_px, np.asarray(rendered.image, np.uint8)
-        cpu = time.thread_time()
-        frame = tracker.track(image, time_s=index / 30)
-        cpu = 1e3 * (time.thread_time() - cpu)
         if frame.start is StartKind.WARM:
             times["warm"].append(frame.elapsed_ms)
             times["cpu"].append(cpu)
