@@ -31,14 +31,12 @@ MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
-NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
-SMALL_BLUR = 0.12  # of an edge; beyond that blur, levels and places settle together, and where
-BENT, MANY_BENT = (
-    0.02,
-    0.25,
-)  # gridlines are bent by that share of an edge, and so many of them, each step bends others:
-HARD_EFFORT = 2.0  # times the effort is allowed
 SAME_LEVELS = 0.006  # likewise, of the levels
+NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
+SMALL_BLUR = 0.12  # of an edge; beyond that, blur, levels and places settle together;
+BENT = 0.02  # of an edge, and where gridlines are bent by more,
+MANY_BENT = 0.25  # of them, each step bends others. Then
+HARD_EFFORT = 2.0  # times the effort is allowed
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
 MAX_STEPS = 10

@@ -24,22 +24,19 @@ from .types import Status
 ROUNDS = 40  # at most; each drops the worst of every neighbourhood, until none is left
 MAX_DEVIATION = 0.15  # of a marker from where its neighbours put it, in edges
 MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-MAX_FRAYED = 0.35  # of the shortest edge there, in any case
 FRAYED = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
-MAX_MOVED, VAGUE = (
-    0.12,
-    0.02,
-)  # in edges, of such a marker by refinement, where its gridlines may bend by more than that
-MAX_MOVED_UNSURE, UNSURE = 0.065, 0.014  # and where its own deviation is larger than that
-BENT_SIGMAS = 10.0  # standard deviations in between
+BENT_SIGMAS = 10.0  # standard deviations in between;
+MAX_FRAYED = 0.35  # of the shortest edge there, in any case
+MAX_MOVED = 0.12  # in edges, of such a marker by refinement, where
+VAGUE = 0.02  # its gridlines may bend by more than that, and
+MAX_MOVED_UNSURE = 0.065  # where
+UNSURE = 0.014  # its own deviation is larger than that
 MAX_AGREED_ALONE = 0.14  # in edges, where two triangles agree and the drawing explains nothing
 MAX_AGREED = 0.3  # in edges, where all triangles agree: only sharp bends explain that
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
 IMPLIED_SIGMA = 0.02  # in edges
 BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
-MAX_VAGUE = (
-    0.12  # in edges, of the deviation of what neighbours say where only two triangles vouch for a marker
-)
+MAX_VAGUE = 0.12  # in edges, deviation of what neighbours say of a marker that only two triangles vouch for
 MAX_UNEXPLAINED = 0.06  # in edges, of a marker on which something lies
 SIGMAS = 6.0  # standard deviations of the prediction are more than that
 MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
