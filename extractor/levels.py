@@ -54,6 +54,17 @@ def monomials(x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _disc(a, b, c, sigma):  # type: ignore[no-untyped-def]
+    """The radius of a cell's inscribed circle, and of the disc about its centroid that its level is taken from."""
+    area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+    around += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
+    around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
+    inscribed = area / max(around, 1e-9)
+    return inscribed, max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
+
+
+@compiled
 def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
     """(K, 4): each cell's mean of image - model over the pixels about its centroid, and their number (0: none).
 
@@ -69,13 +80,7 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
         if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
             continue
-        area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-        around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) + np.sqrt(
-            (c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2
-        )
-        around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
-        inscribed = area / max(around, 1e-9)
-        radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
+        _, radius = _disc(a, b, c, sigma)
         count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
         for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
             half = np.sqrt(max(radius * radius - (y - cy) ** 2, 0.0))
@@ -287,23 +292,13 @@ def smooth_levels(
 
 
 @compiled
-def _radii(corners):  # type: ignore[no-untyped-def]
-    """The radius of a cell's inscribed circle."""
-    a, b, c = corners
-    area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-    around = np.hypot(b[0] - a[0], b[1] - a[1]) + np.hypot(c[0] - b[0], c[1] - b[1])
-    return area / max(around + np.hypot(a[0] - c[0], a[1] - c[1]), 1e-9)
-
-
-@compiled
 def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
     """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
     blur ``assumed``, NaN where the cell is not known; and the median of that."""
     out = np.full(cells.shape[0], np.nan)
     for i in range(cells.shape[0]):
-        inscribed = _radii((xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]))
+        inscribed, radius = _disc(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], assumed)
         if np.isfinite(inscribed):
-            radius = max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * assumed), MIN_RADIUS_PX)
             # a disc's pixels have a quarter of its squared radius of variance in one direction
             out[i] = 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
     return out, np.nanmedian(out)

@@ -50,7 +50,7 @@ NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
 class Refiner:
-    """Refines the markers of one layout; its its picture is kept from image to image, one a thread."""
+    """Refines the markers of one layout; its picture is kept from image to image, one a thread."""
 
     def __init__(self, mesh: Topology, preset: Preset, virtual_per_edge: int) -> None:
         self._mesh = mesh
