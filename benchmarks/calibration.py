@@ -1,0 +1,102 @@
+"""How true covariances are where something is damaged: 72 pictures, three patterns on three surfaces.
+
+    python -m benchmarks.calibration
+
+Error over its stated deviation, per axis: its root mean square, and its median over that of a normal one (1 is true).
+Measured markers by kind of damage; repaired and fitted ones together.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.machine import sentence
+from cmpdesign.scene import (
+    Blob,
+    Camera,
+    Damage,
+    Press,
+    Twist,
+    composed,
+    render,
+    standard_layout,
+    standard_scene,
+)
+from cmpdesign.scene.standard import BLACK_RGB
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, Status, parse_layout
+from extractor.presets import PRESETS, Preset
+
+KINDS = ("cells missing", "dirt", "dark dirt", "blots")
+MEDIAN = np.log(2)  # of the squares per axis, in two dimensions
+LAYERS = 9
+SIZE = (430, 400)
+REACH_MM = 8.0
+SURFACES = {
+    "flat": None,
+    "bulge": composed(Press(radius_mm=5.0, depth_mm=1.0)),
+    "twist": composed(Twist(radius_mm=5.0, angle_deg=15.0)),
+}
+
+
+def damages(seed: int) -> Iterator[Damage]:
+    """Cells that fell out; dirt; dark dirt; two large blots."""
+    rng = np.random.default_rng(seed)
+
+    def spots(count: int, low_mm: float, high_mm: float, rgb: tuple[float, float, float]) -> tuple[Blob, ...]:
+        angle, radius = rng.uniform(0, 2 * np.pi, count), REACH_MM * np.sqrt(rng.uniform(0.04, 1, count))
+        sizes = rng.uniform(low_mm, high_mm, count)
+        places = zip(radius * np.cos(angle), radius * np.sin(angle), sizes, strict=True)
+        return tuple(Blob((float(x), float(y)), float(r), rgb) for x, y, r in places)
+
+    yield Damage(missing_share=0.12)
+    yield Damage(blobs=spots(8, 0.4, 1.2, (120.0, 110.0, 100.0)))
+    yield Damage(blobs=spots(8, 0.4, 1.2, BLACK_RGB))
+    yield Damage(blobs=spots(2, 2.0, 2.4, BLACK_RGB))
+
+
+@cache
+def squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
+    """Squared errors over covariance per axis: of measured markers by ``KINDS``, of repaired and fitted ones."""
+    found: dict[str, list[float]] = {name: [] for name in (*KINDS, "repaired", "fitted")}
+    for pattern in ("honeycomb", "round", "elliptical"):
+        layout = standard_layout(pattern, LAYERS)
+        extractor = Extractor(parse_layout(layout_to_json(layout)), preset)
+        for number, surface in enumerate(SURFACES.values()):
+            plain = replace(
+                standard_scene(layout), surface=surface, camera=Camera(20.0, 7.3, 10.0 * number, 30.0)
+            )
+            for seed, damage in enumerate([*damages(2 * number), *damages(2 * number + 1)]):
+                seen = render(replace(plain, damage=damage, seed=seed), size=SIZE)
+                markers = extractor.extract(seen.image)
+                error = markers.xy_px - seen.truth.marker_xy_px
+                kind = KINDS[seed % len(KINDS)]
+                for status, name in (
+                    (Status.MEASURED, kind),
+                    (Status.REPAIRED, "repaired"),
+                    (Status.FITTED, "fitted"),
+                ):
+                    mine = markers.status == status
+                    inverse = np.linalg.inv(markers.cov_px2[mine])
+                    found[name] += list(np.einsum("mi,mij,mj->m", error[mine], inverse, error[mine]) / 2)
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def main() -> int:
+    for preset in PRESETS:
+        print(preset)
+        for name, values in squares(preset).items():
+            rms, median = np.sqrt(values.mean()), np.sqrt(np.median(values) / MEDIAN)
+            print(f"  {name:<14} {len(values):>6} markers   normalised {rms:5.2f}   median {median:5.2f}")
+    print(sentence())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
