@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import cholesky_solve
-from .bridge import unbridged
+from .bridge import held_by
 from .cells import Cells
-from .engine import compiled
-from .gradients import gradients
-from .mesh import Mesh
+from .engine import compiled, vectorized
+from .gradients import seen_as, slopes
 from .near import bucketed, nearest
 from .numbering import Numbering
 from .tables import Lattice
-from .touch import edge_of, spread, turn_like
+from .touch import UNTURNED, edge_of, spread, turn_like
 from .types import Origin
 
 ROUNDS = 40
@@ -31,9 +30,13 @@ EXACT = 0.02  # of a cell: witnesses that fit so well are not judged
 RIDGE = 1e-3  # holds the curvature of the map where the witnesses lie in a row
 MIN_PIVOT = 1e-7  # of the normal matrix against its largest entry: below, they do lie in a row
 TERMS = 6  # 1, x, y, xx, xy, yy
+# A witness's products: of the terms with each other, those of one power together, and with its place in the layout.
+PRODUCT = np.array([[0, 1, 2, 3, 4, 5], [1, 3, 4, 6, 7, 8], [2, 4, 5, 7, 8, 9]])
+PRODUCT = np.concatenate([PRODUCT, [[3, 6, 7, 10, 11, 12], [4, 7, 8, 11, 12, 13], [5, 8, 9, 12, 13, 14]]])
+PLACE_X, PLACE_Y, CLOSENESS, PRODUCTS = 15, 21, 27, 28
 
 
-def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> Numbering:
+def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     """Number what is not connected with the reference by any face of the mesh.
 
     Cells that share a corner with a numbered one are its neighbours. For the others, the numbered cells around must map
@@ -43,18 +46,22 @@ def attach(cells: Cells, mesh: Mesh, numbering: Numbering, lattice: Lattice) -> 
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    by_white = numbering.white_px if numbering.origin is Origin.WHITE else None
-    cell = numbering.cell.copy()
-    cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
-    free, candidates = _candidates(cells.ink, cell, lattice.ink)
-    if candidates.any():
-        slope = gradients(cells.center_px, cell, lattice)
-        seen = cells.center_px, cells.corner_px, cells.ink, cells.area_px
-        layout = lattice.center_mm, lattice.ink, lattice.size_mm, lattice.arms_mm, lattice.beside
-        step = 1 if numbering.mirrored else 2
-        cell = _attached(*seen, cells.whole, slope, candidates, cell, free, layout, step)
-        cell[unbridged(cells, cell, lattice, numbering.mirrored, by_white)] = -1
-    return replace(numbering, cell=cell)
+    white = numbering.white_px if numbering.origin is Origin.WHITE else np.full(2, np.nan)
+    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
+    step = 1 if numbering.mirrored else 2
+    return replace(numbering, cell=_attach(seen, cells.ink, numbering.cell, white, lattice.plan, step))
+
+
+@compiled
+def _attach(seen, ink, cell, white, plan, step):  # type: ignore[no-untyped-def]
+    """The numbers of the cells with those that could be attached, without those that hang in nothing."""
+    center, corner, area, whole = seen
+    cell = np.where(held_by(center, corner, area, whole, cell, white, plan, step), cell, np.int32(-1))
+    free, candidates = _candidates(ink, cell, plan.ink)
+    if not candidates.any():
+        return cell
+    cell = _attached(center, corner, area, whole, ink, candidates, cell, free, plan, step)
+    return np.where(held_by(center, corner, area, whole, cell, white, plan, step), cell, np.int32(-1))
 
 
 @compiled
@@ -75,42 +82,28 @@ def _candidates(ink, cell, ink_of):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _attached(center_px, corner_px, ink, area_px, whole, slope, candidates, cell, free, layout, step):  # type: ignore[no-untyped-def]
-    """The numbers of the cells with those of the candidates, round by round outward from the numbered ones."""
-    center_mm, ink_of, size_mm, arms_mm, beside = layout
-    cell, free = cell.copy(), free.copy()
+def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, step):  # type: ignore[no-untyped-def]
+    """The numbers of the cells with those of the candidates, round by round outward from the numbered ones; what is
+    ``free`` is so no more."""
+    cell = cell.copy()
     loose = np.flatnonzero(candidates)
-    shaped = np.flatnonzero(candidates & whole & np.isfinite(corner_px[:, 0, 0]))
+    shaped = np.flatnonzero(candidates & whole & np.isfinite(corner[:, 0, 0]))
     claim = np.full(loose.shape[0], -1, np.int32)  # the place of the layout that a loose cell would take
     gap = np.full(loose.shape[0], np.inf)  # how far it is from the next numbered one, in cells
     # the squared distance of its farthest witness: a nearer one changes it
     reach2 = np.full(loose.shape[0], np.inf)
     fresh = np.flatnonzero((cell >= 0) & whole)
-    turn, maps = np.full(cell.shape[0], -1, np.int64), np.full((cell.shape[0], 2, 2), np.nan)
-    for i in fresh:
-        turn[i] = turn_like(center_px[i], corner_px[i], arms_mm[cell[i]], step, slope[i], maps[i])
+    turn, maps = np.full(cell.shape[0], UNTURNED, np.int64), np.empty((cell.shape[0], 2, 2))
+    slope = slopes(center, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside)
     claims = np.zeros(free.shape[0], np.int32)
-    index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
+    index, square, rows = np.empty(WITNESSES, np.int32), np.empty(WITNESSES), np.empty((WITNESSES, PRODUCTS))
     for _ in range(ROUNDS):
-        touched = spread(
-            center_px,
-            corner_px,
-            area_px,
-            ink,
-            shaped,
-            cell,
-            free,
-            turn,
-            maps,
-            fresh,
-            (center_mm, ink_of, arms_mm, beside),
-            step,
-        )
+        touched = spread(center, corner, area, ink, shaped, cell, free, turn, maps, slope, fresh, plan, step)
         fresh = np.concatenate((fresh, touched))
         known = np.flatnonzero((cell >= 0) & whole)
         if known.shape[0] < MIN_WITNESSES:
             break
-        xy = center_px[known]
+        xy, places = center[known], np.flatnonzero(free)
         grid = bucketed(xy)
         claims[:] = 0
         for n in range(loose.shape[0]):
@@ -120,15 +113,14 @@ def _attached(center_px, corner_px, ink, area_px, whole, slope, candidates, cell
                 continue
             if claim[n] >= 0 and not free[claim[n]]:
                 claim[n] = -1
-            if _touched(center_px, i, fresh, reach2[n]):
-                count = nearest(xy, grid, center_px[i, 0], center_px[i, 1], index, square)
+            if _touched(center, i, fresh, reach2[n]):
+                count = nearest(xy, grid, center[i, 0], center[i, 1], index, square)
                 reach2[n] = square[count - 1] if count == WITNESSES else np.inf
-                near = known[index[:count]]
-                claim[n], gap[n] = -1, np.sqrt(square[0]) / edge_of(area_px[near[0]])
+                claim[n], gap[n] = -1, np.sqrt(square[0]) / edge_of(area[known[index[0]]])
                 # far beyond reach, whatever the map
                 if gap[n] < 2.0 * REACH:
-                    x, y, size = _predicted(center_px, i, near, square, cell, center_mm, size_mm)
-                    claim[n] = _nearest_free(x, y, MAX_MISFIT * size, ink[i], center_mm, ink_of, free)
+                    x, y, size = _predicted(center, i, known, index[:count], square, cell, plan, rows)
+                    claim[n] = _nearest_of(places, x, y, MAX_MISFIT * size, ink[i], plan)
             if claim[n] >= 0:
                 claims[claim[n]] += 1
         fresh = _numbered(loose, claim, gap, claims, cell, free)
@@ -136,13 +128,21 @@ def _attached(center_px, corner_px, ink, area_px, whole, slope, candidates, cell
             break
         fresh = fresh[whole[fresh]]
         for i in fresh:
-            count = nearest(xy, grid, center_px[i, 0], center_px[i, 1], index, square)
-            for k in range(count):
-                j = known[index[k]]
-                if turn[j] >= 0:
-                    turn[i] = turn_like(center_px[i], corner_px[i], arms_mm[cell[i]], step, maps[j], maps[i])
-                    break
+            count = nearest(xy, grid, center[i, 0], center[i, 1], index, square)
+            turn[i] = _turn_near(center, corner, i, known, index[:count], cell, turn, maps, slope, plan, step)
     return cell
+
+
+@compiled
+def _turn_near(center, corner, i, known, near, cell, turn, maps, slope, plan, step):  # type: ignore[no-untyped-def]
+    """From which corner cell i is counted, by the nearest of the known cells that is counted from any; -1 unknown."""
+    for k in near:
+        j = known[k]
+        if turn[j] == UNTURNED:
+            turn[j] = turn_like(center, corner, j, plan.arms_mm, cell[j], step, slope[j], maps[j])
+        if turn[j] >= 0:
+            return turn_like(center, corner, i, plan.arms_mm, cell[i], step, maps[j], maps[i])
+    return -1
 
 
 @compiled
@@ -173,41 +173,41 @@ def _numbered(loose, claim, gap, claims, cell, free):  # type: ignore[no-untyped
 
 
 @compiled
-def _nearest_free(x, y, limit, ink, center_mm, ink_of, free):  # type: ignore[no-untyped-def]
-    """The free place of the layout that holds this ink within the limit of (x, y), or -1."""
+def _nearest_of(places, x, y, limit, ink, plan):  # type: ignore[no-untyped-def]
+    """Which of the layout's places holds this ink within the limit of (x, y), or -1."""
     best, least = -1, limit * limit
-    for u in range(free.shape[0]):
-        if free[u] and ink_of[u] == ink:
-            apart = (center_mm[u, 0] - x) ** 2 + (center_mm[u, 1] - y) ** 2
+    if np.isnan(x):
+        return best
+    for u in places:
+        if plan.ink[u] == ink:
+            apart = (plan.center_mm[u, 0] - x) ** 2 + (plan.center_mm[u, 1] - y) ** 2
             if apart < least:
                 best, least = u, apart
     return best
 
 
 @compiled
-def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: ignore[no-untyped-def]
+def _predicted(center, i, known, near, square, cell, plan, rows):  # type: ignore[no-untyped-def]
     """Where cell i lies in the layout by its witnesses (the nearest first), NaN where that is doubtful, and the size of
     a cell there, mm.
 
     In units of the witnesses' mean distance, with the cell at the origin, so that the map's first term is the place.
+    ``rows`` is a buffer.
     """
     count = near.shape[0]
     scale, size, middle_x, middle_y = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
-        u = cell[near[k]]
+        u = cell[known[near[k]]]
         scale += np.sqrt(square[k]) / count
-        size += size_mm[u] / count
-        middle_x += center_mm[u, 0] / count
-        middle_y += center_mm[u, 1] / count
-    rows, offset, closeness = np.empty((count, TERMS)), np.empty((count, 2)), np.empty(count)
+        size += plan.size_mm[u] / count
+        middle_x += plan.center_mm[u, 0] / count
+        middle_y += plan.center_mm[u, 1] / count
     for k in range(count):
-        j, u = near[k], cell[near[k]]
-        x, y = (center_px[j, 0] - center_px[i, 0]) / scale, (center_px[j, 1] - center_px[i, 1]) / scale
-        rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
-        rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
-        offset[k, 0], offset[k, 1] = center_mm[u, 0] - middle_x, center_mm[u, 1] - middle_y
-        closeness[k] = 1.0 / (0.3 + square[k] / scale**2)
-    terms, variance, leverage = _robust(rows, offset, closeness, (EXACT * size) ** 2)
+        j = known[near[k]]
+        x, y, u = (center[j, 0] - center[i, 0]) / scale, (center[j, 1] - center[i, 1]) / scale, cell[j]
+        _lay(rows[k], x, y, plan.center_mm[u, 0] - middle_x, plan.center_mm[u, 1] - middle_y)
+        rows[k, CLOSENESS] = 1.0 / (0.3 + square[k] / scale**2)
+    terms, variance, leverage = _robust(rows[:count], (EXACT * size) ** 2)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) / scale
     sure = (
         np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
@@ -218,41 +218,72 @@ def _predicted(center_px, i, near, square, cell, center_mm, size_mm):  # type: i
 
 
 @compiled
-def _robust(rows, offset, closeness, exact2):  # type: ignore[no-untyped-def]
+def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
+    """Write the products of a witness's terms with each other and with its place (u, v)."""
+    row[0], row[1], row[2], row[3], row[4], row[5] = 1.0, x, y, x * x, x * y, y * y
+    row[6], row[7], row[8], row[9] = x * row[3], x * row[4], x * row[5], y * row[5]
+    row[10], row[11], row[12] = row[3] * row[3], row[3] * row[4], row[3] * row[5]
+    row[13], row[14] = row[4] * row[5], row[5] * row[5]
+    for a in range(TERMS):
+        row[PLACE_X + a], row[PLACE_Y + a] = row[a] * u, row[a] * v
+
+
+@vectorized
+def _sums(rows, weight, out):  # type: ignore[no-untyped-def]
+    """Write the weighted sums of the witnesses' products."""
+    for m in range(PRODUCTS):
+        out[m] = 0.0
+    for k in range(rows.shape[0]):
+        for m in range(PRODUCTS):
+            out[m] += weight[k] * rows[k, m]
+
+
+@compiled
+def _median(values, rank):  # type: ignore[no-untyped-def]
+    """The median of a few numbers; ``rank`` is a buffer."""
+    count = values.shape[0]
+    rank[:count] = 0
+    for j in range(count):
+        for i in range(count):
+            rank[i] += (values[j] < values[i]) | ((values[j] == values[i]) & (j < i))
+    low, high = 0.0, 0.0
+    for i in range(count):
+        low = values[i] if rank[i] == (count - 1) // 2 else low
+        high = values[i] if rank[i] == count // 2 else high
+    return 0.5 * (low + high)
+
+
+@compiled
+def _robust(rows, exact2):  # type: ignore[no-untyped-def]
     """(2, 6) the map's terms by robust least squares, the variance about it, and the leverage at the origin; infinite
     where the witnesses lie in a row."""
     count = rows.shape[0]
-    weight, squares = closeness.copy(), np.zeros(count)
-    normal, right = np.empty((TERMS, TERMS)), np.empty((3, TERMS))
+    weight, squares, rank = rows[:, CLOSENESS].copy(), np.empty(count), np.empty(count, np.int64)
+    normal, right, sums = np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCTS)
     for number in range(ROBUST_ROUNDS):
-        normal[:], right[:] = 0.0, 0.0
-        right[2, 0] = 1.0
-        for k in range(count):
-            for a in range(TERMS):
-                moment = weight[k] * rows[k, a]
-                right[0, a] += moment * offset[k, 0]
-                right[1, a] += moment * offset[k, 1]
-                for b in range(a + 1):
-                    normal[a, b] += moment * rows[k, b]
-        for a in range(3, TERMS):
-            normal[a, a] += RIDGE
+        _sums(rows, weight, sums)
         largest = 0.0
         for a in range(TERMS):
+            for b in range(a + 1):
+                normal[a, b] = sums[PRODUCT[a, b]]
+            normal[a, a] += RIDGE if a >= 3 else 0.0
             largest = max(largest, normal[a, a])
+            right[0, a], right[1, a] = sums[PLACE_X + a], sums[PLACE_Y + a]
+            right[2, a] = 1.0 if a == 0 else 0.0
         cholesky_solve(normal, right if number == ROBUST_ROUNDS - 1 else right[:2], TERMS)
         for a in range(TERMS):
             if not normal[a, a] ** 2 > MIN_PIVOT * largest:
                 return right[:2], np.inf, np.inf
         for k in range(count):
-            u, v = -offset[k, 0], -offset[k, 1]
+            u, v = -rows[k, PLACE_X], -rows[k, PLACE_Y]
             for a in range(TERMS):
                 u += rows[k, a] * right[0, a]
                 v += rows[k, a] * right[1, a]
             squares[k] = u * u + v * v
-        usual, total, about = 2.0 * np.median(squares) + exact2, 0.0, 0.0
-        leverage = right[2, 0] * weight.mean()
+        usual, total, about = 2.0 * _median(squares, rank) + exact2, 0.0, 0.0
+        leverage = right[2, 0] * sums[0] / count
         for k in range(count):
-            weight[k] = closeness[k] / (1.0 + squares[k] / usual)
+            weight[k] = rows[k, CLOSENESS] / (1.0 + squares[k] / usual)
             total += weight[k]
             about += weight[k] * squares[k]
     return right[:2], about / (2.0 * total), leverage

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
+from .gradients import seen_as
 from .near import bucketed, nearest
 from .parts import connected
 from .tables import Lattice
@@ -41,26 +42,47 @@ def unbridged(
         mirrored: the pattern is seen from its back.
         white_px: the middle of the white cell; None where the outline told, and the largest block is right.
     """
-    seen_as = np.full(len(lattice.ink), -1, np.int32)
-    numbered = np.flatnonzero(cell >= 0)
-    seen_as[cell[numbered]] = numbered
-    seen = cells.center_px, cells.corner_px, cells.area_px
-    step = 1 if mirrored else 2
-    tables = lattice.center_mm, lattice.arms_mm, lattice.beside
-    beside = touching(*seen, cells.whole, cell, seen_as, tables, step)
-    block = connected(beside, cells.whole & (cell >= 0))
-    sizes = np.bincount(block[block >= 0])
-    if len(sizes) == 0:
-        return np.asarray(cell >= 0)
-    first = int(sizes.argmax())
-    if white_px is not None:
-        among = np.flatnonzero(block >= 0)
-        apart = ((cells.center_px[among] - white_px) ** 2).sum(axis=1)
-        near = block[among[np.argsort(apart, kind="stable")[:SEEDS]]]
-        first = int(near[sizes[near].argmax()])
-    layout = lattice.center_mm, lattice.size_mm, lattice.arms_mm
-    held = _held(*seen, cell, block, first, beside, *layout, step)
+    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
+    white = np.full(2, np.nan) if white_px is None else white_px
+    held = held_by(*seen, cell, white, lattice.plan, 1 if mirrored else 2)
     return np.asarray((cell >= 0) & ~held)
+
+
+@compiled
+def held_by(center, corner, area, whole, cell, white, plan, step):  # type: ignore[no-untyped-def]
+    """(N,) bool, the numbered cells that hold on to the reference's block; ``white`` is NaN where the outline told."""
+    beside = touching(center, corner, area, whole, cell, seen_as(cell, plan.ink.shape[0]), plan, step)
+    block = connected(beside, whole & (cell >= 0))
+    sizes = np.zeros(block.max() + 1 if block.shape[0] > 0 else 0, np.int64)
+    for i in range(block.shape[0]):
+        if block[i] >= 0:
+            sizes[block[i]] += 1
+    if sizes.shape[0] == 0:
+        return np.zeros(cell.shape[0], np.bool_)
+    first = sizes.argmax() if np.isnan(white[0]) else _largest_near(center, block, sizes, white)
+    return _held(center, corner, area, cell, block, first, beside, plan, step)
+
+
+@compiled
+def _largest_near(center, block, sizes, white):  # type: ignore[no-untyped-def]
+    """The largest block of those of the cells nearest to the white one."""
+    square, near, found = np.empty(SEEDS), np.empty(SEEDS, np.int64), 0
+    for i in range(block.shape[0]):
+        if block[i] < 0:
+            continue
+        apart = (center[i, 0] - white[0]) ** 2 + (center[i, 1] - white[1]) ** 2
+        at = min(found, SEEDS - 1)
+        if found == SEEDS and apart >= square[at]:
+            continue
+        while at > 0 and square[at - 1] > apart:
+            square[at], near[at] = square[at - 1], near[at - 1]
+            at -= 1
+        square[at], near[at] = apart, block[i]
+        found = min(found + 1, SEEDS)
+    best = near[0]
+    for k in range(1, found):
+        best = near[k] if sizes[near[k]] > sizes[best] else best
+    return best
 
 
 @compiled
@@ -86,14 +108,26 @@ def _slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-untyped-
 
 
 @compiled
-def _held(center, corner, area, cell, block, first, beside, center_mm, size_mm, arms_mm, step):  # type: ignore[no-untyped-def]
+def _held(center, corner, area, cell, block, first, beside, plan, step):  # type: ignore[no-untyped-def]
     """(N,) bool, the cells of the first block and of those that hold on to it, and the single ones between."""
     count, blocks = cell.shape[0], block.max() + 1
     held = block == first
     slope, sloped = np.full((count, 2, 2), np.nan), np.zeros(count, np.bool_)
     for i in range(count):
         if block[i] >= 0:
-            sloped[i] = _slope(i, center, cell, beside, center_mm, slope[i])
+            sloped[i] = _slope(i, center, cell, beside, plan.center_mm, slope[i])
+    if blocks > 1:
+        _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, step)
+    alone = np.flatnonzero((cell >= 0) & (block < 0))
+    if alone.shape[0] > 0:
+        _join_alone(center, corner, area, cell, alone, held, slope, sloped, plan, step)
+    return held
+
+
+@compiled
+def _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
+    """Let the blocks that hold on be held, in place, the nearest first."""
+    count, blocks = cell.shape[0], block.max() + 1
     index, square = np.empty(PAIRS, np.int32), np.empty(PAIRS)
     jump, gap = np.empty(count), np.empty(count)
     least, refused = np.empty(blocks), np.zeros(blocks, np.bool_)
@@ -121,50 +155,50 @@ def _held(center, corner, area, cell, block, first, beside, center_mm, size_mm, 
                 if block[j] != b or gap[j] > BESIDE * least[b]:
                     continue
                 nearest(xy, grid, center[j, 0], center[j, 1], index, square)
-                own = _jump(
-                    j, here[index], center, corner, cell, slope, sloped, center_mm, size_mm, arms_mm, step
-                )
+                own = _jump(j, here, index, center, corner, cell, slope, sloped, plan, step)
                 if np.isfinite(own):
                     jump[telling] = own
                     wide += own > MAX_JUMP
                     telling += 1
             if telling > 0 and np.median(jump[:telling]) < MAX_JUMP and wide <= MAX_JUMPING * telling:
-                held |= block == b
+                for j in range(count):
+                    held[j] |= block[j] == b
             else:
                 refused[b] = True
-    here = np.flatnonzero(held & sloped)
-    if here.shape[0] >= PAIRS:
-        xy = center[here]
-        grid = bucketed(xy)
-        for j in range(count):
-            if cell[j] >= 0 and block[j] < 0:
-                nearest(xy, grid, center[j, 0], center[j, 1], index, square)
-                own = _jump(
-                    j, here[index], center, corner, cell, slope, sloped, center_mm, size_mm, arms_mm, step
-                )
-                held[j] = own < MAX_ALONE and np.sqrt(square[0]) < REACH * edge_of(area[here[index[0]]])
-    return held
 
 
 @compiled
-def _jump(j, near, center, corner, cell, slope, sloped, center_mm, size_mm, arms_mm, step):  # type: ignore[no-untyped-def]
-    """How far, in cells, cell j is from where its number puts it, by the slopes there and at the cells near it; the
-    median over these. A cell without a slope has that of its triangle, or else of the others, and keeps it."""
+def _join_alone(center, corner, area, cell, alone, held, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
+    """Let the single cells that hold on be held, in place."""
+    here = np.flatnonzero(held & sloped)
+    if here.shape[0] < PAIRS:
+        return
+    index, square = np.empty(PAIRS, np.int32), np.empty(PAIRS)
+    xy = center[here]
+    grid = bucketed(xy)
+    for j in alone:
+        nearest(xy, grid, center[j, 0], center[j, 1], index, square)
+        own = _jump(j, here, index, center, corner, cell, slope, sloped, plan, step)
+        held[j] = own < MAX_ALONE and np.sqrt(square[0]) < REACH * edge_of(area[here[index[0]]])
+
+
+@compiled
+def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
+    """How far, in cells, cell j is from where its number puts it, by the slopes there and at those ``here`` near it;
+    the median over these. A cell without a slope has that of its triangle, or else of the others, and keeps it."""
     if not sloped[j]:
-        own = np.empty((2, 2))
-        if turn_like(center[j], corner[j], arms_mm[cell[j]], step, slope[near[0]], own) >= 0:
-            slope[j] = own
-        else:
-            slope[j] = slope[near[0]]
+        like = slope[here[near[0]]]
+        if turn_like(center, corner, j, plan.arms_mm, cell[j], step, like, slope[j]) < 0:
+            slope[j] = like
         sloped[j] = True
     apart = np.empty(near.shape[0])
     for k in range(near.shape[0]):
-        i = near[k]
+        i = here[near[k]]
         a, b = 0.5 * (slope[i, 0, 0] + slope[j, 0, 0]), 0.5 * (slope[i, 0, 1] + slope[j, 0, 1])
         c, d = 0.5 * (slope[i, 1, 0] + slope[j, 1, 0]), 0.5 * (slope[i, 1, 1] + slope[j, 1, 1])
         determinant = a * d - b * c
         x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
-        dx = (d * x - b * y) / determinant - center_mm[cell[j], 0] + center_mm[cell[i], 0]
-        dy = (a * y - c * x) / determinant - center_mm[cell[j], 1] + center_mm[cell[i], 1]
-        apart[k] = np.hypot(dx, dy) / size_mm[cell[j]]
+        dx = (d * x - b * y) / determinant - plan.center_mm[cell[j], 0] + plan.center_mm[cell[i], 0]
+        dy = (a * y - c * x) / determinant - plan.center_mm[cell[j], 1] + plan.center_mm[cell[i], 1]
+        apart[k] = np.hypot(dx, dy) / plan.size_mm[cell[j]]
     return np.median(apart)

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .engine import compiled
-from .lattice import SIX, layer_of, marker_id
-from .tables import Lattice
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing
 MAX_MISFIT = 0.3  # of the way to a neighbour, between its center and where a cell's own triangle puts it
@@ -25,9 +22,12 @@ def seen_as(cell, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def slopes(center_px, cell, seen, tables):  # type: ignore[no-untyped-def]
-    """(N, 2, 2) least squares over the six neighbours of each cell, NaN where they lie on one line."""
-    center_mm, axial, cell_of, layers = tables
+def slopes(center_px, cell, seen, center_mm, beside):  # type: ignore[no-untyped-def]
+    """(N, 2, 2) float64, image step (px) per layout step (mm) around each numbered cell, by least squares over its six
+    neighbours; NaN where they lie on one line.
+
+    The layout's own shape is in its millimetres, so a round pattern is no more curved than a honeycomb.
+    """
     out = np.full((cell.shape[0], 2, 2), np.nan)
     for i in range(cell.shape[0]):
         u = cell[i]
@@ -36,10 +36,7 @@ def slopes(center_px, cell, seen, tables):  # type: ignore[no-untyped-def]
         xx, xy, yy = 0.0, 0.0, 0.0
         ax, ay, bx, by = 0.0, 0.0, 0.0, 0.0
         for k in range(6):
-            q, r = axial[u, 0] + SIX[k, 0], axial[u, 1] + SIX[k, 1]
-            if layer_of(q, r) > layers:
-                continue
-            v = cell_of[marker_id(q, r)]
+            v = beside[u, k]
             if v < 0 or seen[v] < 0:
                 continue
             j = seen[v]
@@ -61,16 +58,6 @@ def slopes(center_px, cell, seen, tables):  # type: ignore[no-untyped-def]
     return out
 
 
-def gradients(
-    center_px: NDArray[np.float64], cell: NDArray[np.int32], lattice: Lattice
-) -> NDArray[np.float64]:
-    """(N, 2, 2) float64, image step (px) per layout step (mm) around each numbered cell; NaN where unknown.
-
-    The layout's own shape is in its millimetres, so a round pattern is no more curved than a honeycomb.
-    """
-    return np.asarray(slopes(center_px, cell, seen_as(cell, len(lattice.ink)), lattice.slope_tables))
-
-
 @compiled
 def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-def]
     """Write the linear map that carries a cell's corners 0 and 1 to those of a triangle, counted from ``shift``."""
@@ -82,9 +69,9 @@ def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tables, out):  # type: ignore[no-untyped-def]
+def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out):  # type: ignore[no-untyped-def]
     """Write the map of every numbered cell that has none, but a triangle, and a neighbour that tells its turn."""
-    center_mm, axial, cell_of, layers = tables
+    center_mm, _, _, arms_mm, beside = plan
     maps, misfit = np.empty((3, 2, 2)), np.empty(3)
     step = (
         1 if mirrored else 2
@@ -97,10 +84,7 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tab
             _spanned(arms_mm[u], corner_px[i], center_px[i], shift, step, maps[shift])
         misfit[:] = 0.0
         for k in range(6):
-            q, r = axial[u, 0] + SIX[k, 0], axial[u, 1] + SIX[k, 1]
-            if layer_of(q, r) > layers:
-                continue
-            v = cell_of[marker_id(q, r)]
+            v = beside[u, k]
             if v < 0 or seen[v] < 0:
                 continue
             x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
@@ -116,10 +100,11 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tab
 
 
 @compiled
-def whole_slopes(center_px, corner_px, cell, mirrored, arms_mm, tables):  # type: ignore[no-untyped-def]
+def whole_slopes(center_px, corner_px, cell, mirrored, plan):  # type: ignore[no-untyped-def]
     """``slopes``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle says
     if one of them tells which of its corners is which."""
+    center_mm, _, _, arms_mm, beside = plan
     seen = seen_as(cell, arms_mm.shape[0])
-    out = slopes(center_px, cell, seen, tables)
-    _add_from_triangles(center_px, corner_px, mirrored, cell, seen, arms_mm, tables, out)
+    out = slopes(center_px, cell, seen, center_mm, beside)
+    _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out)
     return out

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled
-from .gradients import gradients
-from .lattice import SIX, layer_of, marker_id
+from .gradients import seen_as, slopes
 from .numbering import Numbering
 from .sampling import sample_patch
 from .tables import Lattice
@@ -29,19 +28,8 @@ def missed(image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice
         image: (H, W, 3) uint8 BGR, at full scale.
         scale: by which it was reduced.
     """
-    seen_as = np.full(len(lattice.ink), -1, np.int32)
-    numbered = np.flatnonzero(numbering.cell >= 0)
-    seen_as[numbering.cell[numbered]] = numbered
-    free, loose = int((seen_as < 0).sum()), len(cells.ink) - len(numbered)
     small_px = float(SMALL_AREA_PX * scale * scale)
-    if free == 0:
-        return 0
-    if np.median(cells.area_px[numbered]) > small_px:
-        loose = 0
-    slope = gradients(cells.center_px, numbering.cell, lattice)
-    tables = lattice.ink, lattice.center_mm, lattice.axial, lattice.cell_of, lattice.layers
-    shown = _missed(image, cells.center_px, cells.area_px, slope, seen_as, *tables, small_px)
-    return min(loose, free) + int(shown)
+    return int(_missed(image, cells.center_px, cells.area_px, numbering.cell, lattice.plan, small_px))
 
 
 @compiled
@@ -52,34 +40,52 @@ def _saturated(color):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _missed(image, center_px, area_px, slope, seen_as, ink, center_mm, axial, cell_of, layers, small_px):  # type: ignore[no-untyped-def]
+def _missed(image, center_px, area_px, cell, plan, small_px):  # type: ignore[no-untyped-def]
+    """The small cells without a number that may have a place, and the places that show their ink."""
+    numbered = np.flatnonzero(cell >= 0)
+    free, loose = plan.ink.shape[0] - numbered.shape[0], cell.shape[0] - numbered.shape[0]
+    if free == 0:
+        return 0
+    if np.median(area_px[numbered]) > small_px:
+        loose = 0
+    return min(loose, free) + _shown(image, center_px, area_px, cell, numbered, plan, small_px)
+
+
+@compiled
+def _usual(image, center_px, area_px, cell, numbered, ink):  # type: ignore[no-untyped-def]
+    """(4, 3) the mean colors of the inks, grey taken off, 0 where there is none, and their strength."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    usual, color, own = np.zeros((4, 3)), np.zeros(3), np.zeros(4)
-    for u in range(ink.shape[0]):
-        i = seen_as[u]
-        if i >= 0:
-            radius = RADIUS * np.sqrt(area_px[i])
-            if sample_patch(flat, height, width, center_px[i, 0], center_px[i, 1], radius, color):
-                usual[ink[u]] += color
-                own[ink[u]] += 1.0
-    strength = np.zeros(4)
+    usual, strength, color, own = np.zeros((4, 3)), np.zeros(4), np.zeros(3), np.zeros(4)
+    for i in numbered:
+        radius = RADIUS * np.sqrt(area_px[i])
+        if sample_patch(flat, height, width, center_px[i, 0], center_px[i, 1], radius, color):
+            for channel in range(3):
+                usual[ink[cell[i]], channel] += color[channel]
+            own[ink[cell[i]]] += 1.0
     for k in range(1, 4):
         usual[k] /= max(own[k], 1.0)
         strength[k] = _saturated(usual[k])
-    count = 0
-    for v in range(ink.shape[0]):
-        if seen_as[v] >= 0 or strength[ink[v]] == 0.0:
+    return usual, strength
+
+
+@compiled
+def _shown(image, center_px, area_px, cell, numbered, plan, small_px):  # type: ignore[no-untyped-def]
+    """How many places beside numbered cells, where cells are small, show the ink that must be there."""
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    usual, strength = _usual(image, center_px, area_px, cell, numbered, plan.ink)
+    seen = seen_as(cell, plan.ink.shape[0])
+    slope = slopes(center_px, cell, seen, plan.center_mm, plan.beside)
+    count, color = 0, np.zeros(3)
+    for v in range(seen.shape[0]):
+        if seen[v] >= 0 or strength[plan.ink[v]] == 0.0:
             continue
         x, y, size, witnesses = 0.0, 0.0, 0.0, 0
         for k in range(6):
-            q, r = axial[v, 0] + SIX[k, 0], axial[v, 1] + SIX[k, 1]
-            if layer_of(q, r) > layers:
+            u = plan.beside[v, k]
+            if u < 0 or seen[u] < 0 or np.isnan(slope[seen[u], 0, 0]):
                 continue
-            u = cell_of[marker_id(q, r)]
-            if u < 0 or seen_as[u] < 0 or np.isnan(slope[seen_as[u], 0, 0]):
-                continue
-            i = seen_as[u]
-            dx, dy = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
+            i = seen[u]
+            dx, dy = plan.center_mm[v, 0] - plan.center_mm[u, 0], plan.center_mm[v, 1] - plan.center_mm[u, 1]
             x += center_px[i, 0] + slope[i, 0, 0] * dx + slope[i, 0, 1] * dy
             y += center_px[i, 1] + slope[i, 1, 0] * dx + slope[i, 1, 1] * dy
             size += area_px[i]
@@ -89,8 +95,11 @@ def _missed(image, center_px, area_px, slope, seen_as, ink, center_mm, axial, ce
         radius = RADIUS * np.sqrt(size / witnesses)
         if not sample_patch(flat, height, width, x / witnesses, y / witnesses, radius, color):
             continue
-        shown, wanted = _saturated(color), usual[ink[v]]
-        dot = color[0] * wanted[0] + color[1] * wanted[1] + color[2] * wanted[2]
-        if shown > MIN_STRENGTH * strength[ink[v]] and dot > MIN_COSINE * shown * strength[ink[v]]:
+        shown, wanted = _saturated(color), usual[plan.ink[v]]
+        likeness = color[0] * wanted[0] + color[1] * wanted[1] + color[2] * wanted[2]
+        if (
+            shown > MIN_STRENGTH * strength[plan.ink[v]]
+            and likeness > MIN_COSINE * shown * strength[plan.ink[v]]
+        ):
             count += 1
     return count

@@ -130,7 +130,7 @@ class Extractor:
             return Reason.REFERENCE_LOST
         if numbering.ambiguous:
             return Reason.AMBIGUOUS
-        return Found(cells, stages.done("attach", attach(cells, mesh, numbering, self._lattice)))
+        return Found(cells, stages.done("attach", attach(cells, numbering, self._lattice)))
 
     def _whole(self, bgr: NDArray[np.uint8], found: Found, scale: int, stages: Stages) -> bool:
         """Whether a finer scale would number no more cells than have been numbered."""

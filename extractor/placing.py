@@ -53,14 +53,7 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     Args:
         size: width and height of the image.
     """
-    slope = whole_slopes(
-        cells.center_px,
-        cells.corner_px,
-        numbering.cell,
-        numbering.mirrored,
-        lattice.arms_mm,
-        lattice.slope_tables,
-    )
+    slope = whole_slopes(cells.center_px, cells.corner_px, numbering.cell, numbering.mirrored, lattice.plan)
     seen = cells.center_px, cells.corner_px, slope, numbering.cell
     corners = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
     xy, around, there, kept = _merged(corners, len(lattice.marker_mm))

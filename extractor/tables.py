@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,22 @@ from .neighbourhood import INNER, inner_table, neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
 UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
+
+
+class Plan(NamedTuple):
+    """The layout's colored cells.
+
+    Attributes:
+        center_mm: (U, 2) float64. ink: (U,) uint8, 1 red, 2 green, 3 blue. size_mm: (U,) float64, the mean side.
+        arms_mm: (U, 3, 2) float64, from the center to the corners.
+        beside: (U, 6) int32, the cells that share a corner with each, in the order of ``SIX``; -1 for none.
+    """
+
+    center_mm: NDArray[np.float64]
+    ink: NDArray[np.uint8]
+    size_mm: NDArray[np.float64]
+    arms_mm: NDArray[np.float64]
+    beside: NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +89,9 @@ class Lattice:
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
 
     @cached_property
-    def slope_tables(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], int]:
-        """What a local map from the layout to the image needs of the layout."""
-        return self.center_mm, self.axial, self.cell_of, self.layers
+    def plan(self) -> Plan:
+        """The colored cells as compiled loops see them."""
+        return Plan(self.center_mm, self.ink, self.size_mm, self.arms_mm, self.beside)
 
     @cached_property
     def ring(self) -> NDArray[np.int32]:
