@@ -14,6 +14,7 @@ MAX_STRAY = 0.005  # of the cells seen may lie outside where they fit: dirt that
 MIN_MISFIT = 0.02  # of them must lie outside at every other place, and
 MIN_MISFITS = 5  # at least so many
 MARGIN = 3  # how far beyond the fitting places others are tried
+NONE = 1 << 30
 MAX_PLACES = 200  # places to try; where more could fit, none is certain
 
 
@@ -28,22 +29,31 @@ def settle(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
     stray = MAX_STRAY * len(at)
     if len(at) < MIN_SHARE * len(lattice.ink) or len(at) - len(lattice.ink) > stray:
         return None
-    ways: list[tuple[int, NDArray[np.int32]]] = []
-    outside: list[int] = []
+    best, next_best, turn, shift = _best(at, lattice.axial, lattice.cell_of, lattice.layers)
+    if not best <= stray or next_best - best < max(MIN_MISFITS, MIN_MISFIT * len(at)):
+        return None
+    return cells_at(turned(at, turn) + shift, lattice)
+
+
+@compiled
+def _best(at, axial, cell_of, layers):  # type: ignore[no-untyped-def]
+    """Of all ways, the fewest cells that lie outside and the next fewest, and the turn and (2,) int32 the shift of the
+    best; with too many ways or only one no numbers that could be enough."""
+    best, next_best, best_turn, best_shift, count = NONE, NONE, 0, np.zeros(2, np.int32), 0
     for turn in range(3):
         place = turned(at, turn)
-        shifts = _shifts(place, lattice.axial)
-        if len(ways) + len(shifts) > MAX_PLACES:
-            return None
-        ways += [(turn, shift) for shift in shifts]
-        outside += _outside(place, shifts, lattice.cell_of, lattice.layers).tolist()
-    order = np.argsort(outside, kind="stable")
-    if len(order) < 2 or outside[order[0]] > stray:
-        return None
-    if outside[order[1]] - outside[order[0]] < max(MIN_MISFITS, MIN_MISFIT * len(at)):
-        return None
-    turn, shift = ways[int(order[0])]
-    return cells_at(turned(at, turn) + shift, lattice)
+        shifts = _shifts(place, axial)
+        count += shifts.shape[0]
+        if count > MAX_PLACES:
+            return NONE, NONE, 0, best_shift
+        for n in range(shifts.shape[0]):
+            outside = _outside(place, shifts[n, 0], shifts[n, 1], cell_of, layers, next_best)
+            if outside < best:
+                best, next_best = outside, best
+                best_turn, best_shift = turn, shifts[n]
+            elif outside < next_best:
+                next_best = outside
+    return best, next_best if count > 1 else best, best_turn, best_shift
 
 
 @compiled
@@ -76,11 +86,13 @@ def _shifts(place, axial):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _outside(place, shifts, cell_of, layers):  # type: ignore[no-untyped-def]
-    """(S,) how many of the places, shifted so, hold no cell of the layout."""
-    out = np.zeros(shifts.shape[0], np.int64)
-    for n in range(shifts.shape[0]):
-        for i in range(place.shape[0]):
-            q, r = place[i, 0] + shifts[n, 0], place[i, 1] + shifts[n, 1]
-            out[n] += layer_of(q, r) > layers or cell_of[marker_id(q, r)] < 0
-    return out
+def _outside(place, q, r, cell_of, layers, enough):  # type: ignore[no-untyped-def]
+    """How many of the places, shifted so, hold no cell of the layout; counted until there are ``enough``."""
+    count = 0
+    for i in range(place.shape[0]):
+        count += layer_of(place[i, 0] + q, place[i, 1] + r) > layers or (
+            cell_of[marker_id(place[i, 0] + q, place[i, 1] + r)] < 0
+        )
+        if count >= enough:
+            break
+    return count

@@ -94,6 +94,12 @@ class Lattice:
         return Plan(self.center_mm, self.ink, self.size_mm, self.arms_mm, self.beside)
 
     @cached_property
+    def white_place(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(2,) mm the middle of the white cell, and (2, 2) mm per axial step in it."""
+        below, left, right = self.marker_mm[:3]
+        return (below + left + right) / 3, np.stack([right - left, right - below], axis=1)
+
+    @cached_property
     def ring(self) -> NDArray[np.int32]:
         """(M, 6) the markers around each, -1 beyond the pattern."""
         return np.ascontiguousarray(self.neighbours[:, INNER])

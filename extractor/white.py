@@ -76,41 +76,55 @@ def ways_from_white(
         image: (H, W, 3) uint8 BGR, at full scale.
         at: (N, 2) axial coordinates of the cells, up to turns and shifts; ``UNKNOWN`` for those not walked to.
     """
-    known, basis = _bases(cells.center_px, at)
+    center = cells.center_px
+    known, basis = _bases(center, at)
     # more cells than the layout has do not fit into it anywhere
     if len(known) == 0 or len(known) - len(lattice.ink) > MAX_OUTSIDE * len(known):
         return []
-    seen = cells.center_px, cells.area_px, cells.ink, at, known, basis
-    for number, ring in enumerate(RINGS):
+    radius, level, inks, strongest = _shown(image, center, cells.area_px, cells.ink, known)
+    layout = lattice.cell_of, lattice.layers, *lattice.white_place, lattice.center_mm
+    refused = np.empty((0, 2), np.int32)  # places that have been tried nearer
+    for number, (steps, offsets) in enumerate(RINGS):
         far = number > 0
-        places, mean, white, votes, color, inks = _whiteness(image, *seen, *ring, far)
-        if not far and not _dark(mean, votes):
+        dark, places, mean, white, black = _bright(
+            image, center, at, known, basis, radius, level, strongest, steps, offsets, far
+        )
+        if not dark:
             return []
-        bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
-        if len(bright) == 0:
-            continue
-        black = _between(color, votes)
-        found: list[tuple[float, Way]] = []
-        for place in bright:
-            cell, inside = _put(at, known, places[place], lattice.cell_of, lattice.layers)
-            outside = len(known) - inside
-            if outside <= MAX_OUTSIDE * len(known):
-                middle = white_cell(image, cells, cell, lattice, inks, black)
-                if middle is not None:
-                    way = Way(cell, inside, outside, middle, float(white[place]), not far)
-                    found.append((mean[place], way))
-        if found:
-            return [way for brightness, way in found if brightness > SAME_WHITE * found[0][0]]
+        cell, inside, middle = _tried(image, center, at, known, places, refused, layout, inks, black)
+        fits = np.flatnonzero(inside)
+        if len(fits) > 0:
+            like = [n for n in fits if mean[n] > SAME_WHITE * mean[fits[0]]]
+            return [
+                Way(cell[n], int(inside[n]), len(known) - int(inside[n]), middle[n], float(white[n]), not far)
+                for n in like
+            ]
+        refused = np.concatenate((refused, places))
     return []
 
 
 @compiled
-def _between(color, votes):  # type: ignore[no-untyped-def]
-    """(3,) the usual color of the places that the most cells surround."""
-    out, among = np.empty(3), np.flatnonzero(votes == votes.max())
+def _bright(image, center, at, known, basis, radius, level, strongest, steps, offsets, far):  # type: ignore[no-untyped-def]
+    """Whether it is dark between the inks at these steps from the known cells, which is not asked ``far`` away; the
+    bright places there, the brightest first, how bright, how white they are; and the color of the others."""
+    places, mean, white, votes, color = _whiteness(
+        image, center, at, known, basis, radius, level, strongest, steps, offsets, far
+    )
+    bright, black = np.empty(0, np.int64), np.empty(3)
+    dark = far or _dark(mean, votes)
+    if dark:
+        bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
+    if bright.shape[0] > 0:
+        _between(color, votes, black)
+    return dark, places[bright], mean[bright], white[bright], black
+
+
+@compiled
+def _between(color, votes, out):  # type: ignore[no-untyped-def]
+    """Write the usual color of the places that the most cells surround."""
+    among = color[votes == votes.max()]
     for channel in range(3):
-        out[channel] = np.median(color[among, channel])
-    return out
+        out[channel] = np.median(among[:, channel].copy())
 
 
 @compiled
@@ -177,9 +191,33 @@ def _bases(center, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):  # type: ignore[no-untyped-def]
+def _shown(image, center, area, ink, known):  # type: ignore[no-untyped-def]
+    """(K,) px the radius over which each known cell's color is taken, (K,) its level, the sum over the channels, NaN
+    outside the image; (4, 3) the inks' colors, 0 where there is none, and (3,) the most of each channel."""
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    own, radius, level = np.empty(3), np.empty(known.shape[0]), np.full(known.shape[0], np.nan)
+    colors, count = np.empty((4, 3, known.shape[0])), np.zeros(4, np.int64)
+    for n in range(known.shape[0]):
+        i = known[n]
+        radius[n] = 0.1 * np.sqrt(area[i])
+        if sample_patch(flat, height, width, center[i, 0], center[i, 1], radius[n], own):
+            for channel in range(3):
+                colors[ink[i], channel, count[ink[i]]] = own[channel]
+            count[ink[i]] += 1
+            level[n] = own.sum()
+    inks, strongest = np.zeros((4, 3)), np.zeros(3)
+    for channel in range(3):
+        for c in range(1, 4):
+            if count[c] > 0:
+                inks[c, channel] = np.median(colors[c, channel, : count[c]])
+                strongest[channel] = max(strongest[channel], inks[c, channel])
+    return radius, level, inks, strongest
+
+
+@compiled
+def _whiteness(image, center, at, known, basis, radius_of, level_of, strongest, steps, offsets, far):  # type: ignore[no-untyped-def]
     """The down-cells at these steps from numbered cells: axial places, brightness against the inks, how white, 0 where
-    it is colored, how many cells tell, (D, 3) their colors; and (4, 3) those of the inks, 0 where there is none.
+    it is colored, how many cells tell, and (D, 3) their colors.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
@@ -191,67 +229,83 @@ def _whiteness(image, center, area, ink, at, known, basis, steps, offsets, far):
     low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
     rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
     # x, y, radius and level, summed over the cells that see the place, and their number
-    sums = np.zeros((rows, columns, 5))
-    own, strongest = np.empty(3), np.zeros(3)
-    colors, count = np.full((4, known.shape[0], 3), np.nan), np.zeros(4, np.int64)
+    sums, found = np.zeros((rows * columns, 5)), 0
+    way = np.empty(steps.shape[0], np.int64)
+    for k in range(steps.shape[0]):
+        way[k] = steps[k, 0] * columns + steps[k, 1]
     for n in range(known.shape[0]):
         i = known[n]
-        radius = 0.1 * np.sqrt(area[i])
-        if not sample_patch(flat, height, width, center[i, 0], center[i, 1], radius, own):
+        if np.isnan(level_of[n]):
             continue
-        colors[ink[i], count[ink[i]]] = own
-        count[ink[i]] += 1
+        x, y, radius, level = center[i, 0], center[i, 1], radius_of[n], level_of[n]
+        a, b, c, d = basis[n, 0, 0], basis[n, 0, 1], basis[n, 1, 0], basis[n, 1, 1]
+        here = (at[i, 0] - low_q) * columns + at[i, 1] - low_r
         for k in range(steps.shape[0]):
-            cell = sums[at[i, 0] + steps[k, 0] - low_q, at[i, 1] + steps[k, 1] - low_r]
-            cell[0] += center[i, 0] + basis[n, 0, 0] * offsets[k, 0] + basis[n, 0, 1] * offsets[k, 1]
-            cell[1] += center[i, 1] + basis[n, 1, 0] * offsets[k, 0] + basis[n, 1, 1] * offsets[k, 1]
-            cell[2] += radius
-            cell[3] += own.sum()
-            cell[4] += 1.0
-    inks = np.zeros((4, 3))
-    for channel in range(3):
-        for c in range(1, 4):
-            if count[c] > 0:
-                inks[c, channel] = np.median(colors[c, : count[c], channel])
-                strongest[channel] = max(strongest[channel], inks[c, channel])
-    found = int((sums[:, :, 4] > 0.0).sum())
-    places, seen = np.empty((found, 2), np.int32), np.zeros((found, 3))
+            to = np.uint64(here + way[k])
+            found += sums[to, 4] == 0.0
+            sums[to, 0] += x + a * offsets[k, 0] + b * offsets[k, 1]
+            sums[to, 1] += y + c * offsets[k, 0] + d * offsets[k, 1]
+            sums[to, 2] += radius
+            sums[to, 3] += level
+            sums[to, 4] += 1.0
+    places, seen, own = np.empty((found, 2), np.int32), np.zeros((found, 3)), np.empty(3)
     ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
     found = 0
-    for q in range(rows):
-        for r in range(columns):
-            votes = sums[q, r, 4]
-            if votes == 0.0:
-                continue
+    for place in range(rows * columns):
+        votes = sums[place, 4]
+        if votes > 0.0:
             seen_by[found] = int(votes)
-            x, y, radius = sums[q, r, 0] / votes, sums[q, r, 1] / votes, sums[q, r, 2] / votes
-            level = sums[q, r, 3] / votes
-            places[found, 0], places[found, 1] = q + low_q, r + low_r
+            x, y, radius = sums[place, 0] / votes, sums[place, 1] / votes, sums[place, 2] / votes
+            level = sums[place, 3] / votes
+            places[found, 0], places[found, 1] = place // columns + low_q, place % columns + low_r
             if sample_patch(flat, height, width, x, y, radius, own):
                 brightness = own.sum() / max(level, 1.0)
-                seen[found] = own
                 for channel in range(3):
+                    seen[found, channel] = own[channel]
                     own[channel] /= max(strongest[channel], 1.0)
                 if own.min() > MIN_BALANCE * own.max():
                     white[found] = own.min()
                 ratio[found] = white[found] if far else brightness
             found += 1
-    return places, ratio, white, seen_by, seen, inks
+    return places, ratio, white, seen_by, seen
 
 
 @compiled
-def _put(at, known, white, cell_of, layers):  # type: ignore[no-untyped-def]
-    """(N,) int32 the layout's cell of each known cell, or -1, where a down-cell at the axial place ``white`` is the
-    white one; and how many have one.
+def _tried(image, center, at, known, places, refused, layout, inks, black):  # type: ignore[no-untyped-def]
+    """(P, N) int32 what ``_put`` makes of the known cells at each place that is not refused, (P,) how many cells have a
+    place in the layout, and (P, 2) px the middle of the white cell: 0 and NaN where it is not there."""
+    cell_of, layers, white_mm, to_mm, center_mm = layout
+    cell, inside = np.empty((places.shape[0], at.shape[0]), np.int32), np.zeros(places.shape[0], np.int64)
+    middle = np.full((places.shape[0], 2), np.nan)
+    for n in range(places.shape[0]):
+        anew = True
+        for k in range(refused.shape[0]):
+            anew = anew and (refused[k, 0] != places[n, 0] or refused[k, 1] != places[n, 1])
+        if not anew:
+            continue
+        count = _put(at, known, places[n], cell_of, layers, cell[n])
+        if count > 0:
+            middle[n] = white_cell(image, center, cell[n], white_mm, to_mm, center_mm, inks, black)
+            inside[n] = 0 if np.isnan(middle[n, 0]) else count
+    return cell, inside, middle
+
+
+@compiled
+def _put(at, known, place, cell_of, layers, out):  # type: ignore[no-untyped-def]
+    """Write the layout's cell of each known cell, or -1, where a down-cell at the axial place is the white one; how
+    many have one, 0 where too many have none.
 
     The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
     the right, to the left or above, and a turn by 0, 120 or 240 degrees brings it to the right.
     """
-    turn, inside = (white[0] - white[1]) % 3, 0
-    cell = np.full(at.shape[0], -1, np.int32)
+    turn, outside = (place[0] - place[1]) % 3, 0
+    out[:] = -1
     for i in known:
-        q, r = turned_place(at[i, 0] - white[0] + turn, at[i, 1] - white[1], turn)
+        q, r = turned_place(at[i, 0] - place[0] + turn, at[i, 1] - place[1], turn)
         if layer_of(q, r) <= layers:
-            cell[i] = cell_of[marker_id(q, r)]
-            inside += cell[i] >= 0
-    return cell, inside
+            out[i] = cell_of[marker_id(q, r)]
+        if out[i] < 0:
+            outside += 1
+            if outside > MAX_OUTSIDE * known.shape[0]:
+                return 0
+    return known.shape[0] - outside

@@ -7,13 +7,10 @@ a black cell, where two scratches cross, a drop or a reflection do not look so, 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .algebra import cholesky_solve, dot
-from .cells import Cells
 from .engine import compiled
 from .sampling import sample_patch
-from .tables import Lattice
 
 WITNESSES = 16  # numbered cells, the nearest, that say where it is
 MIN_WITNESSES = 3
@@ -27,8 +24,6 @@ FAINT = 0.3  # of an ink's strength above black: black, where its cell is missin
 TERMS = 6  # 1, x, y, xx, xy, yy
 # The corners of a down-cell from its middle, in axial steps: below, right above and left above.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
-FROM_CORNERS = np.linalg.inv(CORNERS[:2].T)
-MARKERS = [0, 2, 1]  # at them
 INKS = np.array([2, 3, 1])  # of the cells opposite to them
 # In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
 INSIDE = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
@@ -39,58 +34,70 @@ OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(SIDES) - 0.25 * CORNERS[[2, 2,
 GRID, GRID_REACH = 4, 0.8  # places over which the centroid is taken
 
 
-def white_cell(
-    image: NDArray[np.uint8],
-    cells: Cells,
-    cell: NDArray[np.int32],
-    lattice: Lattice,
-    inks: NDArray[np.float64],
-    black: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
-    """(2,) px the middle of the white cell, where these numbers put it; None where it is not.
+@compiled
+def white_cell(image, center_px, cell, white_mm, to_mm, center_mm, inks, black):  # type: ignore[no-untyped-def]
+    """(2,) px the middle of the white cell, where these numbers put it; NaN where it is not.
 
     Args:
         cell: (N,) the layout's cell of each cell of the image, or -1.
+        white_mm: (2,) the middle of the white cell. to_mm: (2, 2) mm per axial step there.
         inks: (4, 3) the colors of red, green and blue from row 1 on. black: (3,) the color between them.
     """
-    known = np.flatnonzero(cell >= 0)
-    corners = lattice.marker_mm[MARKERS]
-    middle = (corners[0] + corners[1] + corners[2]) / 3
-    # from axial steps to mm, for this cell
-    to_mm = (corners[:2] - middle).T @ FROM_CORNERS
-    where, slope = _map_at(cells.center_px[known], lattice.center_mm[cell[known]] - middle, to_mm)
+    where, slope = _map_at(center_px, cell, white_mm, to_mm, center_mm)
     if np.isnan(where[0]):
-        return None
-    found: NDArray[np.float64] = _middle(image, where, slope @ to_mm, inks, black)
-    return None if np.isnan(found[0]) else found
+        return where
+    axial = np.empty((2, 2))
+    for row in range(2):
+        for column in range(2):
+            axial[row, column] = slope[row, 0] * to_mm[0, column] + slope[row, 1] * to_mm[1, column]
+    return _middle(image, where, axial, inks, black)
 
 
 @compiled
-def _map_at(center_px, place_mm, to_mm):  # type: ignore[no-untyped-def]
-    """Where the map of the layout to the image through the cells nearest to the origin puts this, (2,) px, NaN where
+def _witnesses(cell, white_mm, center_mm):  # type: ignore[no-untyped-def]
+    """The numbered cells whose places in the layout are the nearest to the white one, and their squared distances."""
+    near, square, found = np.empty(WITNESSES, np.int64), np.empty(WITNESSES), 0
+    for i in range(cell.shape[0]):
+        if cell[i] < 0:
+            continue
+        x, y = center_mm[cell[i], 0] - white_mm[0], center_mm[cell[i], 1] - white_mm[1]
+        apart, k = x * x + y * y, min(found, WITNESSES - 1)
+        if found == WITNESSES and apart >= square[k]:
+            continue
+        while k > 0 and square[k - 1] > apart:
+            near[k], square[k] = near[k - 1], square[k - 1]
+            k -= 1
+        near[k], square[k] = i, apart
+        found = min(found + 1, WITNESSES)
+    return near[:found], square[:found]
+
+
+@compiled
+def _map_at(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-untyped-def]
+    """Where the map of the layout to the image through the cells nearest to the white one puts that, (2,) px, NaN where
     that is doubtful; and (2, 2) px per mm there."""
-    squares = (place_mm**2).sum(axis=1)
-    near = np.argsort(squares)[:WITNESSES]
+    near, squares = _witnesses(cell, white_mm, center_mm)
     nowhere = np.full(2, np.nan), np.full((2, 2), np.nan)
     count = near.shape[0]
     if count < MIN_WITNESSES:
         return nowhere
-    scale2 = squares[near].mean()
-    scale = np.sqrt(scale2)
+    scale = np.sqrt(squares.mean())
     rows, weight = np.empty((count, TERMS)), np.empty(count)
     normal, right = np.zeros((TERMS, TERMS)), np.zeros((3, TERMS))
     right[2, 0] = 1.0
-    about = center_px[near[0]].copy()
+    about_x, about_y = center_px[near[0], 0], center_px[near[0], 1]
     for k in range(count):
-        x, y = place_mm[near[k], 0] / scale, place_mm[near[k], 1] / scale
+        i, u = near[k], cell[near[k]]
+        x, y = (center_mm[u, 0] - white_mm[0]) / scale, (center_mm[u, 1] - white_mm[1]) / scale
         rows[k, 0], rows[k, 1], rows[k, 2] = 1.0, x, y
         rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
         weight[k] = 1.0 / (0.3 + x * x + y * y)
         for a in range(TERMS):
-            for axis in range(2):
-                right[axis, a] += weight[k] * rows[k, a] * (center_px[near[k], axis] - about[axis])
+            moment = weight[k] * rows[k, a]
+            right[0, a] += moment * (center_px[i, 0] - about_x)
+            right[1, a] += moment * (center_px[i, 1] - about_y)
             for b in range(a + 1):
-                normal[a, b] += weight[k] * rows[k, a] * rows[k, b]
+                normal[a, b] += moment * rows[k, b]
     total = weight.sum()
     for a in range(3, TERMS):
         normal[a, a] += RIDGE * total
@@ -99,14 +106,25 @@ def _map_at(center_px, place_mm, to_mm):  # type: ignore[no-untyped-def]
         return nowhere
     left = 0.0
     for k in range(count):
-        for axis in range(2):
-            left += weight[k] * (center_px[near[k], axis] - about[axis] - (rows[k] * right[axis]).sum()) ** 2
+        u, v = center_px[near[k], 0] - about_x, center_px[near[k], 1] - about_y
+        for a in range(TERMS):
+            u -= rows[k, a] * right[0, a]
+            v -= rows[k, a] * right[1, a]
+        left += weight[k] * (u * u + v * v)
     slope = right[:2, 1:3] / scale
-    axial = slope @ to_mm
-    edge2 = abs(axial[0, 0] * axial[1, 1] - axial[0, 1] * axial[1, 0]) * 2.0 / np.sqrt(3.0)
+    determinant = (slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]) * (
+        to_mm[0, 0] * to_mm[1, 1] - to_mm[0, 1] * to_mm[1, 0]
+    )
+    edge2 = abs(determinant) * 2.0 / np.sqrt(3.0)
     if not left / (2.0 * total) * (1.0 + right[2, 0] * total / count) < MAX_SIGMA**2 * edge2:
         return nowhere
-    return about + right[:2, 0], slope
+    return np.array([about_x + right[0, 0], about_y + right[1, 0]]), slope
+
+
+@compiled
+def _whiteness(color, strongest):  # type: ignore[no-untyped-def]
+    """The weakest channel of a color, against the strongest of all inks."""
+    return min(color[0] / strongest[0], color[1] / strongest[1], color[2] / strongest[2])
 
 
 @compiled
@@ -115,9 +133,9 @@ def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
     strongest, nowhere = np.ones(3), np.full(2, np.nan)
     for channel in range(3):
         strongest[channel] = max(inks[:, channel].max(), 1.0)
-    ground = (black / strongest).min()  # the whiteness of black, or of the palest ink
+    ground = _whiteness(black, strongest)  # of black, or of the palest ink
     for c in range(1, 4):
-        ground = max(ground, (inks[c] / strongest).min())
+        ground = max(ground, _whiteness(inks[c], strongest))
     # the centroid tells where it is better than the map does, unless something white stands beside it
     if _fills(image, where, slope, ground, strongest) and _amid_inks(image, where, slope, inks, black):
         return where.copy()
@@ -147,7 +165,7 @@ def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untype
         for b in range(-GRID, GRID + 1):
             u, v = GRID_REACH * a / GRID, GRID_REACH * b / GRID
             if abs(a + b) <= GRID and _sampled(image, where, slope, u, v, own):
-                weight = max((own / strongest).min() - ground, 0.0)
+                weight = max(_whiteness(own, strongest) - ground, 0.0)
                 total, q, r = total + weight, q + weight * u, r + weight * v
     return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
 
@@ -158,16 +176,16 @@ def _fills(image, middle, slope, ground, strongest):  # type: ignore[no-untyped-
     own = np.empty(3)
     if not _sampled(image, middle, slope, 0.0, 0.0, own):
         return False
-    reach = max((own / strongest).min() - ground, 1e-3)
+    reach = max(_whiteness(own, strongest) - ground, 1e-3)
     for n in range(INSIDE.shape[0]):
         if not _sampled(image, middle, slope, INSIDE[n, 0], INSIDE[n, 1], own):
             return False
         least = MIN_CORNER if n < CORNERS.shape[0] else MIN_INSIDE
-        if (own / strongest).min() - ground < least * reach:
+        if _whiteness(own, strongest) - ground < least * reach:
             return False
     for n in range(OUTSIDE.shape[0]):
         seen = _sampled(image, middle, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
-        if seen and (own / strongest).min() - ground > MAX_OUTSIDE * reach:
+        if seen and _whiteness(own, strongest) - ground > MAX_OUTSIDE * reach:
             return False
     return True
 
