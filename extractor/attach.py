@@ -33,7 +33,7 @@ TERMS = 6  # 1, x, y, xx, xy, yy
 # A witness's products: of the terms with each other, those of one power together, and with its place in the layout.
 PRODUCT = np.array([[0, 1, 2, 3, 4, 5], [1, 3, 4, 6, 7, 8], [2, 4, 5, 7, 8, 9]])
 PRODUCT = np.concatenate([PRODUCT, [[3, 6, 7, 10, 11, 12], [4, 7, 8, 11, 12, 13], [5, 8, 9, 12, 13, 14]]])
-PLACE_X, PLACE_Y, CLOSENESS, PRODUCTS = 15, 21, 27, 28
+PLACE_X, PLACE_Y, CLOSENESS, PRODUCTS = 15, 21, 27, 32
 
 
 def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
@@ -96,7 +96,8 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
     turn, maps = np.full(cell.shape[0], UNTURNED, np.int64), np.empty((cell.shape[0], 2, 2))
     slope = slopes(center, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside)
     claims = np.zeros(free.shape[0], np.int32)
-    index, square, rows = np.empty(WITNESSES, np.int32), np.empty(WITNESSES), np.empty((WITNESSES, PRODUCTS))
+    index, square, rows = np.empty(WITNESSES, np.int32), np.empty(WITNESSES), np.zeros((WITNESSES, PRODUCTS))
+    room = _room()
     for _ in range(ROUNDS):
         touched = spread(center, corner, area, ink, shaped, cell, free, turn, maps, slope, fresh, plan, step)
         fresh = np.concatenate((fresh, touched))
@@ -119,7 +120,7 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
                 claim[n], gap[n] = -1, np.sqrt(square[0]) / edge_of(area[known[index[0]]])
                 # far beyond reach, whatever the map
                 if gap[n] < 2.0 * REACH:
-                    x, y, size = _predicted(center, i, known, index[:count], square, cell, plan, rows)
+                    x, y, size = _predicted(center, i, known, index[:count], square, cell, plan, rows, room)
                     claim[n] = _nearest_of(places, x, y, MAX_MISFIT * size, ink[i], plan)
             if claim[n] >= 0:
                 claims[claim[n]] += 1
@@ -131,6 +132,13 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
             count = nearest(xy, grid, center[i, 0], center[i, 1], index, square)
             turn[i] = _turn_near(center, corner, i, known, index[:count], cell, turn, maps, slope, plan, step)
     return cell
+
+
+@compiled
+def _room():  # type: ignore[no-untyped-def]
+    """What ``_robust`` needs for its numbers: weights, squares and ranks of the witnesses, a system and its sums."""
+    of_witnesses = np.empty(WITNESSES), np.empty(WITNESSES), np.empty(WITNESSES, np.int64)
+    return *of_witnesses, np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCTS)
 
 
 @compiled
@@ -187,12 +195,12 @@ def _nearest_of(places, x, y, limit, ink, plan):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predicted(center, i, known, near, square, cell, plan, rows):  # type: ignore[no-untyped-def]
+def _predicted(center, i, known, near, square, cell, plan, rows, room):  # type: ignore[no-untyped-def]
     """Where cell i lies in the layout by its witnesses (the nearest first), NaN where that is doubtful, and the size of
     a cell there, mm.
 
     In units of the witnesses' mean distance, with the cell at the origin, so that the map's first term is the place.
-    ``rows`` is a buffer.
+    ``rows`` and ``room`` are buffers.
     """
     count = near.shape[0]
     scale, size, middle_x, middle_y = 0.0, 0.0, 0.0, 0.0
@@ -207,7 +215,8 @@ def _predicted(center, i, known, near, square, cell, plan, rows):  # type: ignor
         x, y, u = (center[j, 0] - center[i, 0]) / scale, (center[j, 1] - center[i, 1]) / scale, cell[j]
         _lay(rows[k], x, y, plan.center_mm[u, 0] - middle_x, plan.center_mm[u, 1] - middle_y)
         rows[k, CLOSENESS] = 1.0 / (0.3 + square[k] / scale**2)
-    terms, variance, leverage = _robust(rows[:count], (EXACT * size) ** 2)
+    rows[count:, CLOSENESS] = 0.0
+    terms, variance, leverage = _robust(rows, count, (EXACT * size) ** 2, room)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) / scale
     sure = (
         np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
@@ -230,12 +239,13 @@ def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
 
 @vectorized
 def _sums(rows, weight, out):  # type: ignore[no-untyped-def]
-    """Write the weighted sums of the witnesses' products."""
+    """Write the weighted sums of the witnesses' products, four witnesses at once."""
     for m in range(PRODUCTS):
         out[m] = 0.0
-    for k in range(rows.shape[0]):
+    for k in range(0, WITNESSES, 4):
+        a, b, c, d = weight[k], weight[k + 1], weight[k + 2], weight[k + 3]
         for m in range(PRODUCTS):
-            out[m] += weight[k] * rows[k, m]
+            out[m] += a * rows[k, m] + b * rows[k + 1, m] + c * rows[k + 2, m] + d * rows[k + 3, m]
 
 
 @compiled
@@ -244,8 +254,9 @@ def _median(values, rank):  # type: ignore[no-untyped-def]
     count = values.shape[0]
     rank[:count] = 0
     for j in range(count):
+        own = values[j]
         for i in range(count):
-            rank[i] += (values[j] < values[i]) | ((values[j] == values[i]) & (j < i))
+            rank[i] += (own < values[i]) | ((own == values[i]) & (j < i))
     low, high = 0.0, 0.0
     for i in range(count):
         low = values[i] if rank[i] == (count - 1) // 2 else low
@@ -254,12 +265,12 @@ def _median(values, rank):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _robust(rows, exact2):  # type: ignore[no-untyped-def]
+def _robust(rows, count, exact2, room):  # type: ignore[no-untyped-def]
     """(2, 6) the map's terms by robust least squares, the variance about it, and the leverage at the origin; infinite
-    where the witnesses lie in a row."""
-    count = rows.shape[0]
-    weight, squares, rank = rows[:, CLOSENESS].copy(), np.empty(count), np.empty(count, np.int64)
-    normal, right, sums = np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCTS)
+    where the witnesses lie in a row. ``room`` is for what is computed on the way."""
+    weight, squares, rank, normal, right, sums = room
+    for k in range(WITNESSES):
+        weight[k] = rows[k, CLOSENESS]
     for number in range(ROBUST_ROUNDS):
         _sums(rows, weight, sums)
         largest = 0.0
@@ -280,7 +291,7 @@ def _robust(rows, exact2):  # type: ignore[no-untyped-def]
                 u += rows[k, a] * right[0, a]
                 v += rows[k, a] * right[1, a]
             squares[k] = u * u + v * v
-        usual, total, about = 2.0 * _median(squares, rank) + exact2, 0.0, 0.0
+        usual, total, about = 2.0 * _median(squares[:count], rank) + exact2, 0.0, 0.0
         leverage = right[2, 0] * sums[0] / count
         for k in range(count):
             weight[k] = rows[k, CLOSENESS] / (1.0 + squares[k] / usual)

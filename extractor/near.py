@@ -44,26 +44,54 @@ def nearest(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
     rows, wanted, found = (begin.shape[0] - 1) // columns, index.shape[0], 0
     column = min(max(int(np.floor((x - low_x) / step)), 0), columns - 1)
     row = min(max(int(np.floor((y - low_y) / step)), 0), rows - 1)
-    # from outside the grid every ring of buckets is farther off than its number says
+    u, v = (x - low_x) / step, (y - low_y) / step
     for ring in range(max(rows, columns)):
-        reach = (ring - 1) * step  # what is in this ring is at least so far
-        if found == wanted and reach > 0.0 and square[found - 1] <= reach * reach:
-            break
-        for v in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
-            whole = abs(v - row) == ring
-            for side in range(2 * ring + 1 if whole else 2 if ring > 0 else 1):
-                u = column - ring + (side if whole else side * 2 * ring)
-                if u < 0 or u >= columns:
-                    continue
-                for k in range(begin[v * columns + u], begin[v * columns + u + 1]):
-                    i = order[k]
-                    apart = (xy[i, 0] - x) ** 2 + (xy[i, 1] - y) ** 2
-                    if found == wanted and apart >= square[found - 1]:
-                        continue
-                    at = found if found < wanted else found - 1
-                    found = min(found + 1, wanted)
-                    while at > 0 and square[at - 1] > apart:
-                        square[at], index[at] = square[at - 1], index[at - 1]
-                        at -= 1
-                    square[at], index[at] = apart, i
+        if found == wanted and ring > 0:
+            # what has not been seen lies beyond the rings before, and within the grid
+            beyond = np.inf
+            if column >= ring:
+                beyond = min(beyond, u - (column - ring + 1))
+            if column + ring < columns:
+                beyond = min(beyond, column + ring - u)
+            if row >= ring:
+                beyond = min(beyond, v - (row - ring + 1))
+            if row + ring < rows:
+                beyond = min(beyond, row + ring - v)
+            if beyond > 0.0 and square[found - 1] <= (beyond * step) ** 2:
+                break
+        left, right = max(column - ring, 0), min(column + ring, columns - 1)
+        for line in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+            first = line * columns
+            if abs(line - row) == ring:
+                found = _take(
+                    xy, order, begin[first + left], begin[first + right + 1], x, y, index, square, found
+                )
+                continue
+            if column >= ring:
+                found = _take(
+                    xy, order, begin[first + left], begin[first + left + 1], x, y, index, square, found
+                )
+            if column + ring < columns:
+                found = _take(
+                    xy, order, begin[first + right], begin[first + right + 1], x, y, index, square, found
+                )
+    return found
+
+
+@compiled
+def _take(xy, order, begin, end, x, y, index, square, found):  # type: ignore[no-untyped-def]
+    """Put those of the ordered points that are nearer than the last into their places; how many there are now."""
+    wanted = index.shape[0]
+    for k in range(begin, end):
+        i = order[k]
+        dx, dy = xy[i, 0] - x, xy[i, 1] - y
+        apart = dx * dx + dy * dy
+        if found == wanted and apart >= square[found - 1]:
+            continue
+        at = found if found < wanted else found - 1
+        found = min(found + 1, wanted)
+        while at > 0 and square[at - 1] > apart:
+            square[at], index[at] = square[at - 1], index[at - 1]
+            at -= 1
+        square[at], index[at] = apart, i
     return found
