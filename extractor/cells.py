@@ -61,6 +61,14 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
     return Cells(*_gathered(seeds.center, seeds.ink, seeds.area_px, *found, scale, seeds.crowded))
 
 
+def with_triangles(cells: Cells, triangles: Triangles) -> Cells:
+    """The cells with these for their triangles, whose ``region`` is the cell."""
+    center, corners = cells.center_px.copy(), cells.corner_px.copy()
+    corners[triangles.region] = triangles.corner_px
+    center[triangles.region] = triangles.corner_px.mean(axis=1)
+    return Cells(center, cells.ink, cells.area_px, corners)
+
+
 @compiled
 def _gathered(place, ink_of, area_px, region, corner_px, scale, crowded):  # type: ignore[no-untyped-def]
     """The fields of ``Cells``."""

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .amid import amid, outlined
 from .attach import attach
-from .cells import Cells, find_cells
+from .cells import Cells, find_cells, with_triangles
 from .color import nominal_hues_deg, to_colors
 from .errors import LayoutError
 from .fit import Seen
@@ -22,14 +23,14 @@ from .placing import Places, place
 from .presets import PRESETS, Preset
 from .reference import Reference
 from .refine import Refiner
-from .regions import NO_CROWD, find_seeds, grow, large_enough
+from .regions import NO_CROWD, Seeds, find_seeds, grow, large_enough
 from .repair import repair
 from .segmentation import segment
 from .sight import Sights
 from .tables import lattice_of
 from .target import find_target
 from .topology import topology_of
-from .triangles import fit_triangles
+from .triangles import fit_triangles, rough_triangles
 from .types import Markers, Origin, Reason
 from .virtual import place_virtual
 
@@ -118,10 +119,34 @@ class Extractor:
 
     def _number(self, sights: Sights, scale: int, stages: Stages) -> Found | Reason:
         """Stages 1 to 7 at 1/``scale`` of the image's scale, or why they do not number anything."""
-        bgr = sights.at(1).image
-        cells = self._recognise(sights, scale, stages)
-        if cells is None:
+        seeds = self._find(sights, scale, stages)
+        if seeds is None:
             return Reason.NO_COLOR
+        if scale > 1 and not large_enough(seeds):
+            return self._amid(sights, seeds, scale, stages) or Reason.NO_COLOR
+        regions = stages.done("grow", grow(stages.results["segment"], seeds))
+        triangles = stages.done("triangles", fit_triangles(sights.at(1).image, regions, scale))
+        cells = stages.done("cells", find_cells(seeds, triangles, scale))
+        return self._connect(sights, cells, stages)
+
+    def _amid(self, sights: Sights, seeds: Seeds, scale: int, stages: Stages) -> Found | None:
+        """The whole pattern by the centers of its cells, where these are too small at this scale for more."""
+        if not amid(seeds, len(self._lattice.ink)):
+            return None
+        rough = stages.done("triangles", rough_triangles(seeds, scale))
+        cells = stages.done("cells", find_cells(seeds, rough, scale))
+        found = self._connect(sights, cells, stages)
+        if not isinstance(found, Found):
+            return None
+        triangles = outlined(sights.at(1).image, cells, found.numbering, self._lattice)
+        if triangles is None:
+            return None
+        stages.done("triangles", triangles)
+        return Found(stages.done("cells", with_triangles(cells, triangles)), found.numbering)
+
+    def _connect(self, sights: Sights, cells: Cells, stages: Stages) -> Found | Reason:
+        """Stages 6 and 7."""
+        bgr = sights.at(1).image
         mesh = stages.done("mesh", build_mesh(cells))
         if mesh is None or int((mesh.turn != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
             return Reason.NO_PATTERN
@@ -137,20 +162,16 @@ class Extractor:
         count = stages.done("missed", missed(bgr, found.cells, found.numbering, self._lattice, scale))
         return int(count) <= MAX_MISSED * len(self._lattice.ink)
 
-    def _recognise(self, sights: Sights, scale: int, stages: Stages) -> Cells | None:
-        """Stages 1 to 5; None where an ink is absent, or the cells are too small for a reduced scale."""
+    def _find(self, sights: Sights, scale: int, stages: Stages) -> Seeds | None:
+        """Stages 1 to 3; None where an ink is absent."""
         colors = stages.done("color", to_colors(sights.at(scale).image))
         target = stages.done("target", find_target(colors))
         segmentation = stages.done("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
             return None
         # at a reduced scale, a crowd is what another scale may tell
-        seeds = stages.done("seeds", find_seeds(segmentation, self._crowd if scale == 1 else NO_CROWD))
-        if scale > 1 and not large_enough(seeds):
-            return None
-        regions = stages.done("grow", grow(segmentation, seeds))
-        triangles = stages.done("triangles", fit_triangles(sights.at(1).image, regions, scale))
-        return stages.done("cells", find_cells(seeds, triangles, scale))  # type: ignore[no-any-return]
+        crowd = self._crowd if scale == 1 else NO_CROWD
+        return stages.done("seeds", find_seeds(segmentation, crowd))  # type: ignore[no-any-return]
 
     def _measure(self, sights: Sights, found: Found, stages: Stages) -> Markers:
         """The places of what has been numbered, and what follows from them."""

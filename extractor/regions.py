@@ -32,6 +32,8 @@ class Seeds:
         center: (N, 2) float64, the domain's geometric center.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) int64, the domain's area.
+        runs: (R, 4) int32, the horizontal runs of one ink: y, first x, last x, ink.
+        domain: (R,) int32, the domain that a run belongs to, -1 where it is clutter.
         crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
     """
 
@@ -39,6 +41,8 @@ class Seeds:
     center: NDArray[np.float64]
     ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
+    runs: NDArray[np.int32]
+    domain: NDArray[np.int32]
     crowded: bool = False
 
 
@@ -215,7 +219,32 @@ def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
     runs, parent = _runs(segmentation.label)
     domain, area, crowded = _domains(runs, parent, crowd)
     xy, center, ink, area_px = _seeds(runs, domain, area)
-    return Seeds(xy, center, ink, area_px, crowded)
+    return Seeds(xy, center, ink, area_px, runs, domain, crowded)
+
+
+@compiled
+def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
+    """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown."""
+    out = np.zeros((seed_xy.shape[0], MOMENTS))
+    for i in range(runs.shape[0]):
+        d = domain[i]
+        if d < 0:
+            continue
+        row, y = out[d], float(runs[i, 0] - seed_xy[d, 1])
+        for k in range(runs[i, 1], runs[i, 2] + 1):
+            x = float(k - seed_xy[d, 0])
+            xx, xy, yy = x * x, x * y, y * y
+            row[0] += 1.0
+            row[1] += x
+            row[2] += y
+            row[3] += xx
+            row[4] += xy
+            row[5] += yy
+            row[6] += xx * x
+            row[7] += xx * y
+            row[8] += x * yy
+            row[9] += yy * y
+    return out
 
 
 def large_enough(seeds: Seeds) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
-from .regions import Regions
+from .regions import Regions, Seeds, domain_moments
 from .sampling import MARGIN, clamp, fixed, fixed_step, sample_fixed, sample_patch
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
@@ -17,8 +17,9 @@ CORNER_RADIUS = np.sqrt(8.0)
 THIRD_MOMENT = 8.0**1.5 / 10.0
 HALF_ROOT = np.sqrt(0.75)
 MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a square have 0
+ROUGH_TRIANGULARITY = 0.1  # of what has too few pixels to tell
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
-MIN_AREA_PX = 4
+MIN_AREA_PX = 4.0
 MAX_GROWTH = 3.0  # of a domain's area over its region's
 FIRST = 0.25  # of an edge, where its first profile crosses it; the second does as far from its end
 HALF_PROFILE = 4  # samples on each side of an edge
@@ -52,7 +53,7 @@ class Triangles:
 
 
 @compiled
-def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
+def _fit(moments, seed, domain_px, min_area, least):  # type: ignore[no-untyped-def]
     """Triangles with the regions' moments up to the third order, and which regions are triangles at all."""
     count = moments.shape[0]
     corners = np.zeros((count, 3, 2))
@@ -84,7 +85,7 @@ def _fit(moments, seed, domain_px, min_area):  # type: ignore[no-untyped-def]
         uvv = ia * (ib * ib * xxx + 2 * ib * ic * xxy + ic * ic * xyy)
         vvv = ib**3 * xxx + 3 * ib * ib * ic * xxy + 3 * ib * ic * ic * xyy + ic**3 * yyy
         real, imaginary = uuu - 3 * uvv, 3 * uuv - vvv
-        if np.hypot(real, imaginary) < MIN_TRIANGULARITY * THIRD_MOMENT:
+        if np.hypot(real, imaginary) < least * THIRD_MOMENT:
             continue
         angle = np.arctan2(imaginary, real) / 3.0
         # growing stops where the blurred rim darkens; the domain, cut nearer to the half level, tells the size
@@ -159,7 +160,7 @@ def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # 
 
 
 @compiled
-def _fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
+def fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
     """Move every triangle's corners to where the lines of its edges meet; in place.
 
     The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
@@ -205,6 +206,14 @@ def _meeting(lines, corners, limit, moved):  # type: ignore[no-untyped-def]
     return True
 
 
+def rough_triangles(seeds: Seeds, scale: int) -> Triangles:
+    """The domains that are triangles by shape, by their moments alone: without growing, without sub-pixel edges."""
+    moments = domain_moments(seeds.runs, seeds.domain, seeds.xy)
+    corners, good = _fit(moments, seeds.xy, seeds.area_px, MIN_AREA_PX, ROUGH_TRIANGULARITY)
+    corners = (corners + 0.5) * scale - 0.5
+    return Triangles(corners[good], seeds.ink[good], np.flatnonzero(good).astype(np.int32))
+
+
 def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:
     """Stage 5: keep the regions that are triangles by shape and size, and place their edges with sub-pixel accuracy.
 
@@ -213,9 +222,9 @@ def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) ->
         regions: grown at 1/``scale`` of the image's scale.
         scale: full-scale pixels per pixel of the regions.
     """
-    corners, good = _fit(regions.moments, regions.seed, regions.domain_px, float(MIN_AREA_PX))
+    corners, good = _fit(regions.moments, regions.seed, regions.domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
-    _fit_edges(image, corners, good)
+    fit_edges(image, corners, good)
     return Triangles(
         corner_px=corners[good], ink=regions.ink[good], region=np.flatnonzero(good).astype(np.int32)
     )

@@ -1,0 +1,86 @@
+"""A small pattern amid much else is numbered by its cells' centers at a reduced scale, or read as any other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.stress_suite.conditions import BY_NAME, matching
+from benchmarks.stress_suite.frames import Shot
+from benchmarks.stress_suite.kinds import frame_of
+from benchmarks.stress_suite.reading import extractor_of, wrong_in
+from extractor.amid import amid, outlined
+from extractor.cells import Cells
+from extractor.numbering import Numbering
+from extractor.regions import find_seeds
+from extractor.tables import lattice_of
+from extractor.types import Markers
+
+
+def shot_of(name: str) -> Shot:
+    case = matching(name)[0]
+    return frame_of(case, BY_NAME[case.kind]).shoot()
+
+
+def largest_error_px(markers: Markers, shot: Shot) -> float:
+    wrong, truth = wrong_in(shot, markers)
+    assert not wrong.any()
+    return float(np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1).max())
+
+
+@pytest.mark.parametrize(
+    "name", ["pattern behind=14/elliptical/200", "busy=400/honeycomb/0", "tilt=60/round/100"]
+)
+def test_small_cells_are_numbered_by_their_centers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is grown, and every marker lies where it lies when all is read at full scale."""
+    shot = shot_of(name)
+    extractor = extractor_of(name.split("/")[1], 11)
+    markers = extractor.extract(shot.image)
+    assert "grow" not in markers.stages and (markers.status == 1).all()
+    monkeypatch.setattr("extractor.pipeline.amid", lambda seeds, cells: False)
+    fully = extractor.extract(shot.image)
+    assert "grow" in fully.stages
+    apart = np.linalg.norm(markers.xy_px - fully.xy_px, axis=1)
+    sigma = np.sqrt(np.trace(fully.cov_px2, axis1=1, axis2=2))
+    assert (apart < 5 * sigma).all() and np.median(apart) < 0.01
+    assert largest_error_px(markers, shot) < largest_error_px(fully, shot) + 0.1
+
+
+def test_what_is_not_whole_is_read_at_full_scale() -> None:
+    """A cell that is gone takes the way for damage."""
+    shot = shot_of("pattern behind=30/round/100")
+    extractor = extractor_of("round", 11)
+    x, y = extractor.extract(shot.image).xy_px[40]
+    image = shot.image.copy()
+    image[round(y) - 9 : round(y) + 10, round(x) - 9 : round(x) + 10] = 20
+    markers = extractor.extract(image)
+    assert "grow" in markers.stages and (markers.status > 0).sum() > 385
+
+
+def test_noise_is_not_tried() -> None:
+    """Its specks tell; and fewer domains than the pattern has cells are not amid anything."""
+    noise = find_seeds(
+        extractor_of("honeycomb", 11).extract(shot_of("nothing: noise=3").image).stages["segment"]
+    )
+    assert not amid(noise, 363)
+    shot = shot_of("busy=400/honeycomb/0")
+    seeds = extractor_of("honeycomb", 11).extract(shot.image).stages["seeds"]
+    assert amid(seeds, 363) and not amid(seeds, len(seeds.ink))
+
+
+def test_edges_are_looked_for_where_the_numbers_say() -> None:
+    """Where they are not, or a cell is missing, there is no result."""
+    extractor = extractor_of("honeycomb", 11)
+    shot = shot_of("busy=400/honeycomb/0")
+    stages = extractor.extract(shot.image).stages
+    lattice = lattice_of(extractor.layout)
+    cells, numbering = stages["cells"], stages["attach"]
+    found = outlined(shot.image, cells, numbering, lattice)
+    assert found is not None
+    np.testing.assert_allclose(found.corner_px, cells.corner_px[found.region], atol=0.5)
+    aside = Cells(cells.center_px + 12.0, cells.ink, cells.area_px, cells.corner_px)
+    assert outlined(shot.image, aside, numbering, lattice) is None
+    fewer = numbering.cell.copy()
+    fewer[fewer == 7] = -1
+    incomplete = Numbering(fewer, numbering.mirrored, numbering.white_px, 0)
+    assert outlined(shot.image, cells, incomplete, lattice) is None
