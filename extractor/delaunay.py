@@ -33,27 +33,36 @@ def _order(points):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _side(a, b, p):  # type: ignore[no-untyped-def]
+def _side(xy, a, b, p):  # type: ignore[no-untyped-def]
     """Twice the area of a, b, p; positive where p lies on the inner side of a triangle's edge a-b."""
-    return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+    ax, ay = xy[a, 0], xy[a, 1]
+    return (xy[b, 0] - ax) * (xy[p, 1] - ay) - (xy[b, 1] - ay) * (xy[p, 0] - ax)
 
 
 @compiled
-def _in_circle(a, b, c, p):  # type: ignore[no-untyped-def]
+def _in_circle(xy, a, b, c, p):  # type: ignore[no-untyped-def]
     """Positive when p lies in the circle through a, b, c (which turn positively)."""
-    ax, ay, bx, by, cx, cy = a[0] - p[0], a[1] - p[1], b[0] - p[0], b[1] - p[1], c[0] - p[0], c[1] - p[1]
+    px, py = xy[p, 0], xy[p, 1]
+    ax, ay, bx, by, cx, cy = (
+        xy[a, 0] - px,
+        xy[a, 1] - py,
+        xy[b, 0] - px,
+        xy[b, 1] - py,
+        xy[c, 0] - px,
+        xy[c, 1] - py,
+    )
     aa, bb, cc = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
     return aa * (bx * cy - by * cx) - bb * (ax * cy - ay * cx) + cc * (ax * by - ay * bx)
 
 
 @compiled
-def _find(xy, faces, neighbours, start, p, slack):  # type: ignore[no-untyped-def]
-    """The triangle that holds p, walked to from another; -1 should rounding lead in circles."""
+def _find(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-untyped-def]
+    """The triangle of those found that holds p, walked to from another; -1 should rounding lead in circles."""
     f = start
-    for _ in range(4 * faces.shape[0]):
+    for _ in range(4 * found):
         outside = -1
         for k in range(3):
-            if _side(xy[faces[f, (k + 1) % 3]], xy[faces[f, (k + 2) % 3]], p) < -slack:
+            if _side(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -slack:
                 outside = k
                 break
         if outside < 0:
@@ -76,8 +85,8 @@ def _replace(neighbours, face, old, new):  # type: ignore[no-untyped-def]
 @compiled
 def _split(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
     """Split face f by the point p, which becomes vertex 0 of f and of the two new faces count and count + 1."""
-    a, b, c = faces[f]
-    na, nb, nc = neighbours[f]
+    a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+    na, nb, nc = neighbours[f, 0], neighbours[f, 1], neighbours[f, 2]
     g, h = count, count + 1
     faces[f, 0], faces[f, 1], faces[f, 2] = p, b, c
     faces[g, 0], faces[g, 1], faces[g, 2] = p, c, a
@@ -100,10 +109,10 @@ def _legalise(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-u
         g = neighbours[f, 0]
         if g < 0:
             continue
-        p, a, b = faces[f]
+        p, a, b = faces[f, 0], faces[f, 1], faces[f, 2]
         k = 0 if neighbours[g, 0] == f else 1 if neighbours[g, 1] == f else 2
         d = faces[g, k]
-        if not _in_circle(xy[p], xy[a], xy[b], xy[d]) > slack:
+        if not _in_circle(xy, p, a, b, d) > slack:
             continue
         # f = p, a, b and g = d, b, a become f = p, a, d and g = p, d, b
         beyond_ad, beyond_db = neighbours[g, (k + 1) % 3], neighbours[g, (k + 2) % 3]
@@ -138,7 +147,7 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
         faces[0, k] = count + k
     found, last = 1, 0
     for i in order:
-        f = _find(xy, faces[:found], neighbours, last, xy[i], SLACK)
+        f = _find(xy, faces, neighbours, last, found, i, SLACK)
         if f < 0:
             continue
         twice = False

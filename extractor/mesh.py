@@ -42,15 +42,16 @@ class Mesh:
 
 
 @compiled
-def _place_of(row, value):  # type: ignore[no-untyped-def]
-    """The place of a value among three."""
-    return 0 if row[0] == value else 1 if row[1] == value else 2
+def _place_of(rows, i, value):  # type: ignore[no-untyped-def]
+    """The place of a value among the three of row i."""
+    return 0 if rows[i, 0] == value else 1 if rows[i, 1] == value else 2
 
 
 @compiled
-def _cross(a, b, c):  # type: ignore[no-untyped-def]
+def _cross(xy, a, b, c):  # type: ignore[no-untyped-def]
     """Twice the signed area of a, b, c; positive clockwise with y down."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    x, y = xy[a, 0], xy[a, 1]
+    return (xy[b, 0] - x) * (xy[c, 1] - y) - (xy[b, 1] - y) * (xy[c, 0] - x)
 
 
 @compiled
@@ -64,25 +65,25 @@ def _flip(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
                 if g < f:
                     continue
                 a, b, c = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], faces[f, k]
-                j = _place_of(neighbours[g], f)
+                j = _place_of(neighbours, g, f)
                 d = faces[g, j]
                 if ink[a] != ink[b] or ink[c] == ink[d] or ink[c] == ink[a] or ink[d] == ink[a]:
                     continue
                 # the four must be convex: both new triangles turn the same way
-                if _cross(points[c], points[a], points[d]) * _cross(points[c], points[d], points[b]) <= 0.0:
+                if _cross(points, c, a, d) * _cross(points, c, d, b) <= 0.0:
                     continue
                 beyond_bc, beyond_ca = neighbours[f, (k + 1) % 3], neighbours[f, (k + 2) % 3]
-                beyond_ad = neighbours[g, _place_of(faces[g], b)]
-                beyond_db = neighbours[g, _place_of(faces[g], a)]
+                beyond_ad = neighbours[g, _place_of(faces, g, b)]
+                beyond_db = neighbours[g, _place_of(faces, g, a)]
                 # f becomes c, a, d and g becomes c, d, b
                 faces[f, 0], faces[f, 1], faces[f, 2] = c, a, d
                 neighbours[f, 0], neighbours[f, 1], neighbours[f, 2] = beyond_ad, g, beyond_ca
                 faces[g, 0], faces[g, 1], faces[g, 2] = c, d, b
                 neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = beyond_db, beyond_bc, f
                 if beyond_ad >= 0:
-                    neighbours[beyond_ad, _place_of(neighbours[beyond_ad], g)] = f
+                    neighbours[beyond_ad, _place_of(neighbours, beyond_ad, g)] = f
                 if beyond_bc >= 0:
-                    neighbours[beyond_bc, _place_of(neighbours[beyond_bc], f)] = g
+                    neighbours[beyond_bc, _place_of(neighbours, beyond_bc, f)] = g
                 flips += 1
                 break
         if flips == 0:
@@ -111,10 +112,10 @@ def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-unt
     across = np.full((count, 3), -1, np.int32)
     turn = np.zeros(count, np.int8)
     for f in range(count):
-        a, b, c = faces[f]
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
             continue
-        size = 0.5 * abs(_cross(points[a], points[b], points[c]))
+        size = 0.5 * abs(_cross(points, a, b, c))
         mean = (area[a] + area[b] + area[c]) / 3.0
         if size < MIN_AREA_RATIO * mean or size > MAX_AREA_RATIO * mean:
             continue
@@ -125,8 +126,7 @@ def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-unt
         for k in range(3):
             ordered[f, ink[faces[f, k]] - 1] = faces[f, k]
             across[f, ink[faces[f, k]] - 1] = neighbours[f, k]
-        p = ordered[f]
-        turn[f] = 1 if _cross(points[p[0]], points[p[1]], points[p[2]]) > 0.0 else -1
+        turn[f] = 1 if _cross(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0 else -1
     for f in range(count):
         for k in range(3):
             g = across[f, k]

@@ -113,18 +113,21 @@ def _profile(flat, width, x, y, dx, dy, red, green, blue, zero):  # type: ignore
 
 
 @compiled
-def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # type: ignore[no-untyped-def]
-    """Write the line n . p = d of the edge a-b, where its ink has fallen halfway to the color beyond; False without.
+def _edge_line(flat, height, width, corners, i, k, cx, cy, ink, share, beyond, lines):  # type: ignore[no-untyped-def]
+    """Write the line n . p = d of edge k of triangle i, where its ink has fallen halfway to the color beyond; False
+    without.
 
     The ink's profile across the edge, 1 inside and 0 outside, is integrated: its area is the edge's position
     whatever the blur, so no blur has to be known. The line through two such positions is the edge. Profiles run
     along the median, not the normal: so they stay clear of the other edges in any triangle. ``beyond`` is a buffer.
     """
-    dx, dy = b[0] - a[0], b[1] - a[1]
+    start_x, start_y = corners[i, k, 0], corners[i, k, 1]
+    end_x, end_y = corners[i, (k + 1) % 3, 0], corners[i, (k + 1) % 3, 1]
+    dx, dy = end_x - start_x, end_y - start_y
     length = np.sqrt(dx * dx + dy * dy)
     nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
-    depth = (a[0] - cx) * nx + (a[1] - cy) * ny
-    ux, uy = a[0] + 0.5 * dx - cx, a[1] + 0.5 * dy - cy
+    depth = (start_x - cx) * nx + (start_y - cy) * ny
+    ux, uy = start_x + 0.5 * dx - cx, start_y + 0.5 * dy - cy
     if not depth > 0.3 or not sample_patch(
         flat, height, width, cx + 2 * ux, cy + 2 * uy, 0.4 * depth, beyond
     ):
@@ -136,8 +139,8 @@ def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # 
     u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
     zero = u0 * beyond[0] + u1 * beyond[1] + u2 * beyond[2]
     step = share / HALF_PROFILE
-    x0, y0 = a[0] + FIRST * dx, a[1] + FIRST * dy
-    x1, y1 = b[0] - FIRST * dx, b[1] - FIRST * dy
+    x0, y0 = start_x + FIRST * dx, start_y + FIRST * dy
+    x1, y1 = end_x - FIRST * dx, end_y - FIRST * dy
     wide, high = share * abs(ux), share * abs(uy)
     if not (
         min(x0, x1) >= wide
@@ -151,11 +154,11 @@ def _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, line):  # 
     first, second = depth * (first * step - share), depth * (second * step - share)
     slope = (second - first) / (1.0 - 2 * FIRST)
     off_a, off_b = first - FIRST * slope, second + FIRST * slope
-    ax, ay = a[0] + off_a * nx, a[1] + off_a * ny
-    dx, dy = b[0] + off_b * nx - ax, b[1] + off_b * ny - ay
+    ax, ay = start_x + off_a * nx, start_y + off_a * ny
+    dx, dy = end_x + off_b * nx - ax, end_y + off_b * ny - ay
     norm = np.sqrt(dx * dx + dy * dy)
-    line[0], line[1] = dy / norm, -dx / norm
-    line[2] = line[0] * ax + line[1] * ay
+    lines[k, 0], lines[k, 1] = dy / norm, -dx / norm
+    lines[k, 2] = lines[k, 0] * ax + lines[k, 1] * ay
     return norm > 0.0
 
 
@@ -166,24 +169,23 @@ def fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
     The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    ink, beyond, lines = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    moved = np.zeros((3, 2))
+    ink, beyond, lines, moved = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 2))
     for i in range(corners.shape[0]):
         share, passes = WINDOW, 0
         while good[i]:
-            a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
-            cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-            size = np.sqrt((a[0] - cx) ** 2 + (a[1] - cy) ** 2)
-            if not (
-                sample_patch(flat, height, width, cx, cy, 0.2 * size, ink)
-                and _edge_line(flat, height, width, a, b, cx, cy, ink, share, beyond, lines[0])
-                and _edge_line(flat, height, width, b, c, cx, cy, ink, share, beyond, lines[1])
-                and _edge_line(flat, height, width, c, a, cx, cy, ink, share, beyond, lines[2])
-                and _meeting(lines, corners[i], MAX_CORNER_SHIFT * size, moved)
-            ):
+            cx = (corners[i, 0, 0] + corners[i, 1, 0] + corners[i, 2, 0]) / 3
+            cy = (corners[i, 0, 1] + corners[i, 1, 1] + corners[i, 2, 1]) / 3
+            size = np.sqrt((corners[i, 0, 0] - cx) ** 2 + (corners[i, 0, 1] - cy) ** 2)
+            fits = sample_patch(flat, height, width, cx, cy, 0.2 * size, ink)
+            for k in range(3):
+                fits = fits and _edge_line(
+                    flat, height, width, corners, i, k, cx, cy, ink, share, beyond, lines
+                )
+            if not (fits and _meeting(lines, corners, i, MAX_CORNER_SHIFT * size, moved)):
                 good[i] = False
                 break
-            corners[i] = moved
+            for k in range(3):
+                corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
             passes += 1
             if passes == 3 or share * size < 2 * FINE_REACH_PX:
                 break
@@ -191,16 +193,16 @@ def fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _meeting(lines, corners, limit, moved):  # type: ignore[no-untyped-def]
+def _meeting(lines, corners, i, limit, moved):  # type: ignore[no-untyped-def]
     """Write where the lines of edges meet, corner by corner; False where one does not or lies beyond the limit."""
     for k in range(3):
-        before, after = lines[(k + 2) % 3], lines[k]
-        sine = before[0] * after[1] - before[1] * after[0]
+        j = (k + 2) % 3
+        sine = lines[j, 0] * lines[k, 1] - lines[j, 1] * lines[k, 0]
         if not abs(sine) >= MIN_SINE:
             return False
-        moved[k, 0] = (before[2] * after[1] - before[1] * after[2]) / sine
-        moved[k, 1] = (before[0] * after[2] - before[2] * after[0]) / sine
-        dx, dy = moved[k, 0] - corners[k, 0], moved[k, 1] - corners[k, 1]
+        moved[k, 0] = (lines[j, 2] * lines[k, 1] - lines[j, 1] * lines[k, 2]) / sine
+        moved[k, 1] = (lines[j, 0] * lines[k, 2] - lines[j, 2] * lines[k, 0]) / sine
+        dx, dy = moved[k, 0] - corners[i, k, 0], moved[k, 1] - corners[i, k, 1]
         if not dx * dx + dy * dy < limit * limit:
             return False
     return True
