@@ -96,40 +96,31 @@ def _equilateral_edge(area):  # type: ignore[no-untyped-def]
 @compiled
 def _large(center, area):  # type: ignore[no-untyped-def]
     """(N,) bool, the domains that are not small beside the ones around them."""
-    keep = np.ones(area.shape[0], np.bool_)
-    if area.shape[0] <= NEIGHBOURS:
-        return keep
-    limit = MIN_AREA_SHARE * area.max()
-    if area.min() >= limit:
-        return keep
-    grid = bucketed(center)
-    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
-    for i in range(area.shape[0]):
-        if area[i] < limit:
-            nearest(center, grid, center[i, 0], center[i, 1], index, square)
-            larger = 0
-            for j in index:
-                larger += area[i] < MIN_AREA_SHARE * area[j]
-            keep[i] = larger < NEIGHBOURS // 2
-    return keep
+    return _few_larger(center, area, MIN_AREA_SHARE, NEIGHBOURS // 2)
 
 
 @compiled
 def _entire(center, area):  # type: ignore[no-untyped-def]
     """(N,) bool, the cells that are about as large as the ones around them."""
-    entire = np.ones(area.shape[0], np.bool_)
-    if area.shape[0] <= NEIGHBOURS:
-        return entire
-    limit = WHOLE_SHARE * area.max()
-    if area.min() >= limit:
-        return entire
+    return _few_larger(center, area, WHOLE_SHARE, NEIGHBOURS // 4 + 1)
+
+
+@compiled
+def _few_larger(center, area, share, most):  # type: ignore[no-untyped-def]
+    """(N,) bool, of which less than so many of the nearest are so much larger that it is but a ``share`` of them."""
+    few = np.ones(area.shape[0], np.bool_)
+    if area.shape[0] <= NEIGHBOURS or area.min() >= share * area.max():
+        return few
+    last = area.shape[0] - most  # where less than so many are larger at all, there is no need to look
+    small = np.flatnonzero(area < share * np.partition(area, last)[last])
+    if small.shape[0] == 0:
+        return few
     grid = bucketed(center)
     index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
-    for i in range(area.shape[0]):
-        if area[i] < limit:
-            nearest(center, grid, center[i, 0], center[i, 1], index, square)
-            larger = 0
-            for j in index:
-                larger += area[i] < WHOLE_SHARE * area[j]
-            entire[i] = larger <= NEIGHBOURS // 4
-    return entire
+    for i in small:
+        nearest(center, grid, center[i, 0], center[i, 1], index, square)
+        larger = 0
+        for j in index:
+            larger += area[i] < share * area[j]
+        few[i] = larger < most
+    return few

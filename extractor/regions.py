@@ -162,19 +162,25 @@ def _keep(domain, area, keep):  # type: ignore[no-untyped-def]
 def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
     """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
     sums = np.zeros((area.shape[0], 5))
-    for i in np.flatnonzero(domain >= 0):
-        row, y, length = sums[domain[i]], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
+    for i in range(domain.shape[0]):
+        d = domain[i]
+        if d < 0:
+            continue
+        y, length = runs[i, 0], runs[i, 2] - runs[i, 1] + 1
         x = 0.5 * (runs[i, 1] + runs[i, 2])
-        row[0] += length * x
-        row[1] += length * y
-        row[2] += length * (x * x + (length * length - 1) / 12.0)
-        row[3] += length * x * y
-        row[4] += length * y * y
-    sums /= area.reshape(-1, 1)
-    x, y = sums[:, 0], sums[:, 1]
-    # a pixel is a square, not a point: it adds 1/12 to each variance
-    xx, xy, yy = sums[:, 2] - x * x + 1.0 / 12.0, sums[:, 3] - x * y, sums[:, 4] - y * y + 1.0 / 12.0
-    return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0))
+        sums[d, 0] += length * x
+        sums[d, 1] += length * y
+        sums[d, 2] += length * (x * x + (length * length - 1) / 12.0)
+        sums[d, 3] += length * x * y
+        sums[d, 4] += length * y * y
+    out = np.empty(area.shape[0])
+    for d in range(area.shape[0]):
+        x, y = sums[d, 0] / area[d], sums[d, 1] / area[d]
+        # a pixel is a square, not a point: it adds 1/12 to each variance
+        xx, yy = sums[d, 2] / area[d] - x * x + 1.0 / 12.0, sums[d, 4] / area[d] - y * y + 1.0 / 12.0
+        xy = sums[d, 3] / area[d] - x * y
+        out[d] = np.sqrt(max(xx * yy - xy * xy, 0.0))
+    return out
 
 
 @compiled
@@ -189,17 +195,18 @@ def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
             ink[d] = runs[i, 3]
             center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
             center[d, 1] += length * runs[i, 0]
+    middle, best = np.empty(count, np.int64), np.full(count, np.inf)
     for d in range(count):
-        center[d] /= area[d]
-    best = np.full(count, np.inf)
+        center[d, 0] /= area[d]
+        center[d, 1] /= area[d]
+        middle[d] = round(center[d, 0])
     xy = np.zeros((count, 2), np.int32)
     for i in range(runs.shape[0]):
         d = domain[i]
         if d < 0:
             continue
-        cx, cy = center[d]
-        x = min(max(round(cx), runs[i, 1]), runs[i, 2])
-        distance = (x - cx) ** 2 + (runs[i, 0] - cy) ** 2
+        x = min(max(middle[d], runs[i, 1]), runs[i, 2])
+        distance = (x - center[d, 0]) ** 2 + (runs[i, 0] - center[d, 1]) ** 2
         if distance < best[d]:
             best[d] = distance
             xy[d, 0] = x
