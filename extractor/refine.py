@@ -26,6 +26,7 @@ from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .step import PRIOR_PX, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import MIN_NOISE, short_edge, trust, trusted_markers
+from .straying import doubted_ones, straying
 from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
@@ -44,6 +45,7 @@ MAX_APART = 0.1
 FAR_APART = 0.03  # where all triangles of a marker were found
 JUDGED_BY_SAMPLES = Judged(1, 4, 1.0)
 JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
+RINGS = 2  # of markers with nothing to go by that their neighbours are continued to
 ELSEWHERE = 5  # one of so many other gridlines shows how well the pattern is explained where nothing is wrong
 PARDON = 0.1  # of the contrast: what glare and uneven light do to a profile
 NO_MODEL = np.empty((0, 0, 3), np.float32)
@@ -71,28 +73,30 @@ class Refiner:
         edge = short_edge(places.xy_px, self._mesh.edges)
         if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
             view = sights.at(before.scale)
-            fit, across = self._begin(view, places, before)
-            refined = self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
-        fit, across = self._begin(view, places)
+        fit, across, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, edge)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
-            fit, across = self._begin(view, replace(places, xy_px=xy))
-        return self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            fit, across, places = self._begin(view, places, xy)
+        return self._finish(view, fit, across, places, edge)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
         least = MIN_EDGE_PX if sigma_px < SMALL_BLUR * edge_px else MIN_BLURRED_EDGE_PX
         return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / least)))
 
-    def _begin(self, view: Sight, places: Places, before: Seen | None = None) -> tuple[Fit, Across]:
-        """The inks' levels, the blur, and the first round of profiles."""
+    def _begin(
+        self, view: Sight, places: Places, start: NDArray[np.float64], before: Seen | None = None
+    ) -> tuple[Fit, Across, Places]:
+        """The inks' levels, the blur, and the first round of profiles from ``start`` (M, 2), px in the full image; and
+        the places without those that strayed."""
         mesh = self._mesh
-        xy, beyond, maps = completed(mesh, view.reduced(places.xy_px))
+        xy, beyond, maps = completed(mesh, view.reduced(start))
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
@@ -103,8 +107,34 @@ class Refiner:
         across = self._across(view, fit, lines)
         if before is None:
             fit, across = self._cleared(view, fit, lines, across)
-        fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
-        return fit, across
+        fit, trusted = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
+        fit, places = self._collected(view, fit, trusted, places)
+        return fit, across, places
+
+    def _collected(
+        self, view: Sight, fit: Fit, trusted: NDArray[np.float64], places: Places
+    ) -> tuple[Fit, Places]:
+        """The fit and the places, those that dirt has led astray put where their gridlines say."""
+        mesh, reading = self._mesh, fit.reading
+        assert reading is not None
+        doubted, some = doubted_ones(trusted, reading.use > 0.0, mesh.spokes)
+        if not some:
+            return fit, places
+        known = np.where(fit.beyond[:, None], np.nan, fit.guiding)
+        edge = places.edge_px / view.scale
+        lattice = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near
+        led = doubted | straying(known, fit.maps, doubted, edge, *lattice)
+        xy = np.where(led[:, None], np.nan, known)
+        for _ in range(RINGS):
+            xy = completed(mesh, xy)[0]
+        led &= np.isfinite(xy[:, 0])
+        at = led[:, None]
+        fit = fit._replace(measured=np.where(at, xy, fit.measured), guiding=np.where(at, xy, fit.guiding))
+        here = np.where(at, view.full(xy), places.xy_px)
+        with np.errstate(invalid="ignore"):
+            apart = np.linalg.norm(here - places.xy_px, axis=1) > MAX_APART * places.edge_px
+        sure = places.agreed & ~apart, places.whole & ~led
+        return fit, replace(places, xy_px=here, agreed=sure[0], whole=sure[1])
 
     def _cleared(
         self, view: Sight, fit: Fit, lines: NDArray[np.float64], across: Across
@@ -128,12 +158,13 @@ class Refiner:
         return Seen(view.scale, 0.0, noise, smooth_levels(drawn, black, xy, mesh, noise, view.frame))
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
-        """The last round of profiles, and synthesis where the blur asks for it."""
-        steps = self._steps
+        """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge."""
+        steps, places, edge_px = self._steps, _in(view, places), edge_px / view.scale
         start = placed(self._mesh, fit)
         if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
             start = roughened(self._mesh, start)
-            fit, trusted = self._profile_step(view, start, across, steps.profiles[1], judged=True)
+            fit, use = self._profile_step(view, start, across, steps.profiles[1], judged=True)
+            trusted = trusted_markers(use, self._mesh.spokes)
             xy, cov = self._sure(fit, places)
             _doubt(xy, cov, ~trusted, places)
             return self._refined(view, fit, xy, cov, trusted, places)
@@ -149,29 +180,33 @@ class Refiner:
 
     def _profile_step(
         self, view: Sight, fit: Fit, across: Across, stations: int, *, judged: bool
-    ) -> tuple[Fit, NDArray[np.bool_]]:
-        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should.
+    ) -> tuple[Fit, NDArray[np.float64]]:
+        """The fit after a round of profiles, and (E,) how far its gridlines look as they should.
 
-        Gridlines are ``judged`` in the last round only, where they are already close: farther off, the best look wrong.
+        They are ``judged`` by it in the last round, where they are already close; before, the best look wrong, and it
+        counts only around markers where little else is seen.
         """
         mesh = self._mesh
         lines, loose = lines_of(mesh, fit), loose_ones(mesh, fit)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, loose, stations)
         votes = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
         fit, said = heard(mesh, fit, lines, sums, votes, JUDGED_BY_SAMPLES)
-        use = (sums[:, AA] > 0).astype(np.float64)
-        if judged:
-            pardon = PARDON**2 * across.room[:, 3]
-            use, _ = trust(sums, said.to_a, said.to_b, pardon, *JUDGED_BY_SAMPLES)
+        pardon = PARDON**2 * across.room[:, 3]
+        trusted, _ = trust(sums, said.to_a, said.to_b, pardon, *JUDGED_BY_SAMPLES)
+        use = trusted
+        if not judged:
+            read = sums[:, AA] > 0.0
+            doubted, _ = doubted_ones(trusted, read, mesh.spokes)
+            use = np.where(touching(doubted, mesh.edges), trusted, read)
         fit = solved(mesh, fit, said, use, lines, across.contrasts, False)
         foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
-        return fit._replace(reading=reading), trusted_markers(use, mesh.spokes)
+        return fit._replace(reading=reading), trusted
 
     def _judged(
         self, view: Sight, fit: Fit, across: Across, which: NDArray[np.bool_]
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """A round of profiles around some markers, judged by these and some elsewhere."""
+        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which are trusted."""
         edges = self._mesh.edges
         near = which.copy()
         beside(which, edges, near)
@@ -179,7 +214,8 @@ class Refiner:
         elsewhere = ~touching(near, edges)
         elsewhere[::ELSEWHERE] = False
         room[elsewhere] = 0.0
-        return self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
+        fit, use = self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
+        return fit, trusted_markers(use, self._mesh.spokes)
 
     def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
         """The blur that some of the gridlines show, px."""
