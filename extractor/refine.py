@@ -20,13 +20,13 @@ from .image import estimate_noise
 from .information import Information, covariances
 from .levels import bled, cell_means, smooth_levels, unbled
 from .offsets import Reading, measure
-from .placing import AGREED, Places
+from .placing import AGREED, MAX_APART, Places
 from .presets import STEPS, Preset
 from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .step import PRIOR_PX, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import MIN_NOISE, short_edge, trust, trusted_markers
-from .straying import doubted_ones, straying
+from .straying import astray, collected, doubted_ones
 from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
@@ -38,14 +38,11 @@ MAX_SIGMA = 0.03  # of what is measured, in the same units
 BLIND_SIGMA_PX = 0.9  # where no gridline shows it
 BLEEDING = 0.002  # of a neighbour's level in the middle of a cell, from which on it is taken out
 BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
-# Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
-# profiles may lie apart, in units of the edges around the marker.
+# Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
 UNEXPLAINED = 0.015
-MAX_APART = 0.1
 FAR_APART = 0.03  # where all triangles of a marker were found
 JUDGED_BY_SAMPLES = Judged(1, 4, 1.0)
 JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
-RINGS = 2  # of markers with nothing to go by that their neighbours are continued to
 ELSEWHERE = 5  # one of so many other gridlines shows how well the pattern is explained where nothing is wrong
 PARDON = 0.1  # of the contrast: what glare and uneven light do to a profile
 NO_MODEL = np.empty((0, 0, 3), np.float32)
@@ -108,33 +105,8 @@ class Refiner:
         if before is None:
             fit, across = self._cleared(view, fit, lines, across)
         fit, trusted = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
-        fit, places = self._collected(view, fit, trusted, places)
+        fit, places = collected(view, mesh, fit, trusted, places)
         return fit, across, places
-
-    def _collected(
-        self, view: Sight, fit: Fit, trusted: NDArray[np.float64], places: Places
-    ) -> tuple[Fit, Places]:
-        """The fit and the places, those that dirt has led astray put where their gridlines say."""
-        mesh, reading = self._mesh, fit.reading
-        assert reading is not None
-        doubted, some = doubted_ones(trusted, reading.use > 0.0, mesh.spokes)
-        if not some:
-            return fit, places
-        known = np.where(fit.beyond[:, None], np.nan, fit.guiding)
-        edge = places.edge_px / view.scale
-        lattice = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near
-        led = doubted | straying(known, fit.maps, doubted, edge, *lattice)
-        xy = np.where(led[:, None], np.nan, known)
-        for _ in range(RINGS):
-            xy = completed(mesh, xy)[0]
-        led &= np.isfinite(xy[:, 0])
-        at = led[:, None]
-        fit = fit._replace(measured=np.where(at, xy, fit.measured), guiding=np.where(at, xy, fit.guiding))
-        here = np.where(at, view.full(xy), places.xy_px)
-        with np.errstate(invalid="ignore"):
-            apart = np.linalg.norm(here - places.xy_px, axis=1) > MAX_APART * places.edge_px
-        sure = places.agreed & ~apart, places.whole & ~led
-        return fit, replace(places, xy_px=here, agreed=sure[0], whole=sure[1])
 
     def _cleared(
         self, view: Sight, fit: Fit, lines: NDArray[np.float64], across: Across
@@ -164,10 +136,11 @@ class Refiner:
         if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
             start = roughened(self._mesh, start)
             fit, use = self._profile_step(view, start, across, steps.profiles[1], judged=True)
-            trusted = trusted_markers(use, self._mesh.spokes)
             xy, cov = self._sure(fit, places)
-            _doubt(xy, cov, ~trusted, places)
-            return self._refined(view, fit, xy, cov, trusted, places)
+            strays, doubted = astray(self._mesh, fit, xy, use, places.edge_px)
+            xy[strays], cov[strays] = np.nan, np.nan
+            _doubt(xy, cov, doubted, places)
+            return self._refined(view, fit, xy, cov, ~doubted, places)
         fit = self._draughtsman.steps(view, start, steps, edge_px)
         return self._result(view, fit, across, places)
 

@@ -7,21 +7,71 @@ bent sharply, at the rim of an object or where it slips, moves from one gridline
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .bending import third_difference
 from .engine import compiled
+from .fit import Fit
 from .gridlines import FIRST_RING
+from .placing import MAX_APART, Places
+from .sight import Sight
+from .step import completed
+from .topology import Topology
 
 DOUBTED = 0.55  # mean trust in the gridlines read at a marker, below which it may have strayed
 # A doubted marker strays, and any other, if it would have to move by so many times what those around would have to,
 UNUSUAL = 3.0, 6.0
 LEAST = 0.02, 0.03  # and by so much of an edge.
 ALIKE = 0.5  # of the move, by which one of a marker's gridlines may say another,
-MOST = 0.65  # and at least so many of them and
+MOST = 0.7  # and at least so many of them and
 FEWEST = 3  # so many may not
+RINGS = 2  # of strays that the markers around are continued to
 ROUNDS = 6  # one marker that strays hides what is wrong with its neighbours
-PART = 1.0 / 3.0  # of a third difference is an error in one of its two inner markers
+PART = (
+    1.0 / 3.0
+)  # of a third difference is an error of one of its two inner markers; all of it, of an outer one
+
+
+def collected(
+    view: Sight, mesh: Topology, fit: Fit, trusted: NDArray[np.float64], places: Places
+) -> tuple[Fit, Places]:
+    """The fit and the places (of the full image), those that dirt has led astray put where their neighbours say;
+    ``trusted`` (E,) is how far gridlines look as they should."""
+    known = np.where(fit.beyond[:, None], np.nan, fit.guiding)
+    strays, doubted = astray(mesh, fit, known, trusted, places.edge_px / view.scale)
+    led = strays | doubted
+    if not led.any():
+        return fit, places
+    xy = np.where(led[:, None], np.nan, known)
+    for _ in range(RINGS):
+        xy = completed(mesh, xy)[0]
+    led &= np.isfinite(xy[:, 0])
+    at = led[:, None]
+    fit = fit._replace(measured=np.where(at, xy, fit.measured), guiding=np.where(at, xy, fit.guiding))
+    here = np.where(at, view.full(xy), places.xy_px)
+    with np.errstate(invalid="ignore"):
+        apart = np.linalg.norm(here - places.xy_px, axis=1) > MAX_APART * places.edge_px
+    return fit, replace(places, xy_px=here, agreed=places.agreed & ~apart, whole=places.whole & ~led)
+
+
+def astray(
+    mesh: Topology,
+    fit: Fit,
+    xy: NDArray[np.float64],
+    trusted: NDArray[np.float64],
+    edge_px: NDArray[np.float64],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(M,) which of the markers ``xy`` (M, 2) strayed, and (M,) which have gridlines that look unlike the pattern;
+    without any of these, none strayed."""
+    assert fit.reading is not None
+    doubted, some = doubted_ones(trusted, fit.reading.use > 0.0, mesh.spokes)
+    if not some:
+        return doubted, doubted
+    lattice = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.onward, mesh.near
+    return straying(xy, fit.maps, doubted, edge_px, *lattice), doubted
 
 
 @compiled
@@ -40,7 +90,7 @@ def doubted_ones(use, read, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, near):  # type: ignore[no-untyped-def]
+def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that strayed.
 
     ``doubted``: (M,) bool. ``edge``: (M,) px, the length of the edges at each. ``xy``: NaN where nothing is known.
@@ -49,7 +99,7 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, near):  # typ
     out, strays, anew = xy.copy(), np.zeros(count, np.bool_), np.ones(count, np.bool_)
     move, far, alike = np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)
     for _ in range(ROUNDS):
-        _ask(out, maps, anew, edges, ahead, third, spokes, move, far, alike)
+        _ask(out, maps, anew, edges, ahead, third, spokes, onward, move, far, alike)
         anew[:] = False
         for m in range(count):
             unusual, least = (UNUSUAL[0], LEAST[0]) if doubted[m] else (UNUSUAL[1], LEAST[1])
@@ -71,7 +121,7 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, near):  # typ
 
 
 @compiled
-def _ask(xy, maps, anew, edges, ahead, third, spokes, move, far, alike):  # type: ignore[no-untyped-def]
+def _ask(xy, maps, anew, edges, ahead, third, spokes, onward, move, far, alike):  # type: ignore[no-untyped-def]
     """Fill in, of the markers that are ``anew``: ``move`` (M, 2), the error that the gridlines through each agree on
     (their median), ``far`` (M,), how large it is, NaN where fewer than three are known, and whether they are alike."""
     said, column = np.empty((spokes.shape[1], 2)), np.empty(spokes.shape[1])
@@ -79,14 +129,17 @@ def _ask(xy, maps, anew, edges, ahead, third, spokes, move, far, alike):  # type
         if not anew[m]:
             continue
         known = 0
-        for e in spokes[m]:
-            if e < 0 or ahead[e, 0] < 0 or ahead[e, 1] < 0:
-                continue
-            x, y = third_difference(xy, maps, edges[e], ahead[e], third[e])
-            if np.isfinite(x):
-                part = PART if edges[e, 1] == m else -PART
-                said[known, 0], said[known, 1] = part * x, part * y
-                known += 1
+        for spoke in range(spokes.shape[1]):
+            # where no gridline goes on behind the marker, it is the last of the next four
+            for e, part in ((spokes[m, spoke], PART), (onward[m, spoke], 1.0)):
+                if e < 0 or ahead[e, 0] < 0 or ahead[e, 1] < 0:
+                    continue
+                x, y = third_difference(xy, maps, edges[e], ahead[e], third[e])
+                if np.isfinite(x):
+                    part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
+                    said[known, 0], said[known, 1] = part * x, part * y
+                    known += 1
+                    break
         if known < FEWEST:
             continue
         for axis in range(2):
