@@ -17,7 +17,7 @@ from .bending import hidden_misfit
 from .engine import compiled
 from .fit import Fit
 from .gridlines import KNOWN, LENGTH
-from .levels import Levels, black_at, cell_means, level_change, smooth_levels
+from .levels import Levels, black_at, cell_means, level_change, rebled, smooth_levels
 from .offsets import Reading, foot_of
 from .painting import draw_cells
 from .presets import Steps
@@ -39,6 +39,8 @@ MANY_BENT = 0.25  # of them, each step bends others. Then
 HARD_EFFORT = 3.0  # times the effort is allowed
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
+# Wide blur and low levels look alike: what a step sees of the blur, by its share of a cell's height, is so much less
+MIXED, UNMIXED, MOST_MIXED = 6.2, 0.075, 0.8  # than it is (rendered patterns)
 MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -161,7 +163,8 @@ class Draughtsman:
         fit = solved(mesh, fit, told, use, lines, contrasts, True)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
         wider = max(sigma + self._widen(fit.xy, drawing, sums, use), MIN_SIGMA_PX)
-        return fit._replace(sigma=wider, reading=reading)
+        levels = rebled(bettered, fit.xy, mesh, sigma, wider)
+        return fit._replace(sigma=wider, levels=levels, reading=reading)
 
     def _widen(
         self, xy: NDArray[np.float64], drawing: Drawing, sums: NDArray[np.float64], use: NDArray[np.float64]
@@ -170,6 +173,8 @@ class Draughtsman:
         mesh, lines, bettered, sigma = self._mesh, drawing.lines, drawing.bettered, drawing.sigma
         now = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         wider = widening(sums, use, drawing.contrasts, now, sigma)
+        share = sigma / (0.5 * 3**0.5 * float(np.median(lines[:, LENGTH])))
+        wider /= 1.0 - min(max(MIXED * (share - UNMIXED), 0.0), MOST_MIXED)
         return float(np.clip(wider, -MAX_WIDEN * sigma, MAX_WIDEN * sigma))
 
     def _bettered(self, view: Sight, picture: NDArray[np.float32], fit: Fit) -> Levels:
@@ -191,7 +196,7 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
     """Whether the blur or the levels were found to be others than those drawn."""
     if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
         return True
-    return bool(level_change(drawing.levels.cell, drawing.bettered.cell) > SAME_LEVELS)
+    return bool(level_change(drawing.levels.cell, fit.levels.cell) > SAME_LEVELS)
 
 
 @compiled
