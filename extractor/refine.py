@@ -31,7 +31,7 @@ from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_EDGE_PX = 5.0  # edges at a reduced scale, and
+MIN_EDGE_PX = 4.0  # edges at a reduced scale, and
 MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
