@@ -92,7 +92,7 @@ class Draughtsman:
         for step in range(MAX_STEPS - 1):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
-            anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
+            anew, moving = still_moving(*about, near, steps.enough, steps.few, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
             hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
@@ -163,8 +163,7 @@ class Draughtsman:
         fit = solved(mesh, fit, told, use, lines, contrasts, True)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
         wider = max(sigma + self._widen(fit.xy, drawing, sums, use), MIN_SIGMA_PX)
-        levels = rebled(bettered, fit.xy, mesh, sigma, wider)
-        return fit._replace(sigma=wider, levels=levels, reading=reading)
+        return fit._replace(sigma=wider, levels=rebled(bettered, fit.xy, mesh, sigma, wider), reading=reading)
 
     def _widen(
         self, xy: NDArray[np.float64], drawing: Drawing, sums: NDArray[np.float64], use: NDArray[np.float64]
@@ -200,18 +199,19 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
 
 
 @compiled
-def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore[no-untyped-def]
+def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them; how many these are, 0 if there are none."""
+    those beside them, none if they are no more than ``few`` (a share of all); and how many these are."""
     count = drawn.shape[0]
-    moving, found = np.zeros(count, np.bool_), False
+    moving, found = np.zeros(count, np.bool_), 0
     for m in range(count):
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
         moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
-        found |= moving[m]
+        found += moving[m]
     out = moving.copy()
-    if found:
-        beside(moving, edges, out)
+    if found <= few * count:
+        return np.zeros(count, np.bool_), 0
+    beside(moving, edges, out)
     return out, np.sum(out)
 
 

@@ -127,10 +127,12 @@ def test_moving_markers_bring_their_neighbours() -> None:
     drawn = np.zeros((4, 2))
     measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, edges)
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2
-    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, edges)
+    assert count == 0 and not anew.any()  # one of four is few
+    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, edges)
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)
