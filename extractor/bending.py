@@ -135,20 +135,26 @@ def _lay_around(m, own, near, column):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def third_difference(xy, maps, edge, ahead, third):  # type: ignore[no-untyped-def]
+    """px, of the four markers along an edge, less the layout's own (``third``)."""
+    a, b = edge
+    p, q = ahead
+    u, v = 0.5 * third[0], 0.5 * third[1]
+    x = xy[p, 0] - xy[q, 0] + 3.0 * (xy[b, 0] - xy[a, 0])
+    y = xy[p, 1] - xy[q, 1] + 3.0 * (xy[b, 1] - xy[a, 1])
+    x -= u * (maps[a, 0, 0] + maps[b, 0, 0]) + v * (maps[a, 0, 1] + maps[b, 0, 1])
+    y -= u * (maps[a, 1, 0] + maps[b, 1, 0]) + v * (maps[a, 1, 1] + maps[b, 1, 1])
+    return x, y
+
+
+@compiled
 def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untyped-def]
-    """(E,) squared, px^2, of the four markers along each edge, less the layout's own; NaN where one is not known."""
+    """(E,) squared, px^2, NaN where one of the four markers is not known."""
     out = np.full(edges.shape[0], np.nan)
     for e in range(edges.shape[0]):
-        a, b = edges[e]
-        p, q = ahead[e]
-        if p < 0 or q < 0:
-            continue
-        x = xy[p, 0] - xy[q, 0] + 3.0 * (xy[b, 0] - xy[a, 0])
-        y = xy[p, 1] - xy[q, 1] + 3.0 * (xy[b, 1] - xy[a, 1])
-        u, v = 0.5 * third[e, 0], 0.5 * third[e, 1]
-        x -= u * (maps[a, 0, 0] + maps[b, 0, 0]) + v * (maps[a, 0, 1] + maps[b, 0, 1])
-        y -= u * (maps[a, 1, 0] + maps[b, 1, 0]) + v * (maps[a, 1, 1] + maps[b, 1, 1])
-        out[e] = x * x + y * y
+        if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
+            x, y = third_difference(xy, maps, edges[e], ahead[e], third[e])
+            out[e] = x * x + y * y
     return out
 
 

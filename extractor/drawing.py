@@ -17,7 +17,7 @@ from .bending import hidden_misfit
 from .engine import compiled
 from .fit import Fit
 from .gridlines import KNOWN, LENGTH
-from .levels import Levels, black_at, cell_means, level_change, smooth_levels
+from .levels import Levels, black_at, cell_means, level_change, rebled, smooth_levels
 from .offsets import Reading, foot_of
 from .painting import draw_cells
 from .presets import Steps
@@ -39,6 +39,9 @@ MANY_BENT = 0.25  # of them, each step bends others. Then
 HARD_EFFORT = 3.0  # times the effort is allowed
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
+# Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
+# UNMIXED of an edge, times MIXED (rendered patterns), and at most by
+MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -53,7 +56,7 @@ class Drawing(NamedTuple):
         contrasts, black: (E, 3) across the gridlines, and under their middles.
         levels, bettered: as drawn, and as the cells' middles then said.
         sums: (E, 24), as ``read_gridlines`` gives them.
-        box: of the image that is drawn. sigma: the blur.
+        box: of the image that is drawn. sigma: the blur. edge_px: a usual edge's length in it.
     """
 
     xy: NDArray[np.float64]
@@ -66,6 +69,7 @@ class Drawing(NamedTuple):
     sums: NDArray[np.float64]
     box: NDArray[np.int64]
     sigma: float
+    edge_px: float
 
 
 class Draughtsman:
@@ -85,12 +89,12 @@ class Draughtsman:
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
-        size = float(np.median(drawing.lines[:, LENGTH]))
+        size = drawing.edge_px
         spent, wide = _effort(size), drawing.sigma > SMALL_BLUR * edge_px
         for step in range(MAX_STEPS - 1):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
-            anew, moving = still_moving(*about, near, steps.enough, self._mesh.edges)
+            anew, moving = still_moving(*about, near, steps.enough, steps.few, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
             hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
@@ -116,7 +120,9 @@ class Draughtsman:
         black = black_at(levels.black, middles(lines), *view.frame)
         sums = read_gridlines(image, picture, lines, contrasts, black, sigma, box, loose_ones(mesh, fit))
         bettered = self._bettered(view, picture, fit)
-        drawing = Drawing(fit.xy, lines, fit.bend, contrasts, black, levels, bettered, sums, box, sigma)
+        known = lines[lines[:, KNOWN] > 0.0, LENGTH]
+        edge = float(np.median(known)) if len(known) else 1.0
+        drawing = Drawing(fit.xy, lines, fit.bend, contrasts, black, levels, bettered, sums, box, sigma, edge)
         return self._stepped(view.frame, fit._replace(levels=bettered), drawing), drawing
 
     def _again(self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_]) -> tuple[Fit, Drawing]:
@@ -160,17 +166,20 @@ class Draughtsman:
         foot = foot_of(contrasts, drawing.black, said[2])
         fit = solved(mesh, fit, told, use, lines, contrasts, True)
         reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
-        wider = max(sigma + self._widen(fit.xy, drawing, sums, use), MIN_SIGMA_PX)
-        return fit._replace(sigma=wider, reading=reading)
+        wider = self._widened(fit.xy, drawing, sums, use)
+        if max(wider, sigma) > UNMIXED * drawing.edge_px:
+            bettered = rebled(bettered, fit.xy, mesh, sigma, wider)
+        return fit._replace(sigma=wider, levels=bettered, reading=reading)
 
-    def _widen(
+    def _widened(
         self, xy: NDArray[np.float64], drawing: Drawing, sums: NDArray[np.float64], use: NDArray[np.float64]
     ) -> float:
-        """By how much the gridlines say that the blur is larger, px."""
+        """The blur that the gridlines say, px."""
         mesh, lines, bettered, sigma = self._mesh, drawing.lines, drawing.bettered, drawing.sigma
         now = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
         wider = widening(sums, use, drawing.contrasts, now, sigma)
-        return float(np.clip(wider, -MAX_WIDEN * sigma, MAX_WIDEN * sigma))
+        wider /= 1.0 - min(max(MIXED * (sigma / drawing.edge_px - UNMIXED), 0.0), MOST_MIXED)
+        return max(sigma + float(np.clip(wider, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
 
     def _bettered(self, view: Sight, picture: NDArray[np.float32], fit: Fit) -> Levels:
         """Levels corrected by what the drawing does not explain in the middle of the cells."""
@@ -191,22 +200,23 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
     """Whether the blur or the levels were found to be others than those drawn."""
     if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
         return True
-    return bool(level_change(drawing.levels.cell, drawing.bettered.cell) > SAME_LEVELS)
+    return bool(level_change(drawing.levels.cell, fit.levels.cell) > SAME_LEVELS)
 
 
 @compiled
-def still_moving(measured, drawn, strides, near, enough, edges):  # type: ignore[no-untyped-def]
+def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them; how many these are, 0 if there are none."""
+    those beside them, none if they are no more than ``few`` (a share of all); and how many these are."""
     count = drawn.shape[0]
-    moving, found = np.zeros(count, np.bool_), False
+    moving, found = np.zeros(count, np.bool_), 0
     for m in range(count):
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
         moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
-        found |= moving[m]
+        found += moving[m]
     out = moving.copy()
-    if found:
-        beside(moving, edges, out)
+    if found <= few * count:
+        return np.zeros(count, np.bool_), 0
+    beside(moving, edges, out)
     return out, np.sum(out)
 
 

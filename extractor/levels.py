@@ -27,6 +27,7 @@ DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
 MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
+LITTLE = 0.002  # of a neighbour, which makes no difference
 ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
@@ -310,13 +311,23 @@ def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64],
     A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
     (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
     """
-    own = np.clip(np.where(np.isfinite(share), share, usual), 0.0, MAX_SHARE)[:, None]
+    own = np.clip(np.where(np.isfinite(share), share, usual), -MAX_SHARE, MAX_SHARE)[:, None]
     inks = [levels.cell[color == ink] for ink in range(BLACK)]
     total = sum(np.median(ink, axis=0) for ink in inks if len(ink)) / (1.0 - 6.0 * min(usual, MAX_SHARE))
     black = levels.black.copy()
     black[:, 0] -= min(usual, MAX_SHARE) * total
     cell = (levels.cell + own * total) / (1.0 - 3.0 * own)
     return levels._replace(cell=cell, slope=levels.slope / (1.0 - 3.0 * own[:, :, None]), black=black)
+
+
+def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float) -> Levels:
+    """The levels that the cells' middles would have shown, had the blur not been ``drawn`` but ``sigma``, px."""
+    before, usual = bled(xy, mesh.cells, drawn, 0.0)
+    after, more = bled(xy, mesh.cells, sigma, 0.0)
+    if max(usual, more) < LITTLE:
+        return levels
+    left = 1.0 - 6.0 * min(usual, MAX_SHARE)
+    return unbled(levels, mesh.cell_color, (after - before) / left, (more - usual) / left)
 
 
 @compiled

@@ -22,6 +22,7 @@ SHARP_SHARE = 0.6
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
 AGREED = 0.04  # standard deviation in edges of corners on which triangles agree, where gridlines bend
+MAX_APART = 0.1  # how far what the gridlines say may lie from a place that is right, in edges
 X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
 
 

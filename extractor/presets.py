@@ -22,7 +22,8 @@ class Steps(NamedTuple):
         effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are
             allowed in any case.
         enough: no more steps once no marker moves by more than so many of its standard deviations
-        near: and by more than this share of the blur.
+        near: and by more than this share of the blur,
+        few: but for this share of the markers.
     """
 
     profiles: tuple[int, int]
@@ -32,10 +33,11 @@ class Steps(NamedTuple):
     effort: float
     enough: float
     near: float
+    few: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 0.0, 0.0, 0.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0),
+    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 0.0, 0.0, 0.0, 0.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0),
 }

@@ -20,27 +20,26 @@ from .image import estimate_noise
 from .information import Information, covariances
 from .levels import bled, cell_means, smooth_levels, unbled
 from .offsets import Reading, measure
-from .placing import AGREED, Places
+from .placing import AGREED, MAX_APART, Places
 from .presets import STEPS, Preset
 from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .step import PRIOR_PX, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import MIN_NOISE, short_edge, trust, trusted_markers
+from .straying import astray, collected, doubted_ones
 from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
-MIN_EDGE_PX = 5.0  # edges at a reduced scale, and
+MIN_EDGE_PX = 4.0  # edges at a reduced scale, and
 MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 BLIND_SIGMA_PX = 0.9  # where no gridline shows it
 BLEEDING = 0.002  # of a neighbour's level in the middle of a cell, from which on it is taken out
 BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
-# Where the drawing does not explain the image, dirt moves what is left to see: by how much, and how far triangles and
-# profiles may lie apart, in units of the edges around the marker.
+# Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
 UNEXPLAINED = 0.015
-MAX_APART = 0.1
 FAR_APART = 0.03  # where all triangles of a marker were found
 JUDGED_BY_SAMPLES = Judged(1, 4, 1.0)
 JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
@@ -71,28 +70,30 @@ class Refiner:
         edge = short_edge(places.xy_px, self._mesh.edges)
         if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
             view = sights.at(before.scale)
-            fit, across = self._begin(view, places, before)
-            refined = self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
         view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
-        fit, across = self._begin(view, places)
+        fit, across, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, edge)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)
-            fit, across = self._begin(view, replace(places, xy_px=xy))
-        return self._finish(view, fit, across, _in(view, places), edge / view.scale)
+            fit, across, places = self._begin(view, places, xy)
+        return self._finish(view, fit, across, places, edge)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
         least = MIN_EDGE_PX if sigma_px < SMALL_BLUR * edge_px else MIN_BLURRED_EDGE_PX
         return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / least)))
 
-    def _begin(self, view: Sight, places: Places, before: Seen | None = None) -> tuple[Fit, Across]:
-        """The inks' levels, the blur, and the first round of profiles."""
+    def _begin(
+        self, view: Sight, places: Places, start: NDArray[np.float64], before: Seen | None = None
+    ) -> tuple[Fit, Across, Places]:
+        """The inks' levels, the blur, and the first round of profiles from ``start`` (M, 2), px in the full image; and
+        the places without those that strayed."""
         mesh = self._mesh
-        xy, beyond, maps = completed(mesh, view.reduced(places.xy_px))
+        xy, beyond, maps = completed(mesh, view.reduced(start))
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
@@ -103,8 +104,9 @@ class Refiner:
         across = self._across(view, fit, lines)
         if before is None:
             fit, across = self._cleared(view, fit, lines, across)
-        fit, _ = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
-        return fit, across
+        fit, trusted = self._profile_step(view, fit, across, self._steps.profiles[0], judged=False)
+        fit, places = collected(view, mesh, fit, trusted, places)
+        return fit, across, places
 
     def _cleared(
         self, view: Sight, fit: Fit, lines: NDArray[np.float64], across: Across
@@ -128,15 +130,17 @@ class Refiner:
         return Seen(view.scale, 0.0, noise, smooth_levels(drawn, black, xy, mesh, noise, view.frame))
 
     def _finish(self, view: Sight, fit: Fit, across: Across, places: Places, edge_px: float) -> Refined:
-        """The last round of profiles, and synthesis where the blur asks for it."""
-        steps = self._steps
+        """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge."""
+        steps, places, edge_px = self._steps, _in(view, places), edge_px / view.scale
         start = placed(self._mesh, fit)
         if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
             start = roughened(self._mesh, start)
-            fit, trusted = self._profile_step(view, start, across, steps.profiles[1], judged=True)
+            fit, use = self._profile_step(view, start, across, steps.profiles[1], judged=True)
             xy, cov = self._sure(fit, places)
-            _doubt(xy, cov, ~trusted, places)
-            return self._refined(view, fit, xy, cov, trusted, places)
+            strays, doubted = astray(self._mesh, fit, xy, use, places.edge_px)
+            xy[strays], cov[strays] = np.nan, np.nan
+            _doubt(xy, cov, doubted, places)
+            return self._refined(view, fit, xy, cov, ~doubted, places)
         fit = self._draughtsman.steps(view, start, steps, edge_px)
         return self._result(view, fit, across, places)
 
@@ -149,29 +153,33 @@ class Refiner:
 
     def _profile_step(
         self, view: Sight, fit: Fit, across: Across, stations: int, *, judged: bool
-    ) -> tuple[Fit, NDArray[np.bool_]]:
-        """The fit after a round of profiles, and (M,) the markers whose gridlines look as they should.
+    ) -> tuple[Fit, NDArray[np.float64]]:
+        """The fit after a round of profiles, and (E,) how far its gridlines look as they should.
 
-        Gridlines are ``judged`` in the last round only, where they are already close: farther off, the best look wrong.
+        They are ``judged`` by it in the last round, where they are already close; before, the best look wrong, and it
+        counts only around markers where little else is seen.
         """
         mesh = self._mesh
         lines, loose = lines_of(mesh, fit), loose_ones(mesh, fit)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, loose, stations)
         votes = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
         fit, said = heard(mesh, fit, lines, sums, votes, JUDGED_BY_SAMPLES)
-        use = (sums[:, AA] > 0).astype(np.float64)
-        if judged:
-            pardon = PARDON**2 * across.room[:, 3]
-            use, _ = trust(sums, said.to_a, said.to_b, pardon, *JUDGED_BY_SAMPLES)
+        pardon = PARDON**2 * across.room[:, 3]
+        trusted, _ = trust(sums, said.to_a, said.to_b, pardon, *JUDGED_BY_SAMPLES)
+        use = trusted
+        if not judged:
+            read = sums[:, AA] > 0.0
+            doubted, _ = doubted_ones(trusted, read, mesh.spokes)
+            use = np.where(touching(doubted, mesh.edges), trusted, read)
         fit = solved(mesh, fit, said, use, lines, across.contrasts, False)
         foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
-        return fit._replace(reading=reading), trusted_markers(use, mesh.spokes)
+        return fit._replace(reading=reading), trusted
 
     def _judged(
         self, view: Sight, fit: Fit, across: Across, which: NDArray[np.bool_]
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """A round of profiles around some markers, judged by these and some elsewhere."""
+        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which are trusted."""
         edges = self._mesh.edges
         near = which.copy()
         beside(which, edges, near)
@@ -179,7 +187,8 @@ class Refiner:
         elsewhere = ~touching(near, edges)
         elsewhere[::ELSEWHERE] = False
         room[elsewhere] = 0.0
-        return self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
+        fit, use = self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
+        return fit, trusted_markers(use, self._mesh.spokes)
 
     def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
         """The blur that some of the gridlines show, px."""

@@ -115,7 +115,7 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
 
 @compiled
 def short_edge(xy, edges):  # type: ignore[no-untyped-def]
-    """The length in px that all but a hundredth of the gridlines exceed; 0 without any."""
+    """The length in px that all but a thirtieth of the gridlines exceed; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e]
@@ -123,7 +123,7 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.partition(length[:count], count // 100)[count // 100] if count > 0 else 0.0
+    return np.partition(length[:count], count // 30)[count // 30] if count > 0 else 0.0
 
 
 @compiled

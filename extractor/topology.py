@@ -31,6 +31,7 @@ class Topology(NamedTuple):
             (a cubic's least squares), where all 18 are there; else 0.
         ahead: (E, 2) int32, the marker next on the same gridline before an edge's start, and the one after its end.
         third: (E, 2) float64, the layout's third difference along these four, in the unit of ``offset``.
+        onward: (M, 6) int32, the edge after each of the ``spokes`` on the same gridline.
     """
 
     edges: NDArray[np.int32]
@@ -45,6 +46,7 @@ class Topology(NamedTuple):
     stencil: NDArray[np.float64]
     ahead: NDArray[np.int32]
     third: NDArray[np.float64]
+    onward: NDArray[np.int32]
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -64,6 +66,7 @@ def topology_of(layout: Reference) -> Topology:
     length = np.linalg.norm(xy[edges[:, 1]] - xy[edges[:, 0]], axis=1)
     ahead = np.stack([_ahead(ring, xy, edges[:, ::-1]), _ahead(ring, xy, edges)], axis=1)
     third = xy[ahead[:, 0]] - xy[ahead[:, 1]] + 3 * (xy[edges[:, 1]] - xy[edges[:, 0]])
+    spokes = _around(spokes, edges, xy)
     offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
     return Topology(
         edges=layout.edges.astype(np.int32),
@@ -72,13 +75,25 @@ def topology_of(layout: Reference) -> Topology:
         cell_edges=cell_edges.astype(np.int32),
         black=layout.cell_corners[~drawn].astype(np.int32).reshape(-1, 3),
         edge_cells=edge_cells,
-        spokes=_around(spokes, edges, xy),
+        spokes=spokes,
         near=near,
         offset=offset,
         stencil=_stencil(near, offset),
         ahead=ahead,
         third=np.where(np.all(ahead >= 0, axis=1)[:, None], third / length.mean(), 0.0),
+        onward=_onward(spokes, edges, ahead, key),
     )
+
+
+def _onward(
+    spokes: NDArray[np.int32], edges: NDArray[np.int64], ahead: NDArray[np.int32], key: NDArray[np.int64]
+) -> NDArray[np.int32]:
+    """(M, 6) int32: the edge after each spoke on the same gridline, -1 where none is; ``key`` tells edges."""
+    starts = edges[spokes, 0] == np.arange(len(spokes))[:, None]
+    end = np.where(starts, edges[spokes, 1], edges[spokes, 0])
+    beyond = np.where(starts, ahead[spokes, 1], ahead[spokes, 0])
+    found = np.searchsorted(key, np.minimum(end, beyond) * len(spokes) + np.maximum(end, beyond))
+    return np.where((spokes >= 0) & (beyond >= 0), found, -1).astype(np.int32)
 
 
 def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most: int) -> NDArray[np.int32]:

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, composed, render
-from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
+from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, composed, render
+from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
 from extractor.drawing import Draughtsman, Drawing, beside, chosen, still_moving, touching, unsettled
-from extractor.levels import Levels, bled, unbled
+from extractor.levels import Levels, bled, rebled, unbled
 from extractor.painting import draw_cells
 from extractor.presets import STEPS
 from extractor.refine import Refiner
@@ -127,10 +127,12 @@ def test_moving_markers_bring_their_neighbours() -> None:
     drawn = np.zeros((4, 2))
     measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, edges)
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2
-    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, edges)
+    assert count == 0 and not anew.any()  # one of four is few
+    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, edges)
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)
@@ -210,3 +212,43 @@ def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
     assert (
         np.abs(picture[..., 0] - true)[middle].max() < 0.25
     )  # 0.8 where blur is taken to leave edges in place
+
+
+@pytest.mark.parametrize("blur", [2.0, 3.0, 3.5])
+@pytest.mark.parametrize("pattern", ["honeycomb", "round"])
+def test_two_steps_find_wide_blur_and_the_levels_that_it_hides(
+    pattern: str, blur: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a blur known to a tenth, with levels as the middles of the cells show them under it."""
+    seen: list[tuple[float, float, float]] = []
+    plain = Draughtsman._first
+
+    def noted(self: Draughtsman, view: Any, fit: Any) -> Any:
+        stepped, drawing = plain(self, view, fit)
+        true = np.sqrt(blur**2 + view.scale**2 / 12) / view.scale
+        level = np.median(np.abs(stepped.levels.cell).sum(axis=1))
+        seen.append((drawing.sigma / true, stepped.sigma / true, level))
+        return stepped, drawing
+
+    monkeypatch.setattr(Draughtsman, "_first", noted)
+    extractor(pattern, "accurate").extract(shown(pattern, blur, sensor=Sensor(noise=0.5)).image)
+    sharp = np.median([np.abs(np.array(INKS[ink]) - BLACK_RGB).sum() for ink in ("red", "green", "blue")])
+    assert abs(seen[1][1] - 1) < 0.03
+    assert abs(seen[1][2] / sharp - 1) < 0.03
+
+
+def test_levels_follow_the_blur_there_and_back() -> None:
+    """What a wider blur would have shown of levels, seen with the narrower one again, is as before."""
+    own = extractor("honeycomb")._mesh
+    mm = standard_layout("honeycomb", LAYERS).marker_xy_mm
+    xy = 10.0 * mm / np.linalg.norm(mm[1] - mm[0])
+    count = len(own.cells)
+    cell = np.tile([120.0, 40.0, 20.0], (count, 1))
+    field = np.zeros((3, 10))
+    field[:, 0] = 20.0
+    levels = Levels(cell, np.zeros((count, 3, 2)), field, np.zeros(4, np.bool_))
+    wider = rebled(levels, xy, own, 1.2, 1.5)
+    assert (wider.cell[:, 0] > 1.02 * cell[:, 0]).all() and (wider.black[:, 0] < 20.0).all()
+    back = rebled(wider, xy, own, 1.5, 1.2)
+    np.testing.assert_allclose(back.cell, cell, rtol=0.02)
+    assert rebled(levels, xy, own, 0.5, 0.6) is levels
