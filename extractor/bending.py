@@ -135,11 +135,10 @@ def _lay_around(m, own, near, column):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def third_difference(xy, maps, edge, ahead, third):  # type: ignore[no-untyped-def]
-    """px, of the four markers along an edge, less the layout's own (``third``)."""
-    a, b = edge
-    p, q = ahead
-    u, v = 0.5 * third[0], 0.5 * third[1]
+def third_difference(xy, maps, edges, ahead, third, e):  # type: ignore[no-untyped-def]
+    """px, of the four markers along edge e, less the layout's own (``third``)."""
+    a, b, p, q = edges[e, 0], edges[e, 1], ahead[e, 0], ahead[e, 1]
+    u, v = 0.5 * third[e, 0], 0.5 * third[e, 1]
     x = xy[p, 0] - xy[q, 0] + 3.0 * (xy[b, 0] - xy[a, 0])
     y = xy[p, 1] - xy[q, 1] + 3.0 * (xy[b, 1] - xy[a, 1])
     x -= u * (maps[a, 0, 0] + maps[b, 0, 0]) + v * (maps[a, 0, 1] + maps[b, 0, 1])
@@ -153,7 +152,7 @@ def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untype
     out = np.full(edges.shape[0], np.nan)
     for e in range(edges.shape[0]):
         if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
-            x, y = third_difference(xy, maps, edges[e], ahead[e], third[e])
+            x, y = third_difference(xy, maps, edges, ahead, third, e)
             out[e] = x * x + y * y
     return out
 
@@ -193,13 +192,14 @@ def freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  #
         if not left > 1e-3 * sums[e, CC]:
             continue
         b = bend[e, 0] + (sums[e, C] - off[e] * sums[e, SHARE_C] - by_a * to_a[e] - by_b * to_b[e]) / left
-        for m in edges[e]:
+        for side in range(2):
+            m = edges[e, side]
             total[m] += use[e] * b * b
             of_noise[m] += use[e] * variance / left
             known[m] += use[e]
     out = np.zeros(edges.shape[0])
     for e in range(edges.shape[0]):
-        i, j = edges[e]
+        i, j = edges[e, 0], edges[e, 1]
         square = min(rough[i], rough[j])
         seen = known[i] + known[j]
         if square > 0.0 and seen > 0.0:
@@ -254,7 +254,7 @@ def bent(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
     for e in range(bend.shape[0]):
         if lines[e, KNOWN] == 0.0:
             continue
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         by_a = shift[a, 1] * lines[e, UX] - shift[a, 0] * lines[e, UY]
         by_b = shift[b, 1] * lines[e, UX] - shift[b, 0] * lines[e, UY]
         limit = MAX_BEND * lines[e, LENGTH]
@@ -282,7 +282,8 @@ def around(loose, spokes):  # type: ignore[no-untyped-def]
     out = np.zeros(spokes.shape[0])
     for m in range(spokes.shape[0]):
         known = 0
-        for e in spokes[m]:
+        for k in range(spokes.shape[1]):
+            e = spokes[m, k]
             if e >= 0:
                 out[m] += loose[e]
                 known += 1

@@ -235,7 +235,7 @@ def unsettled(shift, sigma):  # type: ignore[no-untyped-def]
     drawing answers to shifts of the size of the blur as it would to smaller ones."""
     out = np.zeros((shift.shape[0], 2, 2))
     for m in range(shift.shape[0]):
-        x, y = shift[m]
+        x, y = shift[m, 0], shift[m, 1]
         share = min(LEFT * np.hypot(x, y) / sigma, MOST_LEFT)
         out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
         out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
@@ -246,7 +246,7 @@ def unsettled(shift, sigma):  # type: ignore[no-untyped-def]
 def beside(which, edges, out):  # type: ignore[no-untyped-def]
     """Add to ``out`` (M,) the markers with a gridline to one of ``which`` (M,)."""
     for e in range(edges.shape[0]):
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         out[a] |= which[b]
         out[b] |= which[a]
 

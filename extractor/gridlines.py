@@ -70,7 +70,7 @@ def _quadratic(xy, m, near, offset, gram, right):  # type: ignore[no-untyped-def
         if n < 0 or not np.isfinite(xy[n, 0]):
             continue
         known += 1
-        x, y = offset[k]
+        x, y = offset[k, 0], offset[k, 1]
         weight = 1.0 / (x * x + y * y) ** 2
         terms[0], terms[1], terms[2], terms[3], terms[4] = x, y, 0.5 * x * x, x * y, 0.5 * y * y
         for i in range(5):
@@ -120,7 +120,7 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
     """
     out = np.zeros((edges.shape[0], 8))
     for e in range(edges.shape[0]):
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         dx, dy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
         length = np.sqrt(dx * dx + dy * dy)
         if not length > 1.0:

@@ -103,7 +103,7 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
     count = diagonal.shape[0]
     inverse = np.zeros((count, 3))
     for m in range(count):
-        xx, xy, yy = diagonal[m]
+        xx, xy, yy = diagonal[m, 0], diagonal[m, 1], diagonal[m, 2]
         determinant = xx * yy - xy * xy
         inverse[m, 0], inverse[m, 1], inverse[m, 2] = yy / determinant, -xy / determinant, xx / determinant
     residual = right.copy()

@@ -183,7 +183,7 @@ def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, sca
     """Fill in the cells' levels over black and their slopes."""
     terms = np.empty(TERMS)
     for i in range(own.shape[0]):
-        x, y = place[i]
+        x, y = place[i, 0], place[i, 1]
         if not np.isfinite(x):
             # a corner is unknown; its cell may be drawn in the next step, when it has been put
             x, y = 0.0, 0.0
@@ -236,7 +236,7 @@ def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
 def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
-        a, b, c = cells[i]
+        a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
         out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - x0) / scale
         out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - y0) / scale
     return out

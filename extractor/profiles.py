@@ -139,7 +139,7 @@ def profile_blur(image, lines, weights, room, most):  # type: ignore[no-untyped-
     blurs, count = np.empty(which.shape[0] // every + 1), 0
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     for e in which[::every]:
-        u0, u1, u2, zero = weights[e]
+        u0, u1, u2, zero = weights[e, 0], weights[e, 1], weights[e, 2], weights[e, 3]
         nx, ny, length = -lines[e, UY], lines[e, UX], lines[e, LENGTH]
         step = MAX_REACH * room[e, 0] / BLUR_SAMPLES
         total = 0.0

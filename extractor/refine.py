@@ -41,6 +41,8 @@ BLUR_EDGES = 60  # gridlines that the first estimate of the blur is taken from
 # Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
 UNEXPLAINED = 0.015
 FAR_APART = 0.03  # where all triangles of a marker were found
+# Where the drawing leaves more than so many times the noise, it explains nothing so well that a marker may be moved by
+STRANGE, MAX_STRANGE = 3.0, 0.13  # of an edge.
 JUDGED_BY_SAMPLES = Judged(1, 4, 1.0)
 JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
 ELSEWHERE = 5  # one of so many other gridlines shows how well the pattern is explained where nothing is wrong
@@ -198,6 +200,9 @@ class Refiner:
     def _result(self, view: Sight, fit: Fit, across: Across, places: Places) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
+        apart = np.linalg.norm(xy - places.xy_px, axis=1) > MAX_STRANGE * places.edge_px
+        if apart.any() and fit.noise > STRANGE * estimate_noise(view.image, fit.xy, self._mesh.cells):
+            xy[apart], cov[apart] = np.nan, np.nan
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
             judged, trusted = self._judged(

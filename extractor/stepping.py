@@ -105,7 +105,8 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
         total, count = 0.0, 0
-        for e in spokes[m]:
+        for k in range(spokes.shape[1]):
+            e = spokes[m, k]
             if e >= 0:
                 total += use[e]
                 count += 1
@@ -118,7 +119,7 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
     """The length in px that all but a thirtieth of the gridlines exceed; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         own = np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
         if np.isfinite(own):
             length[count] = own
@@ -162,8 +163,8 @@ def strides(step, diagonal, beyond):  # type: ignore[no-untyped-def]
     """(M,) how far each marker stepped in standard deviations with all others known; 0 for those ``beyond``."""
     out = np.zeros(step.shape[0])
     for m in range(step.shape[0]):
-        xx, cross, yy = diagonal[m]
-        dx, dy = step[m]
+        xx, cross, yy = diagonal[m, 0], diagonal[m, 1], diagonal[m, 2]
+        dx, dy = step[m, 0], step[m, 1]
         if not beyond[m]:
             out[m] = np.sqrt(max(dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy, 0.0))
     return out

@@ -81,7 +81,8 @@ def doubted_ones(use, read, spokes):  # type: ignore[no-untyped-def]
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
         total, count = 0.0, 0
-        for e in spokes[m]:
+        for k in range(spokes.shape[1]):
+            e = spokes[m, k]
             if e >= 0 and read[e]:
                 total += use[e]
                 count += 1
@@ -113,7 +114,8 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
                 out[m, 0] -= move[m, 0]
                 out[m, 1] -= move[m, 1]
                 strays[m] = anew[m] = True
-                for n in near[m]:
+                for k in range(near.shape[1]):
+                    n = near[m, k]
                     anew[n if n >= 0 else m] = True
         if not np.any(anew):
             break
@@ -134,7 +136,7 @@ def _ask(xy, maps, anew, edges, ahead, third, spokes, onward, move, far, alike):
             for e, part in ((spokes[m, spoke], PART), (onward[m, spoke], 1.0)):
                 if e < 0 or ahead[e, 0] < 0 or ahead[e, 1] < 0:
                     continue
-                x, y = third_difference(xy, maps, edges[e], ahead[e], third[e])
+                x, y = third_difference(xy, maps, edges, ahead, third, e)
                 if np.isfinite(x):
                     part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
                     said[known, 0], said[known, 1] = part * x, part * y

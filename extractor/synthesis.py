@@ -61,7 +61,7 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
             i = edge_cells[e, k]
             if i < 0:
                 continue
-            a, b, c = cells[i]
+            a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
             cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3
             if not np.isfinite(cx):
                 # half of it is out of sight; it cannot be drawn, so its sides cannot be read

@@ -65,10 +65,10 @@ def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[n
     places, spread = np.full((count, m, 2), np.nan), np.full((count, m, 2, 2), np.nan)
     status = np.zeros((count, m), np.uint8)
     for e in range(count):
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         if not (known[a] and known[b]):
             continue
-        x0, y0 = xy[a]
+        x0, y0 = xy[a, 0], xy[a, 1]
         cx, cy = xy[b, 0] - x0, xy[b, 1] - y0
         length = np.sqrt(cx * cx + cy * cy)
         tx, ty = cx / length, cy / length
