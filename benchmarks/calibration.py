@@ -1,4 +1,4 @@
-"""How true covariances are where something is damaged: 72 pictures, three patterns on three surfaces.
+"""How true covariances are where something is damaged: 108 pictures, three patterns on three surfaces.
 
     python -m benchmarks.calibration
 
@@ -35,7 +35,7 @@ from extractor.presets import PRESETS, Preset
 
 KINDS = ("cells missing", "dirt", "dark dirt", "blots")
 MEDIAN = np.log(2)  # of the squares per axis, in two dimensions
-LAYERS = 9
+LAYERS, DRAWS = 9, 3
 SIZE = (430, 400)
 REACH_MM = 8.0
 SURFACES = {
@@ -72,7 +72,9 @@ def squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
             plain = replace(
                 standard_scene(layout), surface=surface, camera=Camera(20.0, 7.3, 10.0 * number, 30.0)
             )
-            for seed, damage in enumerate([*damages(2 * number), *damages(2 * number + 1)]):
+            for seed, damage in enumerate(
+                damage for draw in range(DRAWS) for damage in damages(DRAWS * number + draw)
+            ):
                 seen = render(replace(plain, damage=damage, seed=seed), size=SIZE)
                 markers = extractor.extract(seen.image)
                 error = markers.xy_px - seen.truth.marker_xy_px

@@ -94,10 +94,11 @@ class Draughtsman:
         for step in range(MAX_STEPS - 1):
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
-            anew, moving = still_moving(*about, near, steps.enough, steps.few, self._mesh.edges)
+            hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
+            few = 0.0 if hard else steps.few
+            anew, moving = still_moving(*about, near, steps.enough, few, self._mesh.edges)
             everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
-            hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             if not (everything or moving) or (step > 0 and spent > allowed):
                 break

@@ -17,6 +17,8 @@ INNER = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING])
 TERMS = 6  # 1, x, y, x^2, xy, y^2 in units of the local edge
 MIN_QUADRATIC = 9  # neighbours for the quadratic; fewer get the linear map
 MIN_LINEAR = 4
+CUBIC = 10  # the same terms and x^3, x^2 y, x y^2, y^3
+MIN_CUBIC = 16  # neighbours, which leave a cubic something to miss
 PIVOT = 1e-7
 
 
@@ -183,6 +185,65 @@ def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
         leverage[m] = unit[0]
         variance[m] = squares / (2.0 * max(n - terms, 1))
     return place, variance, leverage, support
+
+
+@compiled
+def cubic_variance(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
+    """(M,) px^2, the variance per axis that a cubic map leaves in the neighbours of the wanted markers; infinite where
+    these are fewer than ``MIN_CUBIC``.
+
+    What is odd about the marker, as cubic terms are, hardly moves where a quadratic puts it, if its rings are (nearly)
+    whole: a quadratic misses much of its neighbours on a surface that is bent, and is right about the middle.
+    """
+    out = np.full(xy_px.shape[0], np.inf)
+    rows, seen = np.ones((table.shape[1], CUBIC)), np.empty((table.shape[1], 2))
+    for m in np.flatnonzero(wanted):
+        n = _arms_around(xy_px, m, marker_mm, table, rows, seen)
+        if n >= MIN_CUBIC:
+            out[m] = _left_by_cubic(rows[:n], seen[:n])
+    return out
+
+
+@compiled
+def _arms_around(xy_px, m, marker_mm, table, rows, seen):  # type: ignore[no-untyped-def]
+    """Write x and y of the known neighbours of a marker, in units of their mean distance, into the columns 1 and 2 of
+    ``rows``, and where they are seen; their number."""
+    scale, n = 0.0, 0
+    for j in table[m]:
+        if j >= 0 and not np.isnan(xy_px[j, 0]):
+            rows[n, 1], rows[n, 2] = marker_mm[j] - marker_mm[m]
+            seen[n] = xy_px[j]
+            scale += np.hypot(rows[n, 1], rows[n, 2])
+            n += 1
+    rows[:n, 1:3] *= n / max(scale, 1e-12)
+    return n
+
+
+@compiled
+def _left_by_cubic(rows, seen):  # type: ignore[no-untyped-def]
+    """The variance per axis about the cubic through places ``seen`` (n, 2); their x and y are columns 1 and 2 of
+    ``rows`` (n, 10), whose others are written here."""
+    normal, sides = np.zeros((CUBIC, CUBIC)), np.zeros((2, CUBIC))
+    for k in range(rows.shape[0]):
+        x, y = rows[k, 1], rows[k, 2]
+        rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
+        rows[k, 6], rows[k, 7], rows[k, 8], rows[k, 9] = x * x * x, x * x * y, x * y * y, y * y * y
+        for a in range(CUBIC):
+            for axis in range(2):
+                sides[axis, a] += rows[k, a] * seen[k, axis]
+            for b in range(a + 1):
+                normal[a, b] += rows[k, a] * rows[k, b]
+    if not _factor(normal, CUBIC):
+        return np.inf
+    squares = 0.0
+    for axis in range(2):
+        _solve(normal, CUBIC, sides[axis])
+        for k in range(rows.shape[0]):
+            miss = seen[k, axis]
+            for a in range(CUBIC):
+                miss -= rows[k, a] * sides[axis, a]
+            squares += miss * miss
+    return squares / (2.0 * (rows.shape[0] - CUBIC))
 
 
 def predict(

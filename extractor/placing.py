@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .cells import Cells
 from .engine import compiled
 from .gradients import whole_slopes
+from .neighbourhood import predicted
 from .numbering import Numbering
 from .tables import Lattice
 
@@ -22,6 +23,10 @@ SHARP_SHARE = 0.6
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
 AGREED = 0.04  # standard deviation in edges of corners on which triangles agree, where gridlines bend
+CLEAR = 0.6  # of the misfit with the corners named otherwise: then it is clear which is which
+MAX_EXPECTED_SIGMA = 0.15  # in edges, of where markers around put a corner of such a triangle, and
+MAX_EXPECTED_MISFIT = 0.1  # how far from there it may lie,
+NEARER = 0.5  # of how far the neighbours' centers put it
 MAX_APART = 0.1  # how far what the gridlines say may lie from a place that is right, in edges
 X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
 
@@ -49,7 +54,9 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     """Merge the corners of each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
 
     A cell's corners are those of its triangle where that lies as its neighbours say, else where they say. A marker
-    whose triangles lie apart has a wrong one among them and is lost.
+    whose triangles lie apart has a wrong one among them and is lost. At the pattern's rim the neighbours lie on one
+    side and say little of a cell that is bent: one corner of a triangle is believed there where the markers around
+    say the same.
 
     Args:
         size: width and height of the image.
@@ -57,8 +64,12 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     slope = whole_slopes(cells.center_px, cells.corner_px, numbering.cell, numbering.mirrored, lattice.plan)
     seen = cells.center_px, cells.corner_px, slope, numbering.cell
     corners = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
-    xy, around, there, kept = _merged(corners, len(lattice.marker_mm))
-    return Places(xy, around, kept, *agreement(there, lattice.meeting))
+    xy, around, there, kept, unmatched = _merged(corners, len(lattice.marker_mm))
+    agreed, whole = agreement(there, lattice.meeting)
+    unmatched &= lattice.rim
+    if unmatched.any():
+        _believe(xy, around, agreed, unmatched, corners, lattice.marker_mm, lattice.neighbours)
+    return Places(xy, around, kept, agreed, whole)
 
 
 def agreement(
@@ -71,7 +82,8 @@ def agreement(
 @compiled
 def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, width, height):  # type: ignore[no-untyped-def]
     """Of the N numbered cells with a slope: (N, 3) the ids of corners 0, 1, 2, (N, 3, 2) these, (N,) the mean edges,
-    (N,) where a triangle matched, (N,) which matched or are cut off by the border, and whether most matched.
+    (N,) where a triangle matched, (N,) which matched or are cut off by the border, (N, 3, 2) the corners of the others'
+    triangles where it is clear which is which, else NaN, and whether most matched.
 
     Clockwise in the image a cell's corners run 0, 2, 1, seen from the back 0, 1, 2.
     """
@@ -79,6 +91,7 @@ def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, wi
     count, matched = here.shape[0], 0
     ids, corner, edge = np.empty((count, 3), np.int32), np.empty((count, 3, 2)), np.zeros(count)
     fitted, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    aside, misfit = np.full((count, 3, 2), np.nan), np.empty(3)
     for n in range(count):
         i = here[n]
         arms, place, inside = arms_mm[cell_of[i]], corner[n], True
@@ -91,21 +104,23 @@ def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, wi
             inside = inside and min(x, y, width - 1 - x, height - 1 - y) >= BORDER_PX
         for k in range(3):
             edge[n] += np.sqrt(_square(place[k], place[(k + 1) % 3])) / 3
-        best, first, step = (MAX_CORNER_MISFIT * edge[n]) ** 2, -1, 1 if mirrored else 2
+        step = 1 if mirrored else 2
         for shift in range(3):
-            worst = 0.0
+            misfit[shift] = 0.0
             for k in range(3):
                 square = _square(triangle[i, (shift + step * k) % 3], place[k])
-                worst = square if not square <= worst else worst  # a NaN stays
-            if worst < best:
-                best, first = worst, shift
-        if first >= 0:
-            fitted[n] = True
-            matched += 1
-            for k in range(3):
+                misfit[shift] = square if not square <= misfit[shift] else misfit[shift]  # a NaN stays
+        first = misfit.argmin()
+        fitted[n] = misfit[first] < (MAX_CORNER_MISFIT * edge[n]) ** 2
+        matched += fitted[n]
+        clear = misfit[first] < CLEAR**2 * min(misfit[first - 1], misfit[first - 2])
+        for k in range(3):
+            if fitted[n]:
                 place[k] = triangle[i, (first + step * k) % 3]
+            elif clear:
+                aside[n, k] = triangle[i, (first + step * k) % 3]
         kept[n] = fitted[n] or not inside
-    return ids, corner, edge, fitted, kept, matched > SHARP_SHARE * count
+    return ids, corner, edge, fitted, kept, aside, matched > SHARP_SHARE * count
 
 
 @compiled
@@ -119,8 +134,8 @@ def _square(a, b):  # type: ignore[no-untyped-def]
 def _merged(corners, count):  # type: ignore[no-untyped-def]
     """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
     triangles agree there; (C, 3) the ids of the cells whose corners are all known, where most are sharp only of those
-    ``kept``. ``corners`` as ``_corners`` gives them."""
-    ids, corner, edge, fitted, kept, sharp = corners
+    ``kept``; (M,) bool, the markers where no triangle matched. ``corners`` as ``_corners`` gives them."""
+    ids, corner, edge, fitted, kept, _, sharp = corners
     sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
@@ -131,7 +146,9 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
             row[EDGE] += weight * edge[n]
             row[WEIGHT] += weight
     xy, around = np.full((count, 2), np.nan), np.full(count, np.nan)
+    unmatched = np.zeros(count, np.bool_)
     for m in range(count):
+        unmatched[m] = 0.0 < sums[m, WEIGHT] < 1.0
         if sums[m, WEIGHT] > 0.0:
             xy[m, 0], xy[m, 1] = sums[m, X] / sums[m, WEIGHT], sums[m, Y] / sums[m, WEIGHT]
             around[m] = sums[m, EDGE] / sums[m, WEIGHT]
@@ -155,4 +172,20 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
         if known and (kept[n] or not sharp):
             whole[rows] = ids[n]
             rows += 1
-    return xy, around, there, whole[:rows]
+    return xy, around, there, whole[:rows], unmatched
+
+
+@compiled
+def _believe(xy, edge, agreed, unmatched, corners, marker_mm, table):  # type: ignore[no-untyped-def]
+    """Put ``unmatched`` markers (M,) on corners of triangles that the ``agreed`` ones around confirm, in place."""
+    ids, aside = corners[0], corners[5]
+    seen = xy.copy()
+    seen[~agreed] = np.nan
+    expected, variance, leverage, _ = predicted(seen, unmatched, marker_mm, table)
+    for n in range(ids.shape[0]):
+        for k in range(3):
+            m = ids[n, k]
+            if unmatched[m] and variance[m] * (1.0 + leverage[m]) < (MAX_EXPECTED_SIGMA * edge[m]) ** 2:
+                limit = min(MAX_EXPECTED_MISFIT * edge[m], NEARER * np.sqrt(_square(xy[m], expected[m])))
+                if _square(aside[n, k], expected[m]) < limit * limit:
+                    xy[m] = aside[n, k]

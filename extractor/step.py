@@ -129,5 +129,5 @@ def solved(
         strides=strides(shift, diagonal, fit.beyond),
     )
     least = shown(said.sums, use, lines, mesh.edges, variance, count)
-    measured, guiding = moved(fit.xy, shift, least)
+    measured, guiding = moved(fit.xy, shift, least, use, mesh.spokes)
     return fit._replace(measured=measured, guiding=guiding)

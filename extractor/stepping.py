@@ -25,7 +25,8 @@ from .synthesis import (
 
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
-WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines
+WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
+RIM_PX = 0.05  # pattern's rim, unless believed and known so well: there the map through those on one side knows less
 TRUSTED = 0.4  # of a gridline, for its places to be measured
 BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
@@ -100,17 +101,23 @@ def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no
 
 
 @compiled
+def _believed(use, spokes, m):  # type: ignore[no-untyped-def]
+    """Whether enough of the gridlines that end at a marker are trusted."""
+    total, count = 0.0, 0
+    for k in range(spokes.shape[1]):
+        e = spokes[m, k]
+        if e >= 0:
+            total += use[e]
+            count += 1
+    return total > BELIEVED * count
+
+
+@compiled
 def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
     """(M,) bool: enough of the gridlines that end there are trusted."""
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
-        total, count = 0.0, 0
-        for k in range(spokes.shape[1]):
-            e = spokes[m, k]
-            if e >= 0:
-                total += use[e]
-                count += 1
-        out[m] = total > BELIEVED * count
+        out[m] = _believed(use, spokes, m)
     return out
 
 
@@ -171,7 +178,7 @@ def strides(step, diagonal, beyond):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def moved(xy, shift, least):  # type: ignore[no-untyped-def]
+def moved(xy, shift, least, use, spokes):  # type: ignore[no-untyped-def]
     """(M, 2) the markers after a step, and the same with NaN where the image hardly shows them (``least``, as ``shown``
     gives it)."""
     count = xy.shape[0]
@@ -181,6 +188,8 @@ def moved(xy, shift, least):  # type: ignore[no-untyped-def]
     for m in range(count):
         measured[m, 0], measured[m, 1] = xy[m, 0] + shift[m, 0], xy[m, 1] + shift[m, 1]
         weak = least[m] < limit
+        if weak and spokes[m, spokes.shape[1] - 1] < 0 and least[m] > RIM_PX**-2:
+            weak = not _believed(use, spokes, m)
         guiding[m, 0] = np.nan if weak else measured[m, 0]
         guiding[m, 1] = np.nan if weak else measured[m, 1]
     return measured, guiding

@@ -42,7 +42,7 @@ def collected(
     ``trusted`` (E,) is how far gridlines look as they should."""
     known = np.where(fit.beyond[:, None], np.nan, fit.guiding)
     strays, doubted = astray(mesh, fit, known, trusted, places.edge_px / view.scale)
-    led = strays | doubted
+    led = strays | (doubted & ~places.agreed)
     if not led.any():
         return fit, places
     xy = np.where(led[:, None], np.nan, known)
