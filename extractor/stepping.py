@@ -127,11 +127,12 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
-        own = np.hypot(xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1])
+        dx, dy = xy[b, 0] - xy[a, 0], xy[b, 1] - xy[a, 1]
+        own = dx * dx + dy * dy
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.partition(length[:count], count // 30)[count // 30] if count > 0 else 0.0
+    return np.sqrt(np.partition(length[:count], count // 30)[count // 30]) if count > 0 else 0.0
 
 
 @compiled
