@@ -5,7 +5,8 @@
 640 x 480 px, edges of 20 px, turned by 7.3 degrees, blur 1 px, noise 2/255: honeycomb with 397 markers flat, tilted by
 35 degrees, bulged and twisted; round and elliptical patterns flat. Detectors of checkerboards read one of 400 inner
 corners with the same edge length under the same camera and surface, in black and white only, given as gray image.
-One thread each, processor time; the repetitions of all methods take turns, each with a noise of its own.
+One thread each, processor time; the repetitions of all methods take turns, each with a noise of its own. Each method
+has just read another frame, not timed, as in a stream.
 """
 
 from __future__ import annotations
