@@ -85,7 +85,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     rings = lattice.ring_weights, lattice.neighbours
     if _sound(xy, near, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
         return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
-    kinds = believed, refined.explained, places.whole
+    kinds = believed, refined.explained, places.whole, places.agreed
     _drop_outliers(xy, cov, edge_px, near, kinds, *rings, lattice.marker_mm)
     _drop_frayed(xy, cov, places, lattice)
     _drop_slid(xy, cov, refined.free_px, places, lattice)
@@ -144,10 +144,10 @@ def _inside(x, y, size):  # type: ignore[no-untyped-def]
 def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # type: ignore[no-untyped-def]
     """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
 
-    What the drawing does not explain must lie nearer, and have neighbours that say so; what all triangles agree on may
-    lie farther off.
+    What the drawing does not explain must lie nearer, and have neighbours that say so; what triangles do not agree on
+    must have some. What all triangles agree on may lie farther off.
     """
-    believed, explained, whole = kinds
+    believed, explained, whole, agreed = kinds
     excess, stale = np.zeros(edge.shape[0]), np.ones(edge.shape[0], np.bool_)
     for _ in range(ROUNDS):
         # only what may be too far is looked at closely, and again where a neighbour has been dropped
@@ -170,6 +170,8 @@ def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # ty
             apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
             if np.isfinite(apart / (edge[m] * allowed)):
                 excess[m] = apart / (edge[m] * allowed)
+            elif not agreed[m]:  # nobody vouches for it: neither triangles nor neighbours
+                excess[m] = np.inf
             vague = MAX_VAGUE if believed[m] else MAX_UNEXPLAINED
             if not (explained[m] or whole[m] or sigma < vague * edge[m]):  # they do not know themselves
                 excess[m] = np.inf

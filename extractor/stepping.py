@@ -27,6 +27,7 @@ MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
 WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
 RIM_PX = 0.05  # pattern's rim, unless believed and known so well: there the map through those on one side knows less
+MOSTLY_SOUND = 0.68  # of the gridlines look as the pattern does, where their noise is that of all
 TRUSTED = 0.4  # of a gridline, for its places to be measured
 BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
@@ -97,6 +98,9 @@ def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no
         if np.isfinite(misfit[e]):
             limit = max(usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2))), pardon[e])
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+    sound = misfit[use == 1.0]
+    if 0 < sound.shape[0] < MOSTLY_SOUND * judged.shape[0]:  # what is dirty is no noise
+        usual = max(np.median(sound), MIN_NOISE**2)
     return use, np.sqrt(usual)
 
 

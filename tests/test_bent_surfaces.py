@@ -49,20 +49,27 @@ def twisted(amount: float) -> Array:
     return EDGE_PX * turned * [1.0, -1.0] + 200.0
 
 
-def repaired(xy: Array, lost: list[int]) -> Repaired:
-    """What repair makes of markers measured to a hundredth of a pixel, all but the lost ones."""
+def repaired(xy: Array, lost: list[int], agreed: bool = True) -> Repaired:
+    """What repair makes of markers measured to a hundredth of a pixel but for the lost ones; do triangles agree?"""
     count = len(xy)
     seen = xy + np.random.default_rng(0).normal(0.0, 0.01, xy.shape)
     cov = np.tile(1e-4 * np.eye(2), (count, 1, 1))
     seen[lost], cov[lost] = np.nan, np.nan
     free = np.zeros(count)
     refined = Refined(seen, cov, np.ones(count, np.bool_), free, 1.0, 2.0, None, np.empty((0, 0, 3)))
-    agreed = np.ones(count, np.bool_)
-    places = Places(seen, np.full(count, EDGE_PX), np.empty((0, 3), np.int32), agreed, agreed)
+    vouched = np.full(count, agreed)
+    places = Places(seen, np.full(count, EDGE_PX), np.empty((0, 3), np.int32), vouched, vouched)
     return repair(refined, places, lattice(), SIZE)
 
 
 # -- repair
+
+
+@pytest.mark.parametrize("agreed", [True, False])
+def test_a_marker_that_neither_triangles_nor_neighbours_vouch_for_is_lost(agreed: bool) -> None:
+    xy = twisted(0.0)
+    lost = [int(m) for m in mesh().near[0] if m >= 0]
+    assert (repaired(xy, lost, agreed).status[0] == Status.MEASURED) == agreed
 
 
 def test_a_cubic_leaves_nothing_of_a_cubic_and_the_noise_of_noise() -> None:
