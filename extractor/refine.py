@@ -25,12 +25,13 @@ from .presets import STEPS, Preset
 from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
 from .step import PRIOR_PX, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
-from .stepping import MIN_NOISE, short_edge, trust, trusted_markers
+from .stepping import MIN_NOISE, SHORTEST, short_edge, trust, trusted_markers
 from .straying import astray, collected, doubted_ones
 from .synthesis import AA, A, B, edge_contrasts
 from .topology import Topology
 
 USUAL_SIGMA_PX = 1.5  # before it is known
+SHORT = 30  # one in so many gridlines may be smaller than that at a reduced scale
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and
 MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
 MAX_SHIFT = 0.25  # in units of the edges around the marker
@@ -69,15 +70,16 @@ class Refiner:
 
         A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
         """
-        edge = short_edge(places.xy_px, self._mesh.edges)
-        if before is not None and before.scale == self._scale(before.scale * before.sigma, edge):
+        edge = short_edge(places.xy_px, self._mesh.edges, SHORTEST)
+        usual = short_edge(places.xy_px, self._mesh.edges, SHORT)
+        if before is not None and before.scale == self._scale(before.scale * before.sigma, usual):
             view = sights.at(before.scale)
             refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
-        view = sights.at(min(self._scale(USUAL_SIGMA_PX, edge), 2))
+        view = sights.at(min(self._scale(USUAL_SIGMA_PX, usual), 2))
         fit, across, places = self._begin(view, places, places.xy_px)
-        scale = self._scale(view.scale * fit.sigma, edge)
+        scale = self._scale(view.scale * fit.sigma, usual)
         if scale != view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             view = sights.at(scale)

@@ -23,6 +23,7 @@ from .synthesis import (
     B,
 )
 
+SHORTEST = 100  # one in so many gridlines is shorter than what is called a short edge
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
 PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
 WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
@@ -126,8 +127,8 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def short_edge(xy, edges):  # type: ignore[no-untyped-def]
-    """The length in px that all but a thirtieth of the gridlines exceed; 0 without any."""
+def short_edge(xy, edges, one_in):  # type: ignore[no-untyped-def]
+    """The length in px that all but ``one_in`` so many of the gridlines exceed; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
@@ -136,7 +137,7 @@ def short_edge(xy, edges):  # type: ignore[no-untyped-def]
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.sqrt(np.partition(length[:count], count // 30)[count // 30]) if count > 0 else 0.0
+    return np.sqrt(np.partition(length[:count], count // one_in)[count // one_in]) if count > 0 else 0.0
 
 
 @compiled
