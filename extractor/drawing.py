@@ -207,16 +207,16 @@ def _looks_other(fit: Fit, drawing: Drawing) -> bool:
 @compiled
 def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them, none if they are no more than ``few`` (a share of all); and how many these are."""
+    those beside them; and how many these are. None where no more than ``few`` (a share of all) move."""
     count = drawn.shape[0]
     moving, found = np.zeros(count, np.bool_), 0
     for m in range(count):
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
         moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
         found += moving[m]
-    out = moving.copy()
     if found <= few * count:
         return np.zeros(count, np.bool_), 0
+    out = moving.copy()
     beside(moving, edges, out)
     return out, np.sum(out)
 

@@ -128,7 +128,7 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
 
 @compiled
 def short_edge(xy, edges, one_in):  # type: ignore[no-untyped-def]
-    """The length in px that all but ``one_in`` so many of the gridlines exceed; 0 without any."""
+    """The length in px that all gridlines exceed but for one in ``one_in``; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]

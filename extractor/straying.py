@@ -21,18 +21,17 @@ from .sight import Sight
 from .step import completed
 from .topology import Topology
 
-DOUBTED = 0.55  # mean trust in the gridlines read at a marker, below which it may have strayed
-# A doubted marker strays, and any other, if it would have to move by so many times what those around would have to,
+DOUBTED = 0.55  # mean trust in the gridlines read at a marker, below which it is doubted
+# To stray, a marker must have to move by so many times what those around it must, if doubted, and if not;
 UNUSUAL = 3.0, 6.0
 LEAST = 0.02, 0.03  # and by so much of an edge.
-ALIKE = 0.5  # of the move, by which one of a marker's gridlines may say another,
-MOST = 0.7  # and at least so many of them and
-FEWEST = 3  # so many may not
+# Its gridlines agree on a move if more than this share of them, and no fewer than so many,
+MOST, FEWEST = 0.7, 3
+ALIKE = 0.5  # ask for one that differs by less than this share of it.
 RINGS = 2  # of strays that the markers around are continued to
 ROUNDS = 6  # one marker that strays hides what is wrong with its neighbours
-PART = (
-    1.0 / 3.0
-)  # of a third difference is an error of one of its two inner markers; all of it, of an outer one
+# The share of a third difference that is the error of one of its two inner markers; all of it is, of an outer one.
+PART = 1.0 / 3.0
 
 
 def collected(
