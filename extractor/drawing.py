@@ -31,7 +31,8 @@ MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
-SAME_LEVELS = 0.006  # likewise, of the levels
+SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
+NOISY_BLUR, NOISY_LEVELS = 0.5, 0.12  # of how far noise moves these, in units of the blur
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
 SMALL_BLUR = 0.12  # of an edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
@@ -97,7 +98,7 @@ class Draughtsman:
             hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
             few = 0.0 if hard else steps.few
             anew, moving = still_moving(*about, near, steps.enough, few, self._mesh.edges)
-            everything = _looks_other(fit, drawing) or moving > MAX_AGAIN * len(anew)
+            everything = _looks_other(fit, drawing, steps.enough) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             if not (everything or moving) or (step > 0 and spent > allowed):
@@ -197,11 +198,15 @@ def _effort(size_px: float, share: float | None = None) -> float:
     return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
 
 
-def _looks_other(fit: Fit, drawing: Drawing) -> bool:
-    """Whether the blur or the levels were found to be others than those drawn."""
-    if abs(fit.sigma - drawing.sigma) > SAME_BLUR * drawing.sigma:
-        return True
-    return bool(level_change(drawing.levels.cell, fit.levels.cell) > SAME_LEVELS)
+def _looks_other(fit: Fit, drawing: Drawing, enough: float) -> bool:
+    """Whether the blur or the levels were found to be others than those drawn, by more than what noise of ``enough``
+    standard deviations of a marker makes of them."""
+    blur = abs(fit.sigma - drawing.sigma) / drawing.sigma
+    levels = level_change(drawing.levels.cell, fit.levels.cell)
+    if blur < SAME_BLUR and levels < SAME_LEVELS:
+        return False
+    noise = enough * usual_deviation(fit.information.diagonal) / drawing.sigma
+    return bool(blur > max(SAME_BLUR, NOISY_BLUR * noise) or levels > max(SAME_LEVELS, NOISY_LEVELS * noise))
 
 
 @compiled
@@ -219,6 +224,12 @@ def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: i
     out = moving.copy()
     beside(moving, edges, out)
     return out, np.sum(out)
+
+
+@compiled
+def usual_deviation(diagonal):  # type: ignore[no-untyped-def]
+    """The markers' median standard deviation, px, by their blocks of the information (M, 3), all others known."""
+    return np.sqrt(2.0 / np.median(diagonal[:, 0] + diagonal[:, 2]))
 
 
 @compiled

@@ -24,7 +24,7 @@ from .placing import AGREED, MAX_APART, Places
 from .presets import STEPS, Preset
 from .profiles import profile_blur, read_profiles, unmixing
 from .sight import Sight, Sights
-from .step import PRIOR_PX, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
+from .step import PRIOR_PX, Heard, Judged, completed, heard, lines_of, loose_ones, placed, roughened, solved
 from .stepping import MIN_NOISE, SHORTEST, short_edge, trust, trusted_markers
 from .straying import astray, collected, doubted_ones
 from .synthesis import AA, A, B, edge_contrasts
@@ -77,7 +77,7 @@ class Refiner:
             refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
-        view = sights.at(min(self._scale(USUAL_SIGMA_PX, usual), 2))
+        view = sights.at(max(1, min(int(USUAL_SIGMA_PX / self._steps.finest), int(usual / MIN_EDGE_PX), 2)))
         fit, across, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, usual)
         if scale != view.scale:
@@ -164,26 +164,42 @@ class Refiner:
         counts only around markers where little else is seen.
         """
         mesh = self._mesh
+        fit, lines, said, trusted = self._profiles(view, fit, across, stations)
+        use = trusted
+        if not judged:
+            read = said.sums[:, AA] > 0.0
+            doubted, _ = doubted_ones(trusted, read, mesh.spokes)
+            use = np.where(touching(doubted, mesh.edges), trusted, read)
+        return self._moved(fit, lines, said, use, across), trusted
+
+    def _profiles(
+        self, view: Sight, fit: Fit, across: Across, stations: int
+    ) -> tuple[Fit, NDArray[np.float64], Heard, NDArray[np.float64]]:
+        """What profiles say: the fit with how freely gridlines bend, these (E, 8), their votes, and (E,) how far they
+        look as they should."""
+        mesh = self._mesh
         lines, loose = lines_of(mesh, fit), loose_ones(mesh, fit)
         sums = read_profiles(view.image, lines, across.weights, across.room, fit.sigma, loose, stations)
         votes = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
         fit, said = heard(mesh, fit, lines, sums, votes, JUDGED_BY_SAMPLES)
         pardon = PARDON**2 * across.room[:, 3]
         trusted, _ = trust(sums, said.to_a, said.to_b, pardon, *JUDGED_BY_SAMPLES)
-        use = trusted
-        if not judged:
-            read = sums[:, AA] > 0.0
-            doubted, _ = doubted_ones(trusted, read, mesh.spokes)
-            use = np.where(touching(doubted, mesh.edges), trusted, read)
-        fit = solved(mesh, fit, said, use, lines, across.contrasts, False)
+        return fit, lines, said, trusted
+
+    def _moved(
+        self, fit: Fit, lines: NDArray[np.float64], said: Heard, use: NDArray[np.float64], across: Across
+    ) -> Fit:
+        """The fit with its markers where profiles want them, those in ``use`` (E,)."""
+        fit = solved(self._mesh, fit, said, use, lines, across.contrasts, False)
         foot, sigma = across.weights[:, 3].copy(), fit.sigma
         reading = Reading(lines, across.contrasts, foot, across.room, use, sigma, fit.noise, False)
-        return fit._replace(reading=reading), trusted
+        return fit._replace(reading=reading)
 
     def _judged(
         self, view: Sight, fit: Fit, across: Across, which: NDArray[np.bool_]
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which are trusted."""
+        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which of them are trusted,
+        and without any, nothing is moved."""
         edges = self._mesh.edges
         near = which.copy()
         beside(which, edges, near)
@@ -191,8 +207,9 @@ class Refiner:
         elsewhere = ~touching(near, edges)
         elsewhere[::ELSEWHERE] = False
         room[elsewhere] = 0.0
-        fit, use = self._profile_step(view, fit, across._replace(room=room), JUDGING_STATIONS, judged=True)
-        return fit, trusted_markers(use, self._mesh.spokes)
+        fit, lines, said, use = self._profiles(view, fit, across._replace(room=room), JUDGING_STATIONS)
+        trusted = which & trusted_markers(use, self._mesh.spokes)
+        return (self._moved(fit, lines, said, use, across) if trusted.any() else fit), trusted
 
     def _blur(self, view: Sight, lines: NDArray[np.float64], across: Across) -> float:
         """The blur that some of the gridlines show, px."""
@@ -207,13 +224,11 @@ class Refiner:
             xy[apart], cov[apart] = np.nan, np.nan
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            judged, trusted = self._judged(
-                view, placed(self._mesh, fit._replace(unsettled=None)), across, lost
-            )
-            profiled, wide = self._sure(judged, places)
-            use = lost & trusted
-            xy[use], cov[use] = profiled[use], wide[use]
-            _doubt(xy, cov, use, places)
+            judged, use = self._judged(view, placed(self._mesh, fit._replace(unsettled=None)), across, lost)
+            if use.any():
+                profiled, wide = self._sure(judged, places)
+                xy[use], cov[use] = profiled[use], wide[use]
+                _doubt(xy, cov, use, places)
         return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(

@@ -98,8 +98,10 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
     count = xy.shape[0]
     out, strays, anew = xy.copy(), np.zeros(count, np.bool_), np.ones(count, np.bool_)
     move, far, alike = np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)
+    bent = np.empty((edges.shape[0], 2))
     for _ in range(ROUNDS):
-        _ask(out, maps, anew, edges, ahead, third, spokes, onward, move, far, alike)
+        _third_differences(out, maps, edges, ahead, third, bent)
+        _ask(bent, anew, edges, ahead, spokes, onward, move, far, alike)
         anew[:] = False
         for m in range(count):
             unusual, least = (UNUSUAL[0], LEAST[0]) if doubted[m] else (UNUSUAL[1], LEAST[1])
@@ -122,23 +124,30 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
 
 
 @compiled
-def _ask(xy, maps, anew, edges, ahead, third, spokes, onward, move, far, alike):  # type: ignore[no-untyped-def]
+def _third_differences(xy, maps, edges, ahead, third, out):  # type: ignore[no-untyped-def]
+    """Fill in (E, 2) px, NaN where one of the four markers along a gridline is not known."""
+    for e in range(edges.shape[0]):
+        out[e, 0], out[e, 1] = np.nan, np.nan
+        if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
+            out[e, 0], out[e, 1] = third_difference(xy, maps, edges, ahead, third, e)
+
+
+@compiled
+def _ask(bent, anew, edges, ahead, spokes, onward, move, far, alike):  # type: ignore[no-untyped-def]
     """Fill in, of the markers that are ``anew``: ``move`` (M, 2), the error that the gridlines through each agree on
-    (their median), ``far`` (M,), how large it is, NaN where fewer than three are known, and whether they are alike."""
+    (their median, by their third differences ``bent``), ``far`` (M,), how large it is, NaN where fewer than three are
+    known, and whether they are alike."""
     said, column = np.empty((spokes.shape[1], 2)), np.empty(spokes.shape[1])
-    for m in range(xy.shape[0]):
+    for m in range(anew.shape[0]):
         if not anew[m]:
             continue
         known = 0
         for spoke in range(spokes.shape[1]):
             # where no gridline goes on behind the marker, it is the last of the next four
             for e, part in ((spokes[m, spoke], PART), (onward[m, spoke], 1.0)):
-                if e < 0 or ahead[e, 0] < 0 or ahead[e, 1] < 0:
-                    continue
-                x, y = third_difference(xy, maps, edges, ahead, third, e)
-                if np.isfinite(x):
+                if e >= 0 and np.isfinite(bent[e, 0]):
                     part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
-                    said[known, 0], said[known, 1] = part * x, part * y
+                    said[known, 0], said[known, 1] = part * bent[e, 0], part * bent[e, 1]
                     known += 1
                     break
         if known < FEWEST:
@@ -147,10 +156,12 @@ def _ask(xy, maps, anew, edges, ahead, third, spokes, onward, move, far, alike):
             for k in range(known):
                 column[k] = said[k, axis]
             move[m, axis] = _median(column, known)
-        far[m] = np.hypot(move[m, 0], move[m, 1])
+        square = move[m, 0] ** 2 + move[m, 1] ** 2
+        far[m] = np.sqrt(square)
         like = 0
         for k in range(known):
-            like += np.hypot(said[k, 0] - move[m, 0], said[k, 1] - move[m, 1]) < ALIKE * far[m]
+            dx, dy = said[k, 0] - move[m, 0], said[k, 1] - move[m, 1]
+            like += dx * dx + dy * dy < ALIKE**2 * square
         alike[m] = like >= FEWEST and like > MOST * known
 
 
