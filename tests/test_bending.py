@@ -18,9 +18,9 @@ from cmpdesign.scene.standard import standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
 from extractor.bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
+from extractor.dropping import _drop_slid, _slid
 from extractor.gridlines import KNOWN, LENGTH, UX, local_maps
 from extractor.placing import Places
-from extractor.repair import _drop_slid, _slid
 from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, SUMS, A, B, C, D
 from extractor.tables import lattice_of
 from extractor.topology import Topology, topology_of

@@ -13,11 +13,12 @@ from cmpdesign.scene.standard import standard_layout
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
 from extractor.cells import Cells
+from extractor.dropping import _drop_slid
 from extractor.fit import Refined
 from extractor.neighbourhood import MIN_CUBIC, MIN_QUADRATIC, cubic_variance
 from extractor.numbering import Numbering
 from extractor.placing import Places, place
-from extractor.repair import Repaired, _drop_slid, repair
+from extractor.repair import Repaired, repair
 from extractor.stepping import RIM_PX, moved
 from extractor.tables import Lattice, lattice_of
 from extractor.topology import Topology, topology_of
