@@ -37,7 +37,8 @@ NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a sh
 SMALL_BLUR = 0.12  # of an edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
 MANY_BENT = 0.25  # of them, each step bends others. Then
-HARD_EFFORT = 3.0  # times the effort is allowed
+HARD_EFFORT = 3.0  # times the effort is allowed,
+PATIENCE = 4  # and so many steps are taken for every single marker.
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
 # Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
@@ -96,7 +97,7 @@ class Draughtsman:
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
-            few = 0.0 if hard else steps.few
+            few = 0.0 if hard and step < PATIENCE else steps.few
             anew, moving = still_moving(*about, near, steps.enough, few, self._mesh.edges)
             everything = _looks_other(fit, drawing, steps.enough) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
