@@ -108,9 +108,14 @@ def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) ->
         regions: grown at 1/``scale`` of the image's scale.
         scale: full-scale pixels per pixel of the regions.
     """
-    corners, good = _fit(regions.moments, regions.seed, regions.domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
+    return Triangles(*_fitted(image, regions.moments, regions.seed, regions.domain_px, regions.ink, scale))
+
+
+@compiled
+def _fitted(image, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
+    """The fields of ``Triangles``."""
+    corners, good = _fit(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
     fit_edges(image, corners, good)
-    return Triangles(
-        corner_px=corners[good], ink=regions.ink[good], region=np.flatnonzero(good).astype(np.int32)
-    )
+    region = np.flatnonzero(good)
+    return corners[region], ink[region], region.astype(np.int32)
