@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
+from .edges import fit_edges
 from .engine import compiled
 from .gradients import seen_as, slopes
 from .numbering import Numbering
 from .regions import Seeds
 from .tables import Lattice
-from .triangles import Triangles, fit_edges
+from .triangles import Triangles
 
 MIN_CELL_PX = 12  # of a cell, of which there must be more than the pattern has,
 MORE = 1.0

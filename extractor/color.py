@@ -43,23 +43,39 @@ def nominal_hues_deg(palette: dict[str, str]) -> NDArray[np.float64]:
 
 
 @compiled
-def _planes(hsv):  # type: ignore[no-untyped-def]
-    """(H, W) uint8 each: the hue, and the chroma max - min of B, G, R, which is S V / 255."""
-    height, width = hsv.shape[:2]
-    flat = hsv.reshape(-1)
-    hue, chroma = np.empty(height * width, np.uint8), np.empty(height * width, np.uint8)
-    for i in range(height * width):
-        hue[i] = flat[3 * i]
-        chroma[i] = (
-            np.int32(flat[3 * i + 1]) * np.int32(flat[3 * i + 2]) * np.int32(257) + np.int32(32768)
-        ) >> 16
-    return hue.reshape(height, width), chroma.reshape(height, width)
+def _converted(image):  # type: ignore[no-untyped-def]
+    """(H, W, 3) uint8 OpenCV's HSV, to the bit, in less than half its time; and (H, W) uint8 each: the hue, and the
+    chroma max - min of B, G, R, which is S V / 255."""
+    height, width = image.shape[:2]
+    hsv = np.empty((height, width, 3), np.uint8)
+    hue, chroma = np.empty((height, width), np.uint8), np.empty((height, width), np.uint8)
+    _convert(image.reshape(-1), hsv.reshape(-1), hue.reshape(-1), chroma.reshape(-1))
+    return hsv, hue, chroma
+
+
+@compiled
+def _convert(bgr, hsv, hue, chroma):  # type: ignore[no-untyped-def]
+    """``_converted``, flat: in whole numbers of 32 bits, which lanes hold; quotients are rounded to 2^-12."""
+    one, two, three, twelve = np.uint64(1), np.uint64(2), np.uint64(3), np.int32(12)
+    half, rounds, unit = np.float32(0.5), np.int32(1 << 11), np.int32(1)
+    for i in range(np.uint64(hue.shape[0])):
+        at = three * np.uint64(i)
+        b, g, r = np.int32(bgr[at]), np.int32(bgr[at + one]), np.int32(bgr[at + two])
+        v = max(b, g, r)
+        spread = np.int32(v - min(b, g, r))
+        per_v = np.int32(np.float32(255 << 12) / np.float32(max(v, unit)) + half)
+        per_spread = np.int32(np.float32(HUES * (1 << 12) / 6) / np.float32(max(spread, unit)) + half)
+        s = np.int32(np.int32(spread * per_v) + rounds) >> twelve
+        beyond = g - b if v == r else b - r + 2 * spread if v == g else r - g + 4 * spread
+        h = np.int32(np.int32(np.int32(beyond) * per_spread) + rounds) >> twelve
+        h = np.int32(h + HUES) if h < 0 else np.int32(h)
+        hsv[at], hsv[at + one], hsv[at + two], hue[i] = h, s, v, h
+        chroma[i] = np.int32(np.int32(np.int32(s * v) * np.int32(257)) + np.int32(1 << 15)) >> np.int32(16)
 
 
 def to_colors(image: NDArray[np.uint8]) -> Colors:
     """HSV and chroma of an 8-bit BGR image."""
-    hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-    return Colors(hsv, *_planes(hsv))  # type: ignore[arg-type]
+    return Colors(*_converted(np.ascontiguousarray(image)))
 
 
 @compiled

@@ -177,8 +177,8 @@ def _inner(faces, neighbours, count):  # type: ignore[no-untyped-def]
         n = number[f]
         if n < 0:
             continue
-        inner[n] = faces[f]
         for k in range(3):
+            inner[n, k] = faces[f, k]
             if neighbours[f, k] >= 0:
                 beside[n, k] = number[neighbours[f, k]]
     return inner, beside

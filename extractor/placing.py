@@ -88,45 +88,51 @@ def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, wi
     Clockwise in the image a cell's corners run 0, 2, 1, seen from the back 0, 1, 2.
     """
     here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
-    count, matched = here.shape[0], 0
+    count, matched, step = here.shape[0], 0, 1 if mirrored else 2
     ids, corner, edge = np.empty((count, 3), np.int32), np.empty((count, 3, 2)), np.zeros(count)
     fitted, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     aside, misfit = np.full((count, 3, 2), np.nan), np.empty(3)
     for n in range(count):
-        i = here[n]
-        arms, place, inside = arms_mm[cell_of[i]], corner[n], True
-        ids[n] = corner_ids[cell_of[i]]
+        i, inside = here[n], True
+        u = cell_of[i]
         for k in range(3):
-            for axis in range(2):
-                place[k, axis] = center[i, axis]
-                place[k, axis] += slope[i, axis, 0] * arms[k, 0] + slope[i, axis, 1] * arms[k, 1]
-            x, y = place[k]
+            arm_x, arm_y = arms_mm[u, k, 0], arms_mm[u, k, 1]
+            x = center[i, 0] + (slope[i, 0, 0] * arm_x + slope[i, 0, 1] * arm_y)
+            y = center[i, 1] + (slope[i, 1, 0] * arm_x + slope[i, 1, 1] * arm_y)
+            ids[n, k], corner[n, k, 0], corner[n, k, 1] = corner_ids[u, k], x, y
             inside = inside and min(x, y, width - 1 - x, height - 1 - y) >= BORDER_PX
         for k in range(3):
-            edge[n] += np.sqrt(_square(place[k], place[(k + 1) % 3])) / 3
-        step = 1 if mirrored else 2
+            edge[n] += np.sqrt(_square(corner, n, k, corner, n, (k + 1) % 3)) / 3
         for shift in range(3):
             misfit[shift] = 0.0
             for k in range(3):
-                square = _square(triangle[i, (shift + step * k) % 3], place[k])
+                square = _square(triangle, i, (shift + step * k) % 3, corner, n, k)
                 misfit[shift] = square if not square <= misfit[shift] else misfit[shift]  # a NaN stays
         first = misfit.argmin()
         fitted[n] = misfit[first] < (MAX_CORNER_MISFIT * edge[n]) ** 2
         matched += fitted[n]
         clear = misfit[first] < CLEAR**2 * min(misfit[first - 1], misfit[first - 2])
         for k in range(3):
+            x, y = triangle[i, (first + step * k) % 3, 0], triangle[i, (first + step * k) % 3, 1]
             if fitted[n]:
-                place[k] = triangle[i, (first + step * k) % 3]
+                corner[n, k, 0], corner[n, k, 1] = x, y
             elif clear:
-                aside[n, k] = triangle[i, (first + step * k) % 3]
+                aside[n, k, 0], aside[n, k, 1] = x, y
         kept[n] = fitted[n] or not inside
     return ids, corner, edge, fitted, kept, aside, matched > SHARP_SHARE * count
 
 
 @compiled
-def _square(a, b):  # type: ignore[no-untyped-def]
-    """The squared distance of two points."""
-    x, y = a[0] - b[0], a[1] - b[1]
+def _square(a, i, k, b, j, m):  # type: ignore[no-untyped-def]
+    """The squared distance of two triangles' corners."""
+    x, y = a[i, k, 0] - b[j, m, 0], a[i, k, 1] - b[j, m, 1]
+    return x * x + y * y
+
+
+@compiled
+def _square_to(a, i, k, xy, m):  # type: ignore[no-untyped-def]
+    """The squared distance of a triangle's corner from a point."""
+    x, y = a[i, k, 0] - xy[m, 0], a[i, k, 1] - xy[m, 1]
     return x * x + y * y
 
 
@@ -140,11 +146,11 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
     for n in range(ids.shape[0]):
         weight = 1.0 if fitted[n] else PREDICTED_WEIGHT
         for k in range(3):
-            row = sums[ids[n, k]]
-            row[X] += weight * corner[n, k, 0]
-            row[Y] += weight * corner[n, k, 1]
-            row[EDGE] += weight * edge[n]
-            row[WEIGHT] += weight
+            m = ids[n, k]
+            sums[m, X] += weight * corner[n, k, 0]
+            sums[m, Y] += weight * corner[n, k, 1]
+            sums[m, EDGE] += weight * edge[n]
+            sums[m, WEIGHT] += weight
     xy, around = np.full((count, 2), np.nan), np.full(count, np.nan)
     unmatched = np.zeros(count, np.bool_)
     for m in range(count):
@@ -158,19 +164,19 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
             continue
         shortest = np.inf
         for k in range(3):
-            shortest = min(shortest, _square(corner[n, k], corner[n, (k + 1) % 3]))
+            shortest = min(shortest, _square(corner, n, k, corner, n, (k + 1) % 3))
         for k in range(3):
             m = ids[n, k]
-            apart = _square(corner[n, k], mean[m])
+            apart = _square_to(corner, n, k, mean, m)
             if apart > (MAX_SPREAD * around[m]) ** 2:
-                xy[m] = np.nan
+                xy[m, 0], xy[m, 1] = np.nan, np.nan
             there[m] += apart < AGREED_SPREAD**2 * shortest
     whole, rows = np.empty(ids.shape, np.int32), 0
     for n in range(ids.shape[0]):
-        a, b, c = ids[n]
+        a, b, c = ids[n, 0], ids[n, 1], ids[n, 2]
         known = np.isfinite(xy[a, 0]) and np.isfinite(xy[b, 0]) and np.isfinite(xy[c, 0])
         if known and (kept[n] or not sharp):
-            whole[rows] = ids[n]
+            whole[rows, 0], whole[rows, 1], whole[rows, 2] = a, b, c
             rows += 1
     return xy, around, there, whole[:rows], unmatched
 
@@ -186,6 +192,9 @@ def _believe(xy, edge, agreed, unmatched, corners, marker_mm, table):  # type: i
         for k in range(3):
             m = ids[n, k]
             if unmatched[m] and variance[m] * (1.0 + leverage[m]) < (MAX_EXPECTED_SIGMA * edge[m]) ** 2:
-                limit = min(MAX_EXPECTED_MISFIT * edge[m], NEARER * np.sqrt(_square(xy[m], expected[m])))
-                if _square(aside[n, k], expected[m]) < limit * limit:
+                limit = min(
+                    MAX_EXPECTED_MISFIT * edge[m],
+                    NEARER * np.sqrt((xy[m, 0] - expected[m, 0]) ** 2 + (xy[m, 1] - expected[m, 1]) ** 2),
+                )
+                if _square_to(aside, n, k, expected, m) < limit * limit:
                     xy[m] = aside[n, k]

@@ -98,12 +98,13 @@ def _runs(label):  # type: ignore[no-untyped-def]
     count = 0
     for y in range(height):
         row = label[y]
-        begin[0], stretches = 0, 1
+        begin[0], stretches, before = 0, np.uint64(1), row[0]
         for x in range(1, width):
             begin[stretches] = x
-            stretches += row[x] != row[x - 1]
+            stretches += np.uint64(row[x] != before)
+            before = row[x]
         begin[stretches] = width
-        for n in range(stretches):
+        for n in range(np.int64(stretches)):
             ink = row[begin[n]]
             runs[count, 0], runs[count, 1], runs[count, 2], runs[count, 3] = (
                 y,

@@ -10,8 +10,6 @@ import numpy as np
 from .engine import compiled
 
 STEPS = 256  # to a pixel
-FIXED, HALF_STEP = float(1 << 32), 1 << 23  # a pixel, and half of 1 / STEPS of it, in fixed places
-MARGIN = 0.01  # px, more than half a step
 SHORT = 1.0 + 1e-6  # of the image's size, where the last sample lies
 HEXAGON = np.array(
     [
@@ -27,23 +25,6 @@ HEXAGON = np.array(
 
 
 @compiled
-def _mixed(flat, width, x, y, fx, fy, red, green, blue):  # type: ignore[no-untyped-def]
-    """The four pixels from (x, y) on, mixed for a place ``fx`` and ``fy`` steps beyond, their channels (in their order)
-    weighted and summed. Whole numbers are faster.
-    """
-    a = np.uint64((y * width + x) * 3)
-    b = np.uint64(a + np.uint64(width * 3))
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    four, five = np.uint64(4), np.uint64(5)
-    both = fx * fy
-    right, down, rest = STEPS * fx - both, STEPS * fy - both, STEPS * (STEPS - fx - fy) + both
-    s0 = rest * flat[a] + right * flat[a + three] + down * flat[b] + both * flat[b + three]
-    s1 = rest * flat[a + one] + right * flat[a + four] + down * flat[b + one] + both * flat[b + four]
-    s2 = rest * flat[a + two] + right * flat[a + five] + down * flat[b + two] + both * flat[b + five]
-    return (red * s0 + green * s1 + blue * s2) * (1.0 / (STEPS * STEPS))
-
-
-@compiled
 def sample_dot(flat, height, width, x, y, red, green, blue):  # type: ignore[no-untyped-def]
     """The sample at (x, y) of the image's channels, weighted and summed; NaN outside the image."""
     if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
@@ -51,26 +32,16 @@ def sample_dot(flat, height, width, x, y, red, green, blue):  # type: ignore[no-
     x, y = min(x, width - SHORT), min(y, height - SHORT)
     ix, iy = int(x), int(y)
     fx, fy = np.int64((x - ix) * STEPS + 0.5), np.int64((y - iy) * STEPS + 0.5)
-    return _mixed(flat, width, ix, iy, fx, fy, red, green, blue)
-
-
-@compiled
-def fixed(place):  # type: ignore[no-untyped-def]
-    """A place as a whole number of 2^-32 px, half a step of a sample added, so that what is cut off rounds it."""
-    return np.int64(place * FIXED) + HALF_STEP
-
-
-@compiled
-def fixed_step(length):  # type: ignore[no-untyped-def]
-    """A length as a whole number of 2^-32 px."""
-    return np.int64(length * FIXED)
-
-
-@compiled
-def sample_fixed(flat, width, x, y, red, green, blue):  # type: ignore[no-untyped-def]
-    """``sample_dot`` at ``fixed`` places, which profiles step through without converting any; they must keep
-    ``MARGIN`` away from the last row and column."""
-    return _mixed(flat, width, x >> 32, y >> 32, (x >> 24) & 255, (y >> 24) & 255, red, green, blue)
+    a = np.uint64((iy * width + ix) * 3)
+    b = np.uint64(a + np.uint64(width * 3))
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    four, five = np.uint64(4), np.uint64(5)
+    both = fx * fy  # whole numbers are faster
+    right, down, rest = STEPS * fx - both, STEPS * fy - both, STEPS * (STEPS - fx - fy) + both
+    s0 = rest * flat[a] + right * flat[a + three] + down * flat[b] + both * flat[b + three]
+    s1 = rest * flat[a + one] + right * flat[a + four] + down * flat[b + one] + both * flat[b + four]
+    s2 = rest * flat[a + two] + right * flat[a + five] + down * flat[b + two] + both * flat[b + five]
+    return (red * s0 + green * s1 + blue * s2) * (1.0 / (STEPS * STEPS))
 
 
 @compiled

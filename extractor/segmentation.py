@@ -58,9 +58,8 @@ def _arcs(inks):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _within(hue, arc):  # type: ignore[no-untyped-def]
-    """Whether a hue is among those of an arc."""
-    first, count = arc
+def _within(hue, first, count):  # type: ignore[no-untyped-def]
+    """Whether a hue is among so many from the first one on."""
     past = np.uint8(int(hue) - int(first)) if hue >= first else np.uint8(int(hue) + HUES - int(first))
     return past < count
 
@@ -70,26 +69,29 @@ def _tile_levels(hue, chroma, arcs, tile):  # type: ignore[no-untyped-def]
     """(3, rows, columns) the largest chroma of each ink in every tile; 0 where it is below ``MIN_CHROMA``."""
     height, width = hue.shape
     rows, columns = (height + tile - 1) // tile, (width + tile - 1) // tile
-    level = np.zeros((3, rows, columns), np.float32)
-    strongest = np.empty((3, width), np.uint8)
+    level, strongest = np.zeros((3, rows, columns), np.float32), np.empty(width, np.uint8)
+    hues, chromas = hue.reshape(-1), chroma.reshape(-1)
     for row in range(rows):
-        strongest[:] = 0
-        for y in range(row * tile, min((row + 1) * tile, height)):
-            for ink in range(3):
-                _keep_strongest(hue[y], chroma[y], arcs[ink], strongest[ink])
         for ink in range(3):
+            strongest[:] = 0
+            for y in range(row * tile, min((row + 1) * tile, height)):
+                _keep_strongest(hues, chromas, y * width, arcs[ink, 0], arcs[ink, 1], strongest)
             for column in range(columns):
-                largest = strongest[ink, column * tile : (column + 1) * tile].max()
+                largest = np.uint8(0)
+                for x in range(column * tile, min((column + 1) * tile, width)):
+                    largest = max(largest, strongest[x])
                 if largest >= MIN_CHROMA:
                     level[ink, row, column] = largest
     return level
 
 
 @compiled
-def _keep_strongest(hue, chroma, arc, strongest):  # type: ignore[no-untyped-def]
-    """Let ``strongest`` be the larger of itself and the chroma where the hue is of an arc."""
-    for x in range(hue.shape[0]):
-        much = chroma[x] if _within(hue[x], arc) else np.uint8(0)
+def _keep_strongest(hues, chromas, begin, first, count, strongest):  # type: ignore[no-untyped-def]
+    """Let ``strongest`` be the larger of itself and the chroma of the pixels from ``begin`` on whose hue is among so
+    many from the first one on."""
+    begin = np.uint64(begin)  # whose sum with another is not negative, so no index is wrapped around
+    for x in range(np.uint64(strongest.shape[0])):
+        much = chromas[begin + x] if _within(hues[begin + x], first, count) else np.uint8(0)
         strongest[x] = max(strongest[x], much)
 
 
@@ -130,29 +132,41 @@ def _label(hue, chroma, arcs, threshold, tile, target, shrink):  # type: ignore[
     """(H, W) uint8: each pixel's ink where its chroma exceeds the tile's threshold, inside the target area."""
     height, width = chroma.shape
     label = np.empty((height, width), np.uint8)
-    inside, limit = np.empty(width, np.uint8), np.empty((3, width), np.uint8)  # of a row's pixels
+    hues, chromas, labels = hue.reshape(-1), chroma.reshape(-1), label.reshape(-1)
+    limit = np.empty(4 * width, np.uint8)  # of a row's pixels: of the three inks, and whether they are inside
     for y in range(height):
         if y % shrink == 0:
-            for column in range(target.shape[1]):
-                inside[column * shrink : (column + 1) * shrink] = target[y // shrink, column]
+            _stretch(target[y // shrink], shrink, limit[3 * width :])
         if y % tile == 0:
             for ink in range(3):
-                for column in range(threshold.shape[2]):
-                    limit[ink, column * tile : (column + 1) * tile] = threshold[ink, y // tile, column]
-        _label_row(hue[y], chroma[y], arcs, limit, inside, label[y])
+                _stretch(threshold[ink, y // tile], tile, limit[ink * width : (ink + 1) * width])
+        _label_row(hues, chromas, y * width, width, arcs, limit, labels)
     return label
 
 
 @compiled
-def _label_row(hue, chroma, arcs, limit, inside, out):  # type: ignore[no-untyped-def]
-    """One row of ``_label``."""
-    red, green, blue = arcs
-    red_limit, green_limit, blue_limit = limit
-    for x in range(hue.shape[0]):
-        one = np.uint8(_within(hue[x], red) & (chroma[x] > red_limit[x]))
-        two = np.uint8(_within(hue[x], green) & (chroma[x] > green_limit[x]))
-        three = np.uint8(_within(hue[x], blue) & (chroma[x] > blue_limit[x]))
-        out[x] = np.uint8(inside[x] * np.uint8(one + np.uint8(2) * two + np.uint8(3) * three))
+def _stretch(tiles, size, row):  # type: ignore[no-untyped-def]
+    """Write what each tile has into the ``size`` pixels of a row that it covers."""
+    for column in range(tiles.shape[0]):
+        for x in range(column * size, min((column + 1) * size, row.shape[0])):
+            row[x] = tiles[column]
+
+
+@compiled
+def _label_row(hues, chromas, begin, width, arcs, limit, out):  # type: ignore[no-untyped-def]
+    """One row of ``_label``, which begins there."""
+    # numbers, no rows of arrays: what is written could change those, as far as a compiler knows
+    red, reds, green, greens = arcs[0, 0], arcs[0, 1], arcs[1, 0], arcs[1, 1]
+    blue, blues = arcs[2, 0], arcs[2, 1]
+    begin, width = np.uint64(begin), np.uint64(width)
+    two_widths, three_widths = np.uint64(2) * width, np.uint64(3) * width
+    for x in range(width):
+        hue, chroma = hues[begin + x], chromas[begin + x]
+        one = np.uint8(_within(hue, red, reds) & (chroma > limit[x]))
+        two = np.uint8(_within(hue, green, greens) & (chroma > limit[width + x]))
+        three = np.uint8(_within(hue, blue, blues) & (chroma > limit[two_widths + x]))
+        inside = limit[three_widths + x]
+        out[begin + x] = np.uint8(inside * np.uint8(one + np.uint8(2) * two + np.uint8(3) * three))
 
 
 def segment(colors: Colors, target: Target, nominal_deg: NDArray[np.float64]) -> Segmentation | None:

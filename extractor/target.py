@@ -36,15 +36,22 @@ def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
     """The largest chroma in every tile of ``shrink`` pixels."""
     height, width = chroma.shape
     rows, columns = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
-    largest = np.zeros((rows, columns), np.uint8)
-    strongest = np.empty(width, np.uint8)
+    largest, strongest, flat = (
+        np.zeros((rows, columns), np.uint8),
+        np.empty(width, np.uint8),
+        chroma.reshape(-1),
+    )
     for row in range(rows):
         strongest[:] = 0
         for y in range(row * shrink, min((row + 1) * shrink, height)):
-            np.maximum(strongest, chroma[y], strongest)
+            begin = np.uint64(y * width)
+            for x in range(np.uint64(width)):
+                strongest[x] = max(strongest[x], flat[begin + x])
         for column in range(columns):
+            most = np.uint8(0)
             for x in range(column * shrink, min((column + 1) * shrink, width)):
-                largest[row, column] = max(largest[row, column], strongest[x])
+                most = max(most, strongest[x])
+            largest[row, column] = most
     return largest
 
 

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .batch import COLOR, INSIDE, POINTS, RADIUS, X, Y, room_for_samples, sample_patches
 from .cells import Cells
 from .engine import compiled
 from .lattice import SIX, layer_of, marker_id, turned_place
-from .sampling import sample_patch
 from .tables import UNKNOWN, Lattice
 from .whitecell import white_cell
 
@@ -195,16 +195,30 @@ def _shown(image, center, area, ink, known):  # type: ignore[no-untyped-def]
     """(K,) px the radius over which each known cell's color is taken, (K,) its level, the sum over the channels, NaN
     outside the image; (4, 3) the inks' colors, 0 where there is none, and (3,) the most of each channel."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    own, radius, level = np.empty(3), np.empty(known.shape[0]), np.full(known.shape[0], np.nan)
+    radius, level = np.empty(known.shape[0]), np.full(known.shape[0], np.nan)
     colors, count = np.empty((4, 3, known.shape[0])), np.zeros(4, np.int64)
-    for n in range(known.shape[0]):
-        i = known[n]
-        radius[n] = 0.1 * np.sqrt(area[i])
-        if sample_patch(flat, height, width, center[i, 0], center[i, 1], radius[n], own):
-            for channel in range(3):
-                colors[ink[i], channel, count[ink[i]]] = own[channel]
-            count[ink[i]] += 1
-            level[n] = own.sum()
+    room = room_for_samples()
+    patches = room.patches
+    for first in range(0, known.shape[0], POINTS):
+        here = min(known.shape[0] - first, POINTS)
+        for n in range(here):
+            i = known[first + n]
+            radius[first + n] = 0.1 * np.sqrt(area[i])
+            patches[X + n], patches[Y + n], patches[RADIUS + n] = (
+                center[i, 0],
+                center[i, 1],
+                radius[first + n],
+            )
+        sample_patches(flat, height, width, here, room)
+        for n in range(here):
+            if patches[INSIDE + n] > 0.0:
+                own, total = ink[known[first + n]], 0.0
+                for channel in range(3):
+                    shown = patches[COLOR + channel * POINTS + n]
+                    colors[own, channel, count[own]] = shown
+                    total += shown
+                count[own] += 1
+                level[first + n] = total
     inks, strongest = np.zeros((4, 3)), np.zeros(3)
     for channel in range(3):
         for c in range(1, 4):
@@ -248,26 +262,45 @@ def _whiteness(image, center, at, known, basis, radius_of, level_of, strongest, 
             sums[to, 2] += radius
             sums[to, 3] += level
             sums[to, 4] += 1.0
-    places, seen, own = np.empty((found, 2), np.int32), np.zeros((found, 3)), np.empty(3)
-    ratio, white, seen_by = np.zeros(found), np.zeros(found), np.zeros(found, np.int64)
-    found = 0
-    for place in range(rows * columns):
-        votes = sums[place, 4]
-        if votes > 0.0:
-            seen_by[found] = int(votes)
-            x, y, radius = sums[place, 0] / votes, sums[place, 1] / votes, sums[place, 2] / votes
-            level = sums[place, 3] / votes
+    return _colored(flat, height, width, sums, found, low_q, low_r, columns, strongest, far)
+
+
+@compiled
+def _colored(flat, height, width, sums, count, low_q, low_r, columns, strongest, far):  # type: ignore[no-untyped-def]
+    """What ``_whiteness`` returns, of the ``count`` places that any cell sees."""
+    places, seen = np.empty((count, 2), np.int32), np.zeros((count, 3))
+    ratio, white, votes = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
+    room, begin, found = room_for_samples(), 0, 0
+    patches, level = room.patches, np.empty(POINTS)
+    for place in range(sums.shape[0]):
+        number = sums[place, 4]
+        if number > 0.0:
             places[found, 0], places[found, 1] = place // columns + low_q, place % columns + low_r
-            if sample_patch(flat, height, width, x, y, radius, own):
-                brightness = own.sum() / max(level, 1.0)
-                for channel in range(3):
-                    seen[found, channel] = own[channel]
-                    own[channel] /= max(strongest[channel], 1.0)
-                if own.min() > MIN_BALANCE * own.max():
-                    white[found] = own.min()
-                ratio[found] = white[found] if far else brightness
+            votes[found] = int(number)
+            n = found - begin
+            patches[X + n], patches[Y + n] = sums[place, 0] / number, sums[place, 1] / number
+            patches[RADIUS + n], level[n] = sums[place, 2] / number, sums[place, 3] / number
             found += 1
-    return places, ratio, white, seen_by, seen
+        if found - begin == POINTS or (place == sums.shape[0] - 1 and found > begin):
+            sample_patches(flat, height, width, found - begin, room)
+            for n in range(begin, found):
+                ratio[n], white[n] = _judged(patches, n - begin, level[n - begin], strongest, far, seen[n])
+            begin = found
+    return places, ratio, white, votes, seen
+
+
+@compiled
+def _judged(patches, n, level, strongest, far, seen):  # type: ignore[no-untyped-def]
+    """How bright a patch is against the inks around and how white; its color is written to ``seen``."""
+    if not patches[INSIDE + n] > 0.0:
+        return 0.0, 0.0
+    total, weakest, most = 0.0, np.inf, 0.0
+    for channel in range(3):
+        seen[channel] = patches[COLOR + channel * POINTS + n]
+        share = seen[channel] / max(strongest[channel], 1.0)
+        total, weakest, most = total + seen[channel], min(weakest, share), max(most, share)
+    white = weakest if weakest > MIN_BALANCE * most else 0.0
+    return white if far else total / max(level, 1.0), white
 
 
 @compiled

@@ -65,6 +65,18 @@ def test_hues_are_found_where_the_light_puts_them(shift_deg: int) -> None:
     assert hue_distance(found, true_deg).max() <= 1.01
 
 
+def test_colors_are_opencvs_to_the_bit() -> None:
+    """And the chroma, made of these, is max - min but for a step here and there."""
+    levels = np.concatenate([np.arange(0, 256, 5), np.arange(1, 256, 17), np.arange(250, 256)])
+    image = (
+        np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(len(levels), -1, 3).astype(np.uint8)
+    )
+    colors = to_colors(image)
+    np.testing.assert_array_equal(colors.hsv, cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
+    np.testing.assert_array_equal(colors.hue, colors.hsv[..., 0])
+    np.testing.assert_allclose(colors.chroma, np.ptp(image.astype(int), axis=2), atol=1)
+
+
 def test_without_one_of_the_inks_there_are_no_hues() -> None:
     weight = np.zeros(180)
     assert find_hues(weight, NOMINAL_DEG) is None
