@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, vectorized
-from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
+from .gridlines import FIRST_RING, KNOWN, LENGTH, UX, UY
 from .synthesis import (
     AA,
     AB,
@@ -155,15 +155,6 @@ def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untype
             x, y = third_difference(xy, maps, edges, ahead, third, e)
             out[e] = x * x + y * y
     return out
-
-
-@compiled
-def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
-    """Add b and s (E, 2), px, to the gridlines' slopes, in place."""
-    for e in range(lines.shape[0]):
-        if lines[e, KNOWN] != 0.0:
-            lines[e, LEAVE] += (bend[e, 1] + bend[e, 0]) / lines[e, LENGTH]
-            lines[e, ARRIVE] += (bend[e, 1] - bend[e, 0]) / lines[e, LENGTH]
 
 
 @compiled
