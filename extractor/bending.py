@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
+from .engine import compiled, inlined
 from .gridlines import FIRST_RING, KNOWN, LENGTH, UX, UY
 from .synthesis import (
     AA,
@@ -53,7 +53,7 @@ SURE = 3.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
-@vectorized
+@inlined
 def _order(low, high):  # type: ignore[no-untyped-def]
     """Swap what stands the wrong way round."""
     for k in range(low.shape[0]):
