@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
-from .gridlines import ARRIVE, FIRST_RING, KNOWN, LEAVE, LENGTH, UX, UY
+from .engine import compiled, inlined
+from .gridlines import FIRST_RING, KNOWN, LENGTH, UX, UY
 from .synthesis import (
     AA,
     AB,
@@ -53,7 +53,7 @@ SURE = 3.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
-@vectorized
+@inlined
 def _order(low, high):  # type: ignore[no-untyped-def]
     """Swap what stands the wrong way round."""
     for k in range(low.shape[0]):
@@ -155,15 +155,6 @@ def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untype
             x, y = third_difference(xy, maps, edges, ahead, third, e)
             out[e] = x * x + y * y
     return out
-
-
-@compiled
-def bend_gridlines(lines, bend):  # type: ignore[no-untyped-def]
-    """Add b and s (E, 2), px, to the gridlines' slopes, in place."""
-    for e in range(lines.shape[0]):
-        if lines[e, KNOWN] != 0.0:
-            lines[e, LEAVE] += (bend[e, 1] + bend[e, 0]) / lines[e, LENGTH]
-            lines[e, ARRIVE] += (bend[e, 1] - bend[e, 0]) / lines[e, LENGTH]
 
 
 @compiled

@@ -35,10 +35,16 @@ def vectorized(function: Function) -> Function:
     return _compiled(function, {"reassoc", "contract", "nsz", "arcp"})
 
 
-def _compiled(function: Function, fastmath: bool | set[str]) -> Function:
+def inlined(function: Function) -> Function:
+    """The same for what a loop calls for every item: a call with some arrays costs as much as a hundred additions."""
+    return _compiled(function, False, forceinline=True)
+
+
+def _compiled(function: Function, fastmath: bool | set[str], forceinline: bool = False) -> Function:
     if numba is None:
         return function
-    kernel: Function = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
+    options = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": forceinline}
+    kernel: Function = numba.njit(**options, fastmath=fastmath)(function)
     return kernel
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .algebra import cholesky_solve
-from .engine import compiled, vectorized
+from .engine import compiled, inlined, vectorized
 
 # columns of a gridline
 X, Y, UX, UY, LENGTH, LEAVE, ARRIVE, KNOWN = range(8)
@@ -113,10 +113,11 @@ def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
+def gridlines(xy, maps, bend, edges, along):  # type: ignore[no-untyped-def]
     """(E, 8) per gridline: start, unit vector along its chord, length, slopes against the chord at both ends, known.
 
-    Slopes count towards (-uy, ux), per unit of length along the chord.
+    Slopes count towards (-uy, ux), per unit of length along the chord. ``bend`` (E, 2) px is added to them: b and s of
+    ``bending``.
     """
     out = np.zeros((edges.shape[0], 8))
     for e in range(edges.shape[0]):
@@ -126,31 +127,29 @@ def gridlines(xy, maps, edges, near, offset):  # type: ignore[no-untyped-def]
         if not length > 1.0:
             continue
         ux, uy = dx / length, dy / length
-        out[e, X], out[e, Y], out[e, UX], out[e, UY], out[e, LENGTH] = xy[a, 0], xy[a, 1], ux, uy, length
-        out[e, KNOWN] = 1.0
-        leave, arrive = np.nan, np.nan
-        for k in range(FIRST_RING):
-            if near[a, k] == b:
-                leave = _slope(maps, a, offset[a, k, 0], offset[a, k, 1], ux, uy)
-            if near[b, k] == a:
-                arrive = _slope(maps, b, -offset[b, k, 0], -offset[b, k, 1], ux, uy)
+        leave, arrive = _slope(maps, a, along, e, ux, uy), _slope(maps, b, along, e, ux, uy)
         # where one end's direction is unknown the gridline is a parabola, where both are, straight
         if not np.isfinite(arrive):
             arrive = -leave
         if not np.isfinite(leave):
             leave = -arrive
-        if np.isfinite(leave):
-            out[e, LEAVE], out[e, ARRIVE] = leave, arrive
+        if not np.isfinite(leave):
+            leave, arrive = 0.0, 0.0
+        out[e, X], out[e, Y], out[e, UX], out[e, UY], out[e, LENGTH] = xy[a, 0], xy[a, 1], ux, uy, length
+        out[e, LEAVE] = leave + (bend[e, 1] + bend[e, 0]) / length
+        out[e, ARRIVE] = arrive + (bend[e, 1] - bend[e, 0]) / length
+        out[e, KNOWN] = 1.0
     return out
 
 
-@compiled
-def _slope(maps, m, u, v, ux, uy):  # type: ignore[no-untyped-def]
-    tx = maps[m, 0, 0] * u + maps[m, 0, 1] * v
-    ty = maps[m, 1, 0] * u + maps[m, 1, 1] * v
-    along = tx * ux + ty * uy
-    slope = (ty * ux - tx * uy) / along
-    if not (along > 0.0 and abs(slope) < MAX_SLOPE):
+@inlined
+def _slope(maps, m, along, e, ux, uy):  # type: ignore[no-untyped-def]
+    """Of gridline e by the map at marker m, NaN where that cannot be."""
+    tx = maps[m, 0, 0] * along[e, 0] + maps[m, 0, 1] * along[e, 1]
+    ty = maps[m, 1, 0] * along[e, 0] + maps[m, 1, 1] * along[e, 1]
+    forward = tx * ux + ty * uy
+    slope = (ty * ux - tx * uy) / forward
+    if not (forward > 0.0 and abs(slope) < MAX_SLOPE):
         return np.nan
     return slope
 

@@ -63,15 +63,15 @@ def assemble(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def gradient(to_a, to_b, lines, edges, count):  # type: ignore[no-untyped-def]
-    """(M, 2): the votes of all gridlines at each marker."""
+def gradient(to_a, to_b, weight, variance, lines, edges, count):  # type: ignore[no-untyped-def]
+    """(M, 2): the votes of all gridlines at each marker, in units of the noise's variance."""
     out = np.zeros((count, 2))
     for e in range(edges.shape[0]):
         if lines[e, KNOWN] == 0.0:
             continue
         nx, ny = -lines[e, UY], lines[e, UX]
         for side in range(2):
-            vote = to_a[e] if side == 0 else to_b[e]
+            vote = weight[e] * (to_a[e] if side == 0 else to_b[e]) / variance
             out[edges[e, side], 0] += vote * nx
             out[edges[e, side], 1] += vote * ny
     return out

@@ -243,8 +243,8 @@ def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _smooth(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """Everything of ``smooth_levels``."""
+def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """What ``smooth_levels`` gives, one by one."""
     fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
     strange = np.zeros(drawn.shape[0], np.bool_)
     place, place_black = _places(xy, cells, x0, y0, scale), _places(xy, black_cells, x0, y0, scale)
@@ -289,7 +289,7 @@ def smooth_levels(
         xy: (M, 2) the markers, NaN where unknown.
         noise: grey levels.
     """
-    return Levels(*_smooth(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
+    return Levels(*smoothed(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
 
 
 @compiled

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
-from .profiles import HALF, I1, I2, I3, I4, I5
+from .matched import HALF, I1, I2, I3, I4, I5
 from .stepping import TRUSTED
 from .synthesis import C0, C1, C2, C3, C4, C5
 from .walking import ALONG, ASIDE, CHUNK, TO, gather, lanes_of, lay_rows, row_sizes

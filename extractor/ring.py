@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
+from .engine import compiled, inlined, vectorized
 
 LANES, OF_ONE, OF_TAIL = 32, 15, 10
 MIDDLE = 7  # its first row in the tail
@@ -124,7 +124,7 @@ def _put(rows, at, e, forward, beside):  # type: ignore[no-untyped-def]
     rows[at + LANES], rows[at + 2 * LANES] = beside[e, 1 if forward else 2], beside[e, 2 if forward else 1]
 
 
-@compiled
+@inlined
 def lay(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail):  # type: ignore[no-untyped-def]
     """Write the neighbours of marker m, and what joins them to each other and to it, into lane k."""
     count = 0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bending import bend_gridlines, bending_ones, bent, eliminate, freedom, roughness
+from .bending import bending_ones, bent, eliminate, freedom, roughness
+from .engine import compiled
 from .fit import Fit
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
 from .information import Information, assemble, gradient, solve
@@ -50,8 +51,14 @@ def completed(
     mesh: Topology, xy: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
     """Markers, those just beyond the known ones put where they must be; which; and the map at each."""
-    maps = local_maps(xy, mesh.near, mesh.offset, mesh.stencil)
-    xy, beyond = extrapolate(xy, maps, mesh.near, mesh.offset)
+    whole: tuple[Any, Any, Any] = _completed(xy, mesh.near, mesh.offset, mesh.stencil)
+    return whole
+
+
+@compiled
+def _completed(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
+    maps = local_maps(xy, near, offset, stencil)
+    xy, beyond = extrapolate(xy, maps, near, offset)
     return xy, beyond, maps
 
 
@@ -69,9 +76,7 @@ def roughened(mesh: Topology, fit: Fit) -> Fit:
 
 def lines_of(mesh: Topology, fit: Fit) -> NDArray[np.float64]:
     """(E, 8) the fit's gridlines."""
-    lines: NDArray[np.float64] = gridlines(fit.xy, fit.maps, mesh.edges, mesh.near, mesh.offset)
-    bend_gridlines(lines, fit.bend)
-    return lines
+    return np.asarray(gridlines(fit.xy, fit.maps, fit.bend, mesh.edges, mesh.along))
 
 
 def loose_ones(mesh: Topology, fit: Fit) -> NDArray[np.bool_]:
@@ -88,16 +93,22 @@ def heard(
     judged: Judged,
 ) -> tuple[Fit, Heard]:
     """How freely gridlines bend, and what their bending is, taken out of their sums and votes in place."""
-    to_a, to_b, off = votes
-    stiff, variance = np.zeros(len(sums)), 1.0
-    if fit.rough.any() or fit.bend.any():
+    use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
+    loose, kept = listened(sums, *votes, fit.bend, fit.rough, use, lines, mesh.edges, fit.noise, *judged)
+    return fit._replace(loose=loose), Heard(sums, *votes[:2], fit.bend, kept)
+
+
+@compiled
+def listened(sums, to_a, to_b, off, bend, rough, use, lines, edges, noise, values, least, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) px^2 how freely gridlines bend, as far as they were in ``use`` before (E,), and (E, 6) what their bending
+    is, taken out of ``sums`` and votes in place."""
+    loose, variance = np.zeros(len(sums)), 1.0
+    if np.any(rough) or np.any(bend):
         # what the drawing misses everywhere is no bending either
-        usual = trust(sums, to_a, to_b, np.zeros(len(sums)), *judged)[1]
-        variance = max(fit.noise, usual) ** 2 if np.isfinite(usual) else fit.noise**2
-        use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
-        stiff = freedom(sums, to_a, to_b, off, fit.bend, fit.rough, use, lines, mesh.edges, variance)
-    kept = eliminate(sums, to_a, to_b, off, fit.bend, stiff, variance)
-    return fit._replace(loose=stiff), Heard(sums, to_a, to_b, fit.bend, kept)
+        usual = trust(sums, to_a, to_b, np.zeros(len(sums)), values, least, unjudged)[1]
+        variance = max(noise, usual) ** 2 if np.isfinite(usual) else noise**2
+        loose = freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance)
+    return loose, eliminate(sums, to_a, to_b, off, bend, loose, variance)
 
 
 def solved(
@@ -113,21 +124,33 @@ def solved(
 
     At their ends gridlines overlap (``overlapping``), unless they were read in their middles only.
     """
-    count, variance = len(fit.xy), fit.noise**2
+    where = fit.xy, fit.beyond, mesh.edges, mesh.spokes, fit.sigma, fit.noise, overlapping
+    return moved_on(fit, solution(*said, use, lines, contrasts, *where))
+
+
+def moved_on(fit: Fit, solution: tuple[Any, ...], **others: Any) -> Fit:
+    """The fit with a ``solution``, and what else is new."""
+    measured, guiding, bend, stepped, diagonal, beside = solution
+    about = Information(diagonal, beside)
+    return fit._replace(
+        measured=measured, guiding=guiding, bend=bend, strides=stepped, information=about, **others
+    )
+
+
+@compiled
+def solution(  # type: ignore[no-untyped-def]
+    sums, to_a, to_b, bend, kept, use, lines, contrasts, xy, beyond, edges, spokes, sigma, noise, overlapping
+):
+    """Of ``Fit``: measured, guiding, bend, strides and the information's blocks, after the step that was asked for."""
+    count, variance = len(xy), noise**2
     diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
     believed = use * lines[:, KNOWN]
-    prior = np.where(fit.beyond, PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
-    geometry = (lines, contrasts, mesh.edges, mesh.spokes, fit.sigma, variance, prior)
-    assemble(said.sums, believed, overlapping, *geometry, diagonal, beside)
-    right = gradient(
-        believed * said.to_a / variance, believed * said.to_b / variance, lines, mesh.edges, count
-    )
-    shift = solve(diagonal, beside, mesh.edges, right)
-    fit = fit._replace(
-        bend=bent(said.bend, said.kept, shift, lines, mesh.edges),
-        information=Information(diagonal, beside),
-        strides=strides(shift, diagonal, fit.beyond),
-    )
-    least = shown(said.sums, use, lines, mesh.edges, variance, count)
-    measured, guiding = moved(fit.xy, shift, least, use, mesh.spokes)
-    return fit._replace(measured=measured, guiding=guiding)
+    prior = np.where(beyond, PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
+    geometry = (lines, contrasts, edges, spokes, sigma, variance, prior)
+    assemble(sums, believed, overlapping, *geometry, diagonal, beside)
+    right = gradient(to_a, to_b, believed, variance, lines, edges, count)
+    shift = solve(diagonal, beside, edges, right)
+    least = shown(sums, use, lines, edges, variance, count)
+    measured, guiding = moved(xy, shift, least, use, spokes)
+    bend = bent(bend, kept, shift, lines, edges)
+    return measured, guiding, bend, strides(shift, diagonal, beyond), diagonal, beside

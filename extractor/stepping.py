@@ -127,8 +127,9 @@ def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def short_edge(xy, edges, one_in):  # type: ignore[no-untyped-def]
-    """The length in px that all gridlines exceed but for one in ``one_in``; 0 without any."""
+def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
+    """The lengths in px that all gridlines exceed but for one in ``rare``, and but for one in ``usual``, which are
+    fewer; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
@@ -137,7 +138,11 @@ def short_edge(xy, edges, one_in):  # type: ignore[no-untyped-def]
         if np.isfinite(own):
             length[count] = own
             count += 1
-    return np.sqrt(np.partition(length[:count], count // one_in)[count // one_in]) if count > 0 else 0.0
+    if count == 0:
+        return 0.0, 0.0
+    least, some = count // rare, count // usual
+    short = np.partition(length[:count], some)[: some + 1]
+    return np.sqrt(np.partition(short, least)[least]), np.sqrt(short[some])
 
 
 @compiled

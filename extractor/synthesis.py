@@ -11,7 +11,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled, vectorized
+from .engine import compiled, inlined, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
 from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
@@ -102,7 +102,7 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@compiled
+@inlined
 def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 

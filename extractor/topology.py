@@ -29,6 +29,7 @@ class Topology(NamedTuple):
         offset: (M, 18, 2) float64, their places relative to it in the layout, in units of the mean edge, y up.
         stencil: (M, 2, 18) float64: weights that give the map's derivatives from the differences to these markers
             (a cubic's least squares), where all 18 are there; else 0.
+        along: (E, 2) float64, from an edge's start to its end, in the unit of ``offset``.
         ahead: (E, 2) int32, the marker next on the same gridline before an edge's start, and the one after its end.
         third: (E, 2) float64, the layout's third difference along these four, in the unit of ``offset``.
         onward: (M, 6) int32, the edge after each of the ``spokes`` on the same gridline.
@@ -44,6 +45,7 @@ class Topology(NamedTuple):
     near: NDArray[np.int32]
     offset: NDArray[np.float64]
     stencil: NDArray[np.float64]
+    along: NDArray[np.float64]
     ahead: NDArray[np.int32]
     third: NDArray[np.float64]
     onward: NDArray[np.int32]
@@ -63,9 +65,10 @@ def topology_of(layout: Reference) -> Topology:
     ring = _grouped(ends, edges[:, ::-1].ravel(order="F"), count, NEIGHBOURS)
     near = _two_rings(ring)
     xy = layout.xy_mm
-    length = np.linalg.norm(xy[edges[:, 1]] - xy[edges[:, 0]], axis=1)
+    chord = xy[edges[:, 1]] - xy[edges[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
     ahead = np.stack([_ahead(ring, xy, edges[:, ::-1]), _ahead(ring, xy, edges)], axis=1)
-    third = xy[ahead[:, 0]] - xy[ahead[:, 1]] + 3 * (xy[edges[:, 1]] - xy[edges[:, 0]])
+    third = xy[ahead[:, 0]] - xy[ahead[:, 1]] + 3 * chord
     spokes = _around(spokes, edges, xy)
     offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
     return Topology(
@@ -79,6 +82,7 @@ def topology_of(layout: Reference) -> Topology:
         near=near,
         offset=offset,
         stencil=_stencil(near, offset),
+        along=chord / length.mean(),
         ahead=ahead,
         third=np.where(np.all(ahead >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         onward=_onward(spokes, edges, ahead, key),

@@ -18,7 +18,7 @@ from .pipeline import Extractor, Stages
 from .proof import examine
 from .reference import Reference
 from .sight import Sights
-from .stepping import SHORTEST, short_edge
+from .stepping import SHORTEST, short_edges
 from .types import Markers, Origin, Reason, Status
 from .warm import WarmStart, predict, prove
 from .warm_tables import Tables, completed, tables_of
@@ -183,7 +183,7 @@ class Tracker:
         if bgr is None:
             return None
         sights = Sights(bgr)
-        edge_px = float(short_edge(memory.xy_px, self._some_edges, SHORTEST))
+        edge_px = float(short_edges(memory.xy_px, self._some_edges, SHORTEST, SHORTEST)[0])
         view = sights.at(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
         guesses = [view.reduced(memory.xy_px)]
         if memory.before_px is not None:

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
-from extractor import Extractor, Status, parse_layout
+from extractor import Extractor, Status, parse_layout, refine
 from extractor.drawing import Draughtsman, Drawing, beside, chosen, still_moving, touching, unsettled
 from extractor.levels import Levels, bled, rebled, unbled
 from extractor.painting import draw_cells
 from extractor.presets import STEPS
-from extractor.refine import Refiner
 
 SIZE = (300, 260)
 LAYERS = 5
@@ -170,15 +169,15 @@ def test_the_first_estimate_of_the_blur_is_close(
 ) -> None:
     """Optics and pixel together, before anything is drawn; wide blur is taken for less, never for much more."""
     ratios: list[float] = []
-    plain = Refiner._cleared
+    plain = refine.cleared
 
-    def noted(self: Refiner, view: Any, *rest: Any) -> Any:
-        fit, across = plain(self, view, *rest)
+    def noted(view: Any, *rest: Any) -> Any:
+        fit, across = plain(view, *rest)
         true = np.sqrt(blur**2 + view.scale**2 / 12) / view.scale
         ratios.append(fit.sigma / true)
         return fit, across
 
-    monkeypatch.setattr(Refiner, "_cleared", noted)
+    monkeypatch.setattr(refine, "cleared", noted)
     extractor(pattern).extract(shown(pattern, blur).image)
     assert 0.75 < ratios[-1] < 1.1
     if blur <= 1.0:
