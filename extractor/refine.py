@@ -120,7 +120,7 @@ class Refiner:
     def _judged(
         self, view: Sight, fit: Fit, sides: Across, which: NDArray[np.bool_]
     ) -> tuple[Fit, NDArray[np.bool_]]:
-        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which of these it trusts."""
+        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which it trusts."""
         mesh, near = self._mesh, which.copy()
         beside(which, mesh.edges, near)
         room = sides.room.copy()
