@@ -37,8 +37,7 @@ NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a sh
 SMALL_BLUR = 0.12  # of an edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
 MANY_BENT = 0.25  # of them, each step bends others. Then
-HARD_EFFORT = 3.0  # times the effort is allowed,
-PATIENCE = 4  # and so many steps are taken for every single marker.
+HARD_EFFORT = 3.0  # times the effort is allowed
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 USUAL_EDGE_PX = 10.0
 # Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
@@ -97,7 +96,7 @@ class Draughtsman:
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
             hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
-            few = 0.0 if hard and step < PATIENCE else steps.few
+            few = 0.0 if hard else steps.few
             anew, moving = still_moving(*about, near, steps.enough, few, self._mesh.edges)
             everything = _looks_other(fit, drawing, steps.enough) or moving > MAX_AGAIN * len(anew)
             spent += _effort(size, None if everything else moving / len(anew))
@@ -123,9 +122,8 @@ class Draughtsman:
         black = black_at(levels.black, middles(lines), *view.frame)
         sums = read_gridlines(image, picture, lines, contrasts, black, sigma, box, loose_ones(mesh, fit))
         bettered = self._bettered(view, picture, fit)
-        known = lines[lines[:, KNOWN] > 0.0, LENGTH]
-        edge = float(np.median(known)) if len(known) else 1.0
-        drawing = Drawing(fit.xy, lines, fit.bend, contrasts, black, levels, bettered, sums, box, sigma, edge)
+        about = levels, bettered, sums, box, sigma, usual_length(lines)
+        drawing = Drawing(fit.xy, lines, fit.bend, contrasts, black, *about)
         return self._stepped(view.frame, fit._replace(levels=bettered), drawing), drawing
 
     def _again(self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_]) -> tuple[Fit, Drawing]:
@@ -225,6 +223,13 @@ def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: i
     out = moving.copy()
     beside(moving, edges, out)
     return out, np.sum(out)
+
+
+@compiled
+def usual_length(lines):  # type: ignore[no-untyped-def]
+    """The median length of the known gridlines (E, 8), px; 1 without any."""
+    known = lines[lines[:, KNOWN] > 0.0, LENGTH]
+    return np.median(known) if known.shape[0] > 0 else 1.0
 
 
 @compiled
