@@ -37,7 +37,7 @@ class Steps(NamedTuple):
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.085, np.inf, 0.0, 0.0, 0.0, 0.0),
+    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0),
     "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125),
     "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0),
 }
