@@ -16,7 +16,7 @@ from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .image import estimate_noise
 from .information import Information, covariances
-from .look import USUAL_SIGMA_PX, across, cleared, first_look
+from .look import across, cleared, first_look
 from .offsets import measure
 from .placing import AGREED, MAX_APART, Places
 from .presets import STEPS, Preset
@@ -27,6 +27,9 @@ from .stepping import SHORTEST, short_edges, trusted_markers
 from .straying import astray, collected
 from .topology import Topology
 
+SHARP_SIGMA_PX = (
+    1.05  # of an image in focus, pixel included: it is looked at first at the scale that this allows
+)
 SHORT = 30  # one in so many gridlines may be smaller than that at a reduced scale
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and
 MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
@@ -66,7 +69,7 @@ class Refiner:
             refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
-        view = sights.at(max(1, min(int(USUAL_SIGMA_PX / self._steps.finest), int(usual / MIN_EDGE_PX), 2)))
+        view = sights.at(min(self._scale(SHARP_SIGMA_PX, usual), 2))
         fit, sides, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, usual)
         if scale != view.scale:
