@@ -61,7 +61,7 @@ def _announce_compilation() -> None:
             if not self.said and dispatcher.py_func.__module__.startswith("extractor."):
                 self.said = True
                 log.warning(
-                    "compiling for this machine; the first use takes about 40 s, later ones are cached"
+                    "compiling for this machine; the first use takes about two minutes, later ones are cached"
                 )
 
         def on_end(self, happening: Any) -> None:

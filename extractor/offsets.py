@@ -143,7 +143,7 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
         sums[:] = 0.0
         for begin in range(first, last + 1, most):
             own = min(most, last + 1 - begin)
-            lay_rows(begin, 1, own, *line, 0, q_end - 1, wide, step_p, step_q, False, at, rows)
+            lay_rows(begin, 1, own, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
             gather(flat, at, own, wide, step_q, color, np.float32(foot[e]), rest)
             if drawn:
                 gather(shown, at, own, wide, step_q, color, nothing, under)

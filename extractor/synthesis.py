@@ -292,7 +292,7 @@ def _read(image, model, lines, contrasts, black, sigma, box, loose, residual):  
         for begin in range(first, last + 1, most):
             count = min(most, last + 1 - begin)
             lanes = lanes_of(count)
-            lay_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, False, at, rows)
+            lay_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
             gather_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
             _weigh(rows, lanes, wide, *steps, *small, *shape, weights)
             _vote(rest, squares, weights, lanes * wide, sums)

@@ -50,14 +50,13 @@ def lay_rows(  # type: ignore[no-untyped-def]
     wide,
     step_p,
     step_q,
-    whole,
     at,
     rows,
 ):
     """Fill in where the rows p = first, first + every ... begin in the flat image, and what is known of them.
 
-    Each has ``wide`` pixels between ``low`` and ``high`` in q, the band those up to ``half`` off the gridline; where
-    it has to be ``whole``, the band is empty otherwise. ``step_p`` and ``step_q`` lead through the flat image.
+    Each has ``wide`` pixels between ``low`` and ``high`` in q, the band those up to ``half`` off the gridline.
+    ``step_p`` and ``step_q`` lead through the flat image.
     """
     sense = 1.0 if step_q > step_p else -1.0
     lean, per_length, bulge, top = uq / up, 1.0 / (up * length), sense * length / up, high + 1.0 - wide
@@ -75,8 +74,7 @@ def lay_rows(  # type: ignore[no-untyped-def]
         rows[ALONG + i] = f * up + g * uq
         rows[ASIDE + i] = sense * (g * up - f * uq)
         rows[FROM + i] = start - base
-        empty = (i >= count) | (whole & ((start < low) | (stop > high)))
-        rows[TO + i] = -1.0 if empty else stop - base
+        rows[TO + i] = -1.0 if i >= count else stop - base
 
 
 @compiled
