@@ -19,7 +19,7 @@ from .fit import Fit
 from .gridlines import KNOWN, LENGTH
 from .levels import Levels, black_at, cell_means, level_change, rebled, smooth_levels
 from .offsets import Reading, foot_of
-from .painting import draw_cells
+from .painting import Strokes, draw_cells, erase_cells, room_for_strokes
 from .presets import Steps
 from .sight import Frame, Sight
 from .step import Judged, heard, lines_of, loose_ones, placed, roughened, solved
@@ -87,6 +87,13 @@ class Draughtsman:
             kept = self._kept.picture = np.zeros(shape, np.float32)
         return kept  # type: ignore[no-any-return]
 
+    def _strokes(self) -> Strokes:
+        """Those of that picture."""
+        kept: Strokes | None = getattr(self._kept, "strokes", None)
+        if kept is None:
+            kept = self._kept.strokes = room_for_strokes(len(self._mesh.cells))
+        return kept
+
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
         fit, drawing = self._first(view, roughened(self._mesh, fit))
@@ -117,8 +124,11 @@ class Draughtsman:
         lines, picture = lines_of(mesh, fit), self.picture(image.shape)
         contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
         clear(picture, box)
+        strokes = self._strokes()
+        strokes.used[:] = 0
         sides = mesh.cells, mesh.cell_edges, mesh.edges, lines
-        draw_cells(fit.xy, *sides, levels.cell, levels.slope, sigma, box, picture)
+        how = levels.cell, levels.slope, sigma, box, picture, strokes
+        draw_cells(np.ones(len(mesh.cells), np.bool_), 1.0, fit.xy, *sides, *how)
         black = black_at(levels.black, middles(lines), *view.frame)
         sums = read_gridlines(image, picture, lines, contrasts, black, sigma, box, loose_ones(mesh, fit))
         bettered = self._bettered(view, picture, fit)
@@ -135,10 +145,10 @@ class Draughtsman:
         fit = fit._replace(xy=xy, bend=bend)
         lines = chosen(again, lines_of(mesh, fit), drawing.lines)
         contrasts = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        cells = mesh.cells[which], mesh.cell_edges[which], mesh.edges
-        cell, slope = levels.cell[which], levels.slope[which]
-        draw_cells(drawing.xy, *cells, drawing.lines, -cell, -slope, sigma, box, picture)
-        draw_cells(xy, *cells, lines, cell, slope, sigma, box, picture)
+        sides = mesh.cells, mesh.cell_edges, mesh.edges
+        how = levels.cell, levels.slope, sigma, box, picture, self._strokes()
+        erase_cells(which, drawing.xy, *sides, drawing.lines, *how)
+        draw_cells(which, 1.0, xy, *sides, lines, *how)
         black = black_at(levels.black, middles(lines), *view.frame)
         some = lines.copy()
         some[~again, KNOWN] = 0.0
