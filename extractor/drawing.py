@@ -8,27 +8,24 @@ more. All other votes stay valid, for where they were read.
 from __future__ import annotations
 
 import threading
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .bending import hidden_misfit
+from .drawn import Board, Drawing, drawn, drawn_again, room_for
 from .engine import compiled
 from .fit import Fit
-from .gridlines import KNOWN, LENGTH
-from .levels import Levels, black_at, cell_means, level_change, rebled, smooth_levels
+from .levels import level_change, rebled
 from .offsets import Reading, foot_of
-from .painting import Strokes, draw_cells, erase_cells, room_for_strokes
 from .presets import Steps
 from .sight import Frame, Sight
-from .step import Judged, heard, lines_of, loose_ones, placed, roughened, solved
-from .stepping import box_of, middles, trust, votes, widening
-from .synthesis import clear, edge_contrasts, read_gridlines
+from .step import Judged, listened, moved_on, placed, roughened, solution
+from .stepping import middles, trust, votes, widening
+from .synthesis import edge_contrasts
 from .topology import Topology
 
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
-MARGIN_SIGMA = 4.0
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
@@ -49,30 +46,6 @@ JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
 
 
-class Drawing(NamedTuple):
-    """The pattern as it is drawn, and what was read along its gridlines.
-
-    Attributes:
-        xy, lines, bend: where: the markers (M, 2), gridlines (E, 8) and their bending (E, 2).
-        contrasts, black: (E, 3) across the gridlines, and under their middles.
-        levels, bettered: as drawn, and as the cells' middles then said.
-        sums: (E, 24), as ``read_gridlines`` gives them.
-        box: of the image that is drawn. sigma: the blur. edge_px: a usual edge's length in it.
-    """
-
-    xy: NDArray[np.float64]
-    lines: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    contrasts: NDArray[np.float64]
-    black: NDArray[np.float64]
-    levels: Levels
-    bettered: Levels
-    sums: NDArray[np.float64]
-    box: NDArray[np.int64]
-    sigma: float
-    edge_px: float
-
-
 class Draughtsman:
     """Takes steps by synthesis; the picture it draws is kept from image to image, one a thread."""
 
@@ -80,18 +53,11 @@ class Draughtsman:
         self._mesh = mesh
         self._kept = threading.local()
 
-    def picture(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """The pattern over black as it was last drawn in an image of this shape."""
-        kept: Any = getattr(self._kept, "picture", None)
-        if kept is None or kept.shape != shape:
-            kept = self._kept.picture = np.zeros(shape, np.float32)
-        return kept  # type: ignore[no-any-return]
-
-    def _strokes(self) -> Strokes:
-        """Those of that picture."""
-        kept: Strokes | None = getattr(self._kept, "strokes", None)
-        if kept is None:
-            kept = self._kept.strokes = room_for_strokes(len(self._mesh.cells))
+    def board(self, shape: tuple[int, ...]) -> Board:
+        """With the pattern over black as it was last drawn in an image of this shape."""
+        kept: Board | None = getattr(self._kept, "board", None)
+        if kept is None or kept.picture.shape != shape:
+            kept = self._kept.board = room_for(shape, self._mesh)
         return kept
 
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
@@ -119,68 +85,29 @@ class Draughtsman:
 
     def _first(self, view: Sight, fit: Fit) -> tuple[Fit, Drawing]:
         """A step from everything."""
-        image, mesh, levels, sigma = view.image, self._mesh, fit.levels, fit.sigma
-        box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
-        lines, picture = lines_of(mesh, fit), self.picture(image.shape)
-        contrasts = edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        clear(picture, box)
-        strokes = self._strokes()
-        strokes.used[:] = 0
-        sides = mesh.cells, mesh.cell_edges, mesh.edges, lines
-        how = levels.cell, levels.slope, sigma, box, picture, strokes
-        draw_cells(np.ones(len(mesh.cells), np.bool_), 1.0, fit.xy, *sides, *how)
-        black = black_at(levels.black, middles(lines), *view.frame)
-        sums = read_gridlines(image, picture, lines, contrasts, black, sigma, box, loose_ones(mesh, fit))
-        bettered = self._bettered(view, picture, fit)
-        about = levels, bettered, sums, box, sigma, usual_length(lines)
-        drawing = Drawing(fit.xy, lines, fit.bend, contrasts, black, *about)
-        return self._stepped(view.frame, fit._replace(levels=bettered), drawing), drawing
+        drawing = drawn(view, self._mesh, fit, self.board(view.image.shape))
+        return self._stepped(view.frame, fit, drawing), drawing
 
     def _again(self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_]) -> tuple[Fit, Drawing]:
         """A step from what was read, once more where gridlines end at markers that are ``anew`` (M,) bool."""
-        image, mesh, levels, sigma = view.image, self._mesh, drawing.levels, drawing.sigma
-        picture, box = self.picture(image.shape), drawing.box
-        again, which = touching(anew, mesh.edges), touching(anew, mesh.cells)
-        xy, bend = chosen(anew, fit.xy, drawing.xy), chosen(again, fit.bend, drawing.bend)
-        fit = fit._replace(xy=xy, bend=bend)
-        lines = chosen(again, lines_of(mesh, fit), drawing.lines)
-        contrasts = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, levels.cell, levels.slope)
-        sides = mesh.cells, mesh.cell_edges, mesh.edges
-        how = levels.cell, levels.slope, sigma, box, picture, self._strokes()
-        erase_cells(which, drawing.xy, *sides, drawing.lines, *how)
-        draw_cells(which, 1.0, xy, *sides, lines, *how)
-        black = black_at(levels.black, middles(lines), *view.frame)
-        some = lines.copy()
-        some[~again, KNOWN] = 0.0
-        sums = read_gridlines(image, picture, some, contrasts, black, sigma, box, loose_ones(mesh, fit))
-        drawing = drawing._replace(
-            xy=xy,
-            lines=lines,
-            bend=bend,
-            contrasts=chosen(again, contrasts, drawing.contrasts),
-            black=chosen(again, black, drawing.black),
-            sums=chosen(again, sums, drawing.sums),
-        )
-        return self._stepped(view.frame, fit, drawing), drawing
+        drawing = drawn_again(view, self._mesh, fit, drawing, anew, self.board(view.image.shape))
+        return self._stepped(view.frame, fit._replace(xy=drawing.xy, bend=drawing.bend), drawing), drawing
 
     def _stepped(self, frame: Frame, fit: Fit, drawing: Drawing) -> Fit:
         """The fit after the step that what was read asks for."""
         mesh, levels, bettered = self._mesh, drawing.levels, drawing.bettered
-        lines, contrasts, sigma = drawing.lines, drawing.contrasts, drawing.sigma
-        sums = drawing.sums.copy()
+        assert fit.reading is not None
         changes = bettered.cell - levels.cell, bettered.black - levels.black
-        said = votes(sums, contrasts, mesh.edge_cells, *changes, middles(lines), *frame)
-        fit, told = heard(mesh, fit._replace(sigma=sigma), lines, sums, said, JUDGED_BY_PIXELS)
-        pardon = hidden_misfit(fit.loose, contrasts, sigma)
-        use, noise = trust(sums, told.to_a, told.to_b, pardon, *JUDGED_BY_PIXELS)
-        fit = fit._replace(noise=float(noise) if np.isfinite(noise) else fit.noise)
-        foot = foot_of(contrasts, drawing.black, said[2])
-        fit = solved(mesh, fit, told, use, lines, contrasts, True)
-        reading = Reading(lines, contrasts, foot, NO_ROOM, use, sigma, fit.noise, True)
+        now = fit.xy, fit.beyond, fit.rough, drawing.bend, fit.reading.use, fit.noise
+        seen = drawing.lines, drawing.contrasts, drawing.black, drawing.sums, drawing.sigma
+        tables = mesh.edges, mesh.spokes, mesh.edge_cells
+        sums, use, loose, foot, noise, *step = _step(seen, changes, now, tables, tuple(frame))
+        reading = Reading(drawing.lines, drawing.contrasts, foot, NO_ROOM, use, drawing.sigma, noise, True)
+        fit = moved_on(fit, step, loose=loose, reading=reading, noise=noise)
         wider = self._widened(fit.xy, drawing, sums, use)
-        if max(wider, sigma) > UNMIXED * drawing.edge_px:
-            bettered = rebled(bettered, fit.xy, mesh, sigma, wider)
-        return fit._replace(sigma=wider, levels=bettered, reading=reading)
+        if max(wider, drawing.sigma) > UNMIXED * drawing.edge_px:
+            bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, wider)
+        return fit._replace(sigma=wider, levels=bettered)
 
     def _widened(
         self, xy: NDArray[np.float64], drawing: Drawing, sums: NDArray[np.float64], use: NDArray[np.float64]
@@ -192,13 +119,29 @@ class Draughtsman:
         wider /= 1.0 - min(max(MIXED * (sigma / drawing.edge_px - UNMIXED), 0.0), MOST_MIXED)
         return max(sigma + float(np.clip(wider, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
 
-    def _bettered(self, view: Sight, picture: NDArray[np.float32], fit: Fit) -> Levels:
-        """Levels corrected by what the drawing does not explain in the middle of the cells."""
-        mesh = self._mesh
-        drawn = cell_means(view.image, picture, fit.xy, mesh.cells, 0.0)
-        black = cell_means(view.image, picture, fit.xy, mesh.black, 0.0)
-        drawn[:, :3] += fit.levels.cell
-        return smooth_levels(drawn, black, fit.xy, mesh, fit.noise, view.frame)
+
+@compiled
+def _step(seen, changes, now, tables, frame):  # type: ignore[no-untyped-def]
+    """Sums without bending, use, looseness, foot and noise of what was ``seen``, and the solution.
+
+    Args:
+        seen: lines, contrasts, black, sums and blur of a drawing.
+        changes: of the cells' levels (K, 3) and of the black's polynomial (3, 10) since.
+    """
+    lines, contrasts, black, read, sigma = seen
+    xy, beyond, rough, bend, before, noise = now
+    edges, spokes, edge_cells = tables
+    values, least, unjudged = JUDGED_BY_PIXELS
+    sums = read.copy()
+    cell_change, black_change = changes
+    to_a, to_b, off = votes(sums, contrasts, edge_cells, cell_change, black_change, middles(lines), *frame)
+    said = bend, rough, before, lines, edges, noise
+    loose, kept = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
+    use, found = trust(sums, to_a, to_b, hidden_misfit(loose, contrasts, sigma), values, least, unjudged)
+    noise = found if np.isfinite(found) else noise
+    where = xy, beyond, edges, spokes, sigma, noise, True
+    step = solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
+    return (sums, use, loose, foot_of(contrasts, black, off), noise) + step
 
 
 def _effort(size_px: float, share: float | None = None) -> float:
@@ -236,13 +179,6 @@ def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: i
 
 
 @compiled
-def usual_length(lines):  # type: ignore[no-untyped-def]
-    """The median length of the known gridlines (E, 8), px; 1 without any."""
-    known = lines[lines[:, KNOWN] > 0.0, LENGTH]
-    return np.median(known) if known.shape[0] > 0 else 1.0
-
-
-@compiled
 def usual_deviation(diagonal):  # type: ignore[no-untyped-def]
     """The markers' median standard deviation, px, by their blocks of the information (M, 3), all others known."""
     return np.sqrt(2.0 / np.median(diagonal[:, 0] + diagonal[:, 2]))
@@ -277,23 +213,3 @@ def beside(which, edges, out):  # type: ignore[no-untyped-def]
         a, b = edges[e, 0], edges[e, 1]
         out[a] |= which[b]
         out[b] |= which[a]
-
-
-@compiled
-def touching(which, groups):  # type: ignore[no-untyped-def]
-    """(G,) bool, the groups (G, n) of markers with one of ``which`` (M,) among them."""
-    out = np.zeros(groups.shape[0], np.bool_)
-    for g in range(groups.shape[0]):
-        for k in range(groups.shape[1]):
-            out[g] |= which[groups[g, k]]
-    return out
-
-
-@compiled
-def chosen(which, ones, others):  # type: ignore[no-untyped-def]
-    """Rows of ``ones`` where ``which``, of ``others`` elsewhere."""
-    out = others.copy()
-    for i in range(which.shape[0]):
-        if which[i]:
-            out[i] = ones[i]
-    return out

@@ -17,12 +17,13 @@ MUCH_BLUR, MUCH_LIGHT = 0.06, 0.03  # of the blur and the levels, that no start 
 
 class Seen(NamedTuple):
     """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
-    and the inks' levels."""
+    the inks' levels, and the grain: noise as pixels show it that lie side by side, whatever the pattern explains."""
 
     scale: int
     sigma: float
     noise: float
     levels: Levels
+    grain: float
 
     def relit(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Seen:
         """The same in another light.
@@ -78,7 +79,7 @@ class Fit(NamedTuple):
         guiding: (M, 2), the same with NaN where the image hardly shows them.
         beyond: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
-        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks.
+        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks. grain: as in ``Seen``.
         information: about the markers.
         rough: (M,) px^2, how rough the markers are around each.
         loose: (E,) px^2, how freely gridlines may bend beyond the map there.
@@ -96,6 +97,7 @@ class Fit(NamedTuple):
     sigma: float
     noise: float
     levels: Levels
+    grain: float
     information: Information
     rough: NDArray[np.float64]
     loose: NDArray[np.float64]

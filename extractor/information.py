@@ -140,30 +140,30 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def covariances(diagonal, beside, edges, spokes, weak):  # type: ignore[no-untyped-def]
-    """(M, 2, 2): diagonal blocks of the inverse, from each marker and its neighbours; NaN where nothing is known.
+def covariances(diagonal, beside, edges, spokes, weak, which):  # type: ignore[no-untyped-def]
+    """(M, 2, 2): diagonal blocks of the inverse, from each marker and its neighbours; NaN where nothing is known, and
+    beyond ``which`` (M,) bool.
 
     The markers beyond the neighbours are eliminated one by one, as if they were not connected to each other, then the
     neighbours. ``weak`` is the information (1/px^2) below which a marker counts as unknown.
     """
-    count = diagonal.shape[0]
-    out = np.full((count, 2, 2), np.nan)
+    out = np.full((diagonal.shape[0], 2, 2), np.nan)
+    asked = np.flatnonzero(which & (diagonal[:, 0] + diagonal[:, 2] > weak))
     lost, left = behind(diagonal, beside, edges)
     others = others_at(beside, edges, spokes)
     # rows beyond those of five neighbours are written when the fifth is eliminated, and not read
     rows, tail = np.empty(6 * OF_ONE * LANES), np.empty(OF_TAIL * LANES)
     ring, spoke, own = np.empty(6, np.int64), np.empty(6, np.int64), np.empty((6, 3))
-    for start in range(0, count, LANES):
-        end = min(start + LANES, count)
+    for start in range(0, len(asked), LANES):
+        some = asked[start : start + LANES]
         rows[:], tail[:] = 0.0, 0.0
-        for m in range(start, end):
-            if diagonal[m, 0] + diagonal[m, 2] > weak:
-                lay(m, m - start, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail)
-                for c in range(3):
-                    tail[(MIDDLE + c) * LANES + m - start] = diagonal[m, c]
+        for k, m in enumerate(some):
+            lay(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail)
+            for c in range(3):
+                tail[(MIDDLE + c) * LANES + k] = diagonal[m, c]
         eliminate_ring(rows, tail)
-        for m in range(start, end):
-            at = MIDDLE * LANES + m - start
+        for k, m in enumerate(some):
+            at = MIDDLE * LANES + k
             xx, xy, yy = tail[at], tail[at + LANES], tail[at + 2 * LANES]
             determinant = xx * yy - xy * xy
             if xx > 0.0 and determinant > 1e-6 * (xx + yy) ** 2 and xx + yy > weak:

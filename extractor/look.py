@@ -28,7 +28,7 @@ def first_look(view: Sight, mesh: Topology, xy: NDArray[np.float64]) -> Seen:
     """The noise and the levels in the middles of the cells; the blur is not known yet."""
     usual, tables = USUAL_SIGMA_PX / view.scale, (mesh.cells, mesh.black, mesh.cell_color)
     noise, *levels = _first_look(view.image, NO_MODEL, xy, *tables, usual, *view.frame)
-    return Seen(view.scale, 0.0, noise, Levels(*levels))
+    return Seen(view.scale, 0.0, noise, Levels(*levels), noise)
 
 
 @compiled

@@ -16,7 +16,10 @@ from .gaussian import REACH
 from .gridlines import KNOWN
 from .shares import CHUNK, PX, PY, columns, fill_shares, lay_sides, opening_of, room_for_shares
 
-KEPT_SHARES, KEPT_RUNS = 1 << 18, 1 << 16  # of what is drawn; more than that is drawn once more to be taken out
+KEPT_SHARES, KEPT_RUNS = (
+    1 << 18,
+    1 << 16,
+)  # of what is drawn; more than that is drawn once more to be taken out
 FIRST_RUN, RUNS, FIRST_SHARE = range(3)  # columns of a cell's strokes
 
 
@@ -62,8 +65,8 @@ def _add(flat, at, first, count, shares, level, slope):  # type: ignore[no-untyp
 
 @compiled
 def _add_runs(model, runs, shares, sense, level, slope, cx, cy):  # type: ignore[no-untyped-def]
-    """Add ``sense`` times a cell's level over black, ``level`` at its centroid (cx, cy), to its runs (n, 3) of pixels."""
-    flat, width, k = model.reshape(-1), model.shape[1], 0
+    """Add ``sense`` times a cell's level, ``level`` at its centroid (cx, cy), to its runs (n, 3) of pixels."""
+    flat, width, k = model.reshape(-1), model.shape[1], np.int64(0)
     change = np.float32(sense * slope[0, 0]), np.float32(sense * slope[1, 0]), np.float32(sense * slope[2, 0])
     for i in range(runs.shape[0]):
         x, y, own = np.int64(runs[i, 0]), np.int64(runs[i, 1]), np.int64(runs[i, 2])

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around
-from .drawing import SMALL_BLUR, Draughtsman, beside, touching
+from .drawing import SMALL_BLUR, Draughtsman, beside
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
-from .image import estimate_noise
 from .information import Information, covariances
 from .look import across, cleared, first_look
 from .offsets import measure
@@ -52,6 +51,7 @@ class Refiner:
         self._virtual = virtual_per_edge
         self._steps = STEPS[preset]
         self._draughtsman = Draughtsman(mesh)
+        self._all = np.ones(len(mesh.spokes), np.bool_)
 
     def __call__(self, sights: Sights, places: Places, before: Seen | None = None) -> Refined:
         """Solve all markers together.
@@ -94,7 +94,18 @@ class Refiner:
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
         seen = before or first_look(view, mesh, xy)
-        about = seen.sigma, seen.noise, seen.levels, nothing, smooth, stiff, straight, smooth, None
+        about = (
+            seen.sigma,
+            seen.noise,
+            seen.levels,
+            seen.grain,
+            nothing,
+            smooth,
+            stiff,
+            straight,
+            smooth,
+            None,
+        )
         fit = Fit(xy, xy, xy, beyond, maps, *about)
         lines = lines_of(mesh, fit)
         sides = across(view, mesh, fit, lines)
@@ -112,7 +123,7 @@ class Refiner:
             start = roughened(mesh, start)
             lines = lines_of(mesh, start)
             fit, use = profiled(view, mesh, start, lines, sides, steps.profiles[1], judged=True)
-            xy, cov = self._sure(fit, places)
+            xy, cov = self._sure(fit, places, self._all)
             strays, doubted = astray(mesh, fit, xy, use, places.edge_px)
             xy[strays], cov[strays] = np.nan, np.nan
             _doubt(xy, cov, doubted, places)
@@ -124,28 +135,24 @@ class Refiner:
         self, view: Sight, fit: Fit, sides: Across, which: NDArray[np.bool_]
     ) -> tuple[Fit, NDArray[np.bool_]]:
         """A round of profiles around some markers, judged by these and some elsewhere; (M,) which it trusts."""
-        mesh, near = self._mesh, which.copy()
-        beside(which, mesh.edges, near)
-        room = sides.room.copy()
-        elsewhere = ~touching(near, mesh.edges)
-        elsewhere[::ELSEWHERE] = False
-        room[elsewhere] = 0.0
-        some, lines = sides._replace(room=room), lines_of(mesh, fit)
+        mesh = self._mesh
+        some = sides._replace(room=_room_around(which, mesh.edges, sides.room))
+        lines = lines_of(mesh, fit)
         fit, use = profiled(view, mesh, fit, lines, some, JUDGING_STATIONS, judged=True)
         return fit, which & trusted_markers(use, mesh.spokes)
 
     def _result(self, view: Sight, fit: Fit, sides: Across, places: Places) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
-        xy, cov = self._sure(fit, places)
+        xy, cov = self._sure(fit, places, self._all)
         apart = _far(xy, places.xy_px, places.edge_px, MAX_STRANGE)
-        if apart.any() and fit.noise > STRANGE * estimate_noise(view.image, fit.xy, self._mesh.cells):
+        if apart.any() and fit.noise > STRANGE * fit.grain:
             xy[apart], cov[apart] = np.nan, np.nan
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
             start = placed(self._mesh, fit._replace(unsettled=None))
             judged, use = self._judged(view, start, sides, lost)
             if use.any():
-                anew, wide = self._sure(judged, places)
+                anew, wide = self._sure(judged, places, use)
                 xy[use], cov[use] = anew[use], wide[use]
                 _doubt(xy, cov, use, places)
         return self._refined(view, fit, xy, cov, ~lost, places)
@@ -162,29 +169,31 @@ class Refiner:
         """The markers at the image's full scale; what was lost though all triangles agree on it is where these say."""
         mesh, scale, reading = self._mesh, view.scale, fit.reading
         assert reading is not None
-        picture = self._draughtsman.picture(view.image.shape)
+        picture = self._draughtsman.board(view.image.shape).picture
         points = measure(view.image, picture, reading, self._virtual, scale)
         left = places.xy_px, places.edge_px, places.agreed
         xy, cov, free = _in_full(xy, cov, fit.loose, mesh.spokes, *left, scale)
         blur, noise = scale * fit.sigma, scale * fit.noise
-        seen = Seen(scale, fit.sigma, fit.noise, fit.levels) if reading.drawn else None
+        seen = Seen(scale, fit.sigma, fit.noise, fit.levels, fit.grain) if reading.drawn else None
         return Refined(xy, cov, explained, free, blur, noise, seen, points)
 
-    def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Markers and covariances of a fit, NaN where it is far from the places or not sure."""
+    def _sure(
+        self, fit: Fit, places: Places, which: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Markers and covariances of a fit; NaN where it is far from the places or not sure, and beyond ``which``."""
         tables = self._mesh.edges, self._mesh.spokes
         start = places.xy_px, places.edge_px, places.whole
-        xy, cov = _sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start)
+        xy, cov = _sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start, which)
         if fit.unsettled is not None:
             cov += fit.unsettled
         return xy, cov
 
 
 @compiled
-def _sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, whole):  # type: ignore[no-untyped-def]
+def _sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, whole, which):  # type: ignore[no-untyped-def]
     """Markers and covariances, NaN where a marker lies far from its ``start`` or is not sure."""
     xy, hidden = measured.copy(), around(loose, spokes)
-    cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2)
+    cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
     for m in range(xy.shape[0]):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
         limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
@@ -194,6 +203,17 @@ def _sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, wh
         if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
             xy[m], cov[m] = np.nan, np.nan
     return xy, cov
+
+
+@compiled
+def _room_around(which, edges, room):  # type: ignore[no-untyped-def]
+    """(E, 4) ``room``, 0 where a gridline is neither near to ``which`` (M,) bool nor one of those elsewhere."""
+    near, out = which.copy(), room.copy()
+    beside(which, edges, near)
+    for e in range(edges.shape[0]):
+        if not (near[edges[e, 0]] or near[edges[e, 1]] or e % ELSEWHERE == 0):
+            out[e] = 0.0
+    return out
 
 
 @compiled

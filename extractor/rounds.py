@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import bending_ones
-from .drawing import touching
+from .drawn import touching
 from .engine import compiled
 from .fit import Across, Fit
 from .matched import read_profiles

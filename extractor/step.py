@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .bending import bending_ones, bent, eliminate, freedom, roughness
+from .bending import bent, eliminate, freedom, roughness
 from .engine import compiled
 from .fit import Fit
 from .gridlines import KNOWN, extrapolate, gridlines, local_maps
@@ -30,21 +30,6 @@ class Judged(NamedTuple):
     values: int
     least: int
     unjudged: float
-
-
-class Heard(NamedTuple):
-    """What was read along the gridlines, bending taken out.
-
-    Attributes:
-        sums: (E, 24), as ``eliminate`` leaves them. to_a, to_b: (E,) the votes.
-        bend: (E, 2) px, by which the gridlines were drawn bent. kept: (E, 6), as ``eliminate`` gives it.
-    """
-
-    sums: NDArray[np.float64]
-    to_a: NDArray[np.float64]
-    to_b: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    kept: NDArray[np.float64]
 
 
 def completed(
@@ -79,25 +64,6 @@ def lines_of(mesh: Topology, fit: Fit) -> NDArray[np.float64]:
     return np.asarray(gridlines(fit.xy, fit.maps, fit.bend, mesh.edges, mesh.along))
 
 
-def loose_ones(mesh: Topology, fit: Fit) -> NDArray[np.bool_]:
-    """(E,) the gridlines that may bend beyond the map, or did."""
-    return np.asarray(bending_ones(fit.rough, fit.bend, mesh.edges))
-
-
-def heard(
-    mesh: Topology,
-    fit: Fit,
-    lines: NDArray[np.float64],
-    sums: NDArray[np.float64],
-    votes: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    judged: Judged,
-) -> tuple[Fit, Heard]:
-    """How freely gridlines bend, and what their bending is, taken out of their sums and votes in place."""
-    use = np.ones(len(sums)) if fit.reading is None else fit.reading.use
-    loose, kept = listened(sums, *votes, fit.bend, fit.rough, use, lines, mesh.edges, fit.noise, *judged)
-    return fit._replace(loose=loose), Heard(sums, *votes[:2], fit.bend, kept)
-
-
 @compiled
 def listened(sums, to_a, to_b, off, bend, rough, use, lines, edges, noise, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) px^2 how freely gridlines bend, as far as they were in ``use`` before (E,), and (E, 6) what their bending
@@ -109,23 +75,6 @@ def listened(sums, to_a, to_b, off, bend, rough, use, lines, edges, noise, value
         variance = max(noise, usual) ** 2 if np.isfinite(usual) else noise**2
         loose = freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance)
     return loose, eliminate(sums, to_a, to_b, off, bend, loose, variance)
-
-
-def solved(
-    mesh: Topology,
-    fit: Fit,
-    said: Heard,
-    use: NDArray[np.float64],
-    lines: NDArray[np.float64],
-    contrasts: NDArray[np.float64],
-    overlapping: bool,
-) -> Fit:
-    """The fit with all markers moved together from where they were drawn.
-
-    At their ends gridlines overlap (``overlapping``), unless they were read in their middles only.
-    """
-    where = fit.xy, fit.beyond, mesh.edges, mesh.spokes, fit.sigma, fit.noise, overlapping
-    return moved_on(fit, solution(*said, use, lines, contrasts, *where))
 
 
 def moved_on(fit: Fit, solution: tuple[Any, ...], **others: Any) -> Fit:

@@ -6,10 +6,7 @@ its two ends as 1 - t and t: the gradient of the log-likelihood, and its curvatu
 
 from __future__ import annotations
 
-import threading
-
 import numpy as np
-from numpy.typing import NDArray
 
 from .engine import compiled, inlined, vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
@@ -23,8 +20,6 @@ AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
 SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
 SUMS = 24
 KEEP, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # weights of pixels
-
-_kept = threading.local()
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -224,33 +219,16 @@ def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
             own[k] = np.float32(seen[k]) - drawn[k]
 
 
-def read_gridlines(
-    image: NDArray[np.uint8],
-    model: NDArray[np.float32],
-    lines: NDArray[np.float64],
-    contrasts: NDArray[np.float64],
-    black: NDArray[np.float64],
-    sigma: float,
-    box: NDArray[np.int64],
-    loose: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+@compiled
+def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
     """(E, 24) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
     residual (image - model - black, the last at the gridline's middle); SHARE: derivative times the share of a side,
     per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
-    likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere.
+    likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere. ``residual`` is room for
+    the pixels in the box.
     """
-    size = 3 * int(max(box[2] - box[0], 0) * max(box[3] - box[1], 0))
-    residual = getattr(_kept, "residual", None)
-    if residual is None or len(residual) < size:  # fresh memory would cost more than what is written to it
-        residual = _kept.residual = np.empty(size, np.float32)
-    return np.asarray(_read(image, model, lines, contrasts, black, sigma, box, loose, residual))
-
-
-@compiled
-def _read(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
-    """Everything of ``read_gridlines``; ``residual`` is room for the pixels in the box."""
     out = np.zeros((lines.shape[0], SUMS))
     inverse, reach = 1.0 / sigma, BAND * sigma
     area = _area(lines, reach, box)

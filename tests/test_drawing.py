@@ -17,9 +17,10 @@ from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, compo
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout, refine
-from extractor.drawing import Draughtsman, Drawing, beside, chosen, still_moving, touching, unsettled
+from extractor.drawing import Draughtsman, beside, still_moving, unsettled
+from extractor.drawn import Drawing, chosen, touching
 from extractor.levels import Levels, bled, rebled, unbled
-from extractor.painting import draw_cells
+from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
 from extractor.presets import STEPS
 
 SIZE = (300, 260)
@@ -53,10 +54,11 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
         fit, drawing = plain(self, view, fit, before, anew)
         mesh, levels = self._mesh, drawing.levels
         fresh = np.zeros(view.image.shape, np.float32)
-        sides = mesh.cells, mesh.cell_edges, mesh.edges, drawing.lines
-        draw_cells(drawing.xy, *sides, levels.cell, levels.slope, drawing.sigma, drawing.box, fresh)
+        every, sides = np.ones(len(mesh.cells), np.bool_), (mesh.cells, mesh.cell_edges, mesh.edges)
+        how = drawing.lines, levels.cell, levels.slope, drawing.sigma, drawing.box
+        draw_cells(every, 1.0, drawing.xy, *sides, *how, fresh, room_for_strokes(len(every)))
         x0, y0, x1, y1 = drawing.box
-        picture = self.picture(view.image.shape)[y0:y1, x0:x1]
+        picture = self.board(view.image.shape).picture[y0:y1, x0:x1]
         np.testing.assert_allclose(picture, fresh[y0:y1, x0:x1], atol=2e-3)  # grey levels
         kept = ~touching(anew, mesh.edges)
         np.testing.assert_array_equal(drawing.sums[kept], before.sums[kept])
@@ -184,12 +186,10 @@ def test_the_first_estimate_of_the_blur_is_close(
         assert 0.95 < ratios[-1] < 1.06
 
 
-@pytest.mark.parametrize("bow", [-0.3, -0.1, 0.1, 0.3])
-def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
-    """One cell with a curved side against the same, finely sampled and filtered: blur moves curved edges."""
-    fine, sigma, size = 16, 3.0, 96
-    corners = np.array([[18.0, 70.0], [78.0, 70.0], [48.0, 18.0]])
-    xy, cells = corners, np.array([[0, 1, 2]], np.int32)
+def one_cell(bow: float, sigma: float, picture: NDArray[np.float32], size: float = 1.0) -> tuple[Any, ...]:
+    """A cell with a side that is bowed, as ``draw_cells`` takes it."""
+    corners = size * np.array([[18.0, 70.0], [78.0, 70.0], [48.0, 18.0]])
+    cells = np.array([[0, 1, 2]], np.int32)
     edges, cell_edges = np.array([[0, 1], [1, 2], [0, 2]], np.int32), np.array([[0, 1, 2]], np.int32)
     chords = corners[edges[:, 1]] - corners[edges[:, 0]]
     lengths = np.linalg.norm(chords, axis=1)
@@ -197,9 +197,31 @@ def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
     lines[:, :2], lines[:, 2:4] = corners[edges[:, 0]], chords / lengths[:, None]
     lines[:, 4], lines[:, 7] = lengths, 1.0
     lines[0, 5:7] = bow, -bow  # a parabola
+    box, slope = np.array([0, 0, *picture.shape[1::-1]]), np.zeros((1, 3, 2))
+    slope[0, 1] = 0.2, -0.1
+    return corners, cells, cell_edges, edges, lines, np.full((1, 3), 100.0), slope, sigma, box
+
+
+@pytest.mark.parametrize("shares", [1 << 18, 4000, 0])
+def test_what_is_taken_out_leaves_nothing(shares: int) -> None:
+    """Whether its strokes were kept, did not fit all, or were not kept at all; larger than a chunk of pixels, too."""
+    picture, which = np.full((96, 96, 3), 50.0, np.float32), np.ones(1, np.bool_)
+    for size in (0.5, 1.0):  # 700 pixels and 2,400
+        strokes = room_for_strokes(1, shares)
+        cell = one_cell(0.2, 1.0, picture, size)
+        draw_cells(which, 1.0, *cell, picture, strokes)
+        assert picture.max() > 120.0 and bool(strokes.cell[0, RUNS]) == (size < 1.0 and shares >= 4000)
+        erase_cells(which, *cell, picture, strokes)
+        np.testing.assert_allclose(picture, 50.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("bow", [-0.3, -0.1, 0.1, 0.3])
+def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
+    """One cell with a curved side against the same, finely sampled and filtered: blur moves curved edges."""
+    fine, sigma, size = 16, 3.0, 96
     picture = np.zeros((size, size, 3), np.float32)
-    box, level = np.array([0, 0, size, size]), np.full((1, 3), 100.0)
-    draw_cells(xy, cells, cell_edges, edges, lines, level, np.zeros((1, 3, 2)), sigma, box, picture)
+    which, strokes = np.ones(1, np.bool_), room_for_strokes(1)
+    draw_cells(which, 1.0, *one_cell(bow, sigma, picture), picture, strokes)
     y, x = np.mgrid[0 : size * fine, 0 : size * fine].astype(np.float32)
     x, y = (x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5
     t = np.clip((x - 18.0) / 60.0, 0.0, 1.0)

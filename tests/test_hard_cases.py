@@ -36,6 +36,7 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.cells import Cells
 from extractor.drawing import Draughtsman
+from extractor.drawn import Board, room_for
 from extractor.fit import Refined
 from extractor.information import covariances, solve
 from extractor.meeting import overlap
@@ -275,8 +276,13 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    kept: dict[tuple[int, ...], NDArray[np.float64]] = {}
-    monkeypatch.setattr(Draughtsman, "picture", lambda self, shape: kept.setdefault(shape, np.zeros(shape)))
+    kept: dict[tuple[int, ...], Board] = {}
+
+    def board(self: Draughtsman, shape: tuple[int, ...]) -> Board:
+        single = room_for(shape, self._mesh)
+        return kept.setdefault(shape, single._replace(picture=np.zeros(shape)))  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Draughtsman, "board", board)
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))
@@ -347,9 +353,9 @@ def test_singular_systems_are_solved_where_they_tell_something() -> None:
     """No information at all; one gridline alone; two markers that only know their difference."""
     mesh = topology_of(extractor().layout)
     count, edges = len(mesh.spokes), np.asarray(mesh.edges)
-    weak = 1e-2
+    weak, every = 1e-2, np.ones(count, np.bool_)
     diagonal, beside = np.zeros((count, 3)), np.zeros((len(edges), 4))
-    assert np.isnan(covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak)).all()
+    assert np.isnan(covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak, every)).all()
     diagonal[:, [0, 2]] = weak
     right = np.zeros((count, 2))
     assert not solve(diagonal, beside, mesh.edges, right).any()
@@ -362,7 +368,7 @@ def test_singular_systems_are_solved_where_they_tell_something() -> None:
         shift = solve(diagonal, beside, mesh.edges, right)
         assert np.isfinite(shift).all() and shift[a, 0] - shift[b, 0] == pytest.approx(1.0, rel=0.02)
         assert not shift[:, 1].any()
-        cov = covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak)
+        cov = covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak, every)
         known = np.isfinite(cov[:, 0, 0])
         assert (np.linalg.eigvalsh(cov[known]) > 0).all()
 
