@@ -126,7 +126,7 @@ class Refiner:
             xy, cov = self._sure(fit, places, self._all)
             strays, doubted = astray(mesh, fit, xy, use, places.edge_px)
             xy[strays], cov[strays] = np.nan, np.nan
-            _doubt(xy, cov, doubted, places)
+            _doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
             return self._refined(view, fit, xy, cov, ~doubted, places)
         fit = self._draughtsman.steps(view, start, steps, edge_px)
         return self._result(view, fit, sides, places)
@@ -153,8 +153,8 @@ class Refiner:
             judged, use = self._judged(view, start, sides, lost)
             if use.any():
                 anew, wide = self._sure(judged, places, use)
+                _doubt(anew, wide, use, places.xy_px, places.edge_px, places.whole)
                 xy[use], cov[use] = anew[use], wide[use]
-                _doubt(xy, cov, use, places)
         return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(
@@ -241,22 +241,22 @@ def _in_full(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignor
     return places, wide, free
 
 
-def _doubt(
-    xy: NDArray[np.float64], cov: NDArray[np.float64], which: NDArray[np.bool_], places: Places
-) -> None:
-    """Put markers on which something lies between what profiles and triangles say, in place; NaN where these differ."""
-    if not which.any():
-        return
-    apart = np.linalg.norm(xy - places.xy_px, axis=1)
-    with np.errstate(invalid="ignore"):
-        lost = which & ~(apart < MAX_APART * places.edge_px)
-    # all triangles around a marker are seldom wrong together: the farther off, the more they count
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(places.whole, 0.5 / (1.0 + (apart / (FAR_APART * places.edge_px)) ** 2), 0.5)
-    xy[which] = (places.xy_px + share[:, None] * (xy - places.xy_px))[which]
-    doubt = 0.25 * apart**2 + (UNEXPLAINED * places.edge_px) ** 2
-    cov[which] += doubt[which, None, None] * np.eye(2)
-    xy[lost], cov[lost] = np.nan, np.nan
+@compiled
+def _doubt(xy, cov, which, start, edge, whole):  # type: ignore[no-untyped-def]
+    """Put markers on which something lies between what profiles and triangles (``start``) say, in place; NaN where
+    these differ."""
+    for m in np.flatnonzero(which):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        apart = np.sqrt(dx * dx + dy * dy)
+        if not apart < MAX_APART * edge[m]:
+            xy[m], cov[m] = np.nan, np.nan
+            continue
+        # all triangles around a marker are seldom wrong together: the farther off, the more they count
+        share = 0.5 / (1.0 + (apart / (FAR_APART * edge[m])) ** 2) if whole[m] else 0.5
+        xy[m, 0], xy[m, 1] = start[m, 0] + share * dx, start[m, 1] + share * dy
+        doubt = 0.25 * apart**2 + (UNEXPLAINED * edge[m]) ** 2
+        cov[m, 0, 0] += doubt
+        cov[m, 1, 1] += doubt
 
 
 def _in(view: Sight, places: Places) -> Places:
