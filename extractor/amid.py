@@ -15,7 +15,7 @@ from .edges import fit_edges
 from .engine import compiled
 from .gradients import seen_as, slopes
 from .numbering import Numbering
-from .regions import Seeds
+from .seeds import Seeds
 from .tables import Lattice
 from .triangles import Triangles
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .near import bucketed, nearest
-from .regions import Seeds
+from .seeds import Seeds
 from .triangles import Triangles
 
 NEIGHBOURS = 8

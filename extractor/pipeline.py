@@ -23,8 +23,9 @@ from .placing import Places, place
 from .presets import PRESETS, Preset
 from .reference import Reference
 from .refine import Refiner
-from .regions import NO_CROWD, Seeds, find_seeds, grow, large_enough
+from .regions import grow
 from .repair import repair
+from .seeds import NO_CROWD, Seeds, find_seeds, large_enough
 from .segmentation import segment
 from .sight import Sights
 from .tables import lattice_of

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .edges import fit_edges
 from .engine import compiled
-from .regions import Regions, Seeds, domain_moments
+from .regions import Regions
+from .seeds import Seeds, domain_moments
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
 # radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.

@@ -12,7 +12,7 @@ from benchmarks.stress_suite.reading import extractor_of, wrong_in
 from extractor.amid import amid, outlined
 from extractor.cells import Cells
 from extractor.numbering import Numbering
-from extractor.regions import find_seeds
+from extractor.seeds import find_seeds
 from extractor.tables import lattice_of
 
 

@@ -16,7 +16,8 @@ from pictures import picture
 from extractor import parse_layout
 from extractor.color import find_hues, hue_weights, nominal_hues_deg, to_colors
 from extractor.image import estimate_noise
-from extractor.regions import GROW_THRESHOLD, find_seeds, grow
+from extractor.regions import GROW_THRESHOLD, grow
+from extractor.seeds import find_seeds
 from extractor.segmentation import Segmentation, segment
 from extractor.target import Target, find_target
 

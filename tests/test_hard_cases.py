@@ -44,8 +44,9 @@ from extractor.mesh import build_mesh
 from extractor.neighbourhood import predict
 from extractor.placing import Places
 from extractor.presets import PRESETS
-from extractor.regions import find_seeds, grow
+from extractor.regions import grow
 from extractor.repair import repair
+from extractor.seeds import find_seeds
 from extractor.segmentation import Segmentation
 from extractor.tables import lattice_of
 from extractor.topology import topology_of

@@ -19,7 +19,8 @@ from benchmarks.scenes import BOARD_LAYERS, Case, extractor_of, reference_of
 from extractor import Extractor
 from extractor.color import nominal_hues_deg, to_colors
 from extractor.presets import Preset
-from extractor.regions import find_seeds, grow
+from extractor.regions import grow
+from extractor.seeds import find_seeds
 from extractor.segmentation import segment
 from extractor.target import find_target
 
