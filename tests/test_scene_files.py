@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from scene_texts import MOVING, SIZE, scene_writer
 
 import cmpdesign.scene.sensor
-from cmpdesign.cli.app import app
-from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.layout import Layout
 from cmpdesign.scene import (
     Camera,
@@ -38,31 +37,10 @@ from cmpdesign.scene import (
     save_truths,
     standard_layout,
 )
-from cmpdesign.scene.film import open_film
 from cmpdesign.scene.keys import flattened, value_at, with_values
 from cmpdesign.templates import scene_templates
-from cmpdesign.writers.layout_file import layout_to_json
 
 ROOT = Path(__file__).parent.parent
-SIZE = (96, 80)
-MOVING = """
-size_px = [96, 80]
-[camera]
-pitch_px = 16
-[surface.dent]
-radius_mm = 1.5
-depth_mm = 0
-[sensor]
-noise = 3
-[damage]
-missing_share = 0.3
-[sequence]
-frames = 5
-fps = 4
-[sequence.values]
-surface.dent.depth_mm = [[0.25, 0.0], [0.75, 1.0]]
-surface.dent.centre_mm = [[0.0, [0, 0]], [1.0, [1, 2]]]
-"""
 BALL = """
 [contact]
 size_mm = [8, 8]
@@ -80,27 +58,8 @@ def layout() -> Layout:
 
 
 @pytest.fixture
-def written(tmp_path: Path, layout: Layout):  # type: ignore[no-untyped-def]
-    def write(text: str, **options: object) -> SceneFile:
-        path = tmp_path / "scene.toml"
-        path.write_text(text, encoding="utf-8")
-        return load_scene(path, layout, **options)  # type: ignore[arg-type]
-
-    return write
-
-
-@pytest.fixture
-def run(tmp_path: Path, layout: Layout):  # type: ignore[no-untyped-def]
-    (tmp_path / "layout.json").write_text(layout_to_json(layout), encoding="utf-8")
-
-    def invoke(text: str, *arguments: object) -> tuple[int, str]:
-        (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-        words = ["render", tmp_path / "layout.json", "--scene", tmp_path / "scene.toml", *arguments]
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-        return result.exit_code, " ".join(result.output.split())
-
-    return invoke
+def written(tmp_path: Path, layout: Layout) -> Callable[..., SceneFile]:
+    return scene_writer(tmp_path, layout)
 
 
 def test_a_file_says_what_python_says(written, layout: Layout, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
@@ -305,73 +264,6 @@ def test_a_truth_of_many_frames_survives_its_file(written, tmp_path: Path) -> No
         load_truth(tmp_path / "t.npz")
     with pytest.raises(SceneError, match="no sequence"):
         load_truths(save_truth(truths[0], tmp_path / "one.npz"))
-
-
-def test_the_command_draws_pictures_videos_and_folders(run, tmp_path: Path, written) -> None:  # type: ignore[no-untyped-def]
-    folder, film, truth = tmp_path / "frames", tmp_path / "film.mkv", tmp_path / "truth.npz"
-    code, said = run(MOVING, "-o", folder, "--truth", truth)
-    assert code == 0 and "5 frames of 96 x 80 px at 4 fps" in said
-    pictures = [cv2.imread(str(path)) for path in sorted(folder.iterdir())]
-    expected = [render(scene, size=SIZE) for scene in written(MOVING).scenes()]
-    assert len(load_truths(truth)[0]) == len(pictures) == 5
-    for picture, frame in zip(pictures, expected, strict=True):
-        np.testing.assert_array_equal(picture, frame.image)
-    assert run(MOVING, "-o", film)[0] == 0
-    video = cv2.VideoCapture(str(film))
-    for frame in expected:  # FFV1 loses nothing
-        np.testing.assert_array_equal(video.read()[1], frame.image)
-    video.release()
-    still = MOVING.partition("[sequence]")[0]
-    code, said = run(still, "-o", tmp_path / "one.png", "--truth", truth, "--size", "60x50", "--seed", 3)
-    assert code == 0 and "one.png: 60 x 50 px" in said
-    assert cv2.imread(str(tmp_path / "one.png")).shape == (50, 60, 3)
-    assert load_truth(truth).marker_xy_px.shape == (19, 2)
-
-
-def test_the_command_refuses_what_does_not_fit(run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    still = MOVING.partition("[sequence]")[0]
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "x").write_text("")
-    odd = MOVING.replace("[96, 80]", "[97, 80]")
-    deep = MOVING.replace("noise = 3", "bits = 16")
-    for text, words, message in (
-        (still, ("-o", tmp_path / "a.mkv"), "unknown ending; expected .png"),
-        (MOVING, ("-o", tmp_path / "a.png"), "expected .mp4, .avi, .mkv, or none"),
-        (MOVING, ("-o", tmp_path / "full"), "is no empty folder"),
-        (odd, ("-o", tmp_path / "a.mp4"), "an .mp4 has even sides"),
-        (deep, ("-o", tmp_path / "a.avi"), "a video has 8 bits, the sensor 16"),
-        (still, ("-o", tmp_path / "a.png", "--pitch", 30), "--pitch has no place beside --scene"),
-        (still, ("-o", tmp_path / "a.png", "--front"), "--front or --mirrored has no place"),
-    ):
-        code, said = run(text, *words)
-        assert code == 2 and message in said, said
-    assert not (tmp_path / "a.png").exists() and not (tmp_path / "a.mkv").exists()
-
-
-def test_an_interrupted_sequence_leaves_nothing(run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    # The last frames' dent turns away from the camera: refused while drawing.
-    steep = MOVING.replace("[camera]\npitch_px = 16", "[camera]\npitch_px = 16\ntilt_deg = -60").replace(
-        "1.0]]", "9]]"
-    )
-    before = sorted(path.name for path in tmp_path.iterdir())
-    for name in ("frames", "film.mkv"):
-        code, said = run(steep, "-o", tmp_path / name, "--truth", tmp_path / "t.npz")
-        assert code == 2 and "turn away" in said
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted({*before, "scene.toml"})
-
-
-def test_films_write_beside(tmp_path: Path) -> None:
-    film = open_film(tmp_path / "f", 5, (8, 8), 16)
-    film.add(np.full((8, 8, 3), 40_000, np.uint16))
-    assert not (tmp_path / "f").exists()
-    film.close()
-    picture = cv2.imread(str(tmp_path / "f" / "frame_000000.png"), cv2.IMREAD_UNCHANGED)
-    assert picture.dtype == np.uint16 and picture[0, 0, 0] == 40_000
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"):
-        open_film(tmp_path / "file" / "f", 5, (8, 8), 8).add(np.zeros((8, 8, 3), np.uint8))
-    with pytest.raises(CmpDesignError, match="unknown ending"):
-        open_film(tmp_path / "x.gif", 5, (8, 8), 8)
 
 
 def test_a_contact_is_pressed_into_the_surface(written, layout: Layout) -> None:  # type: ignore[no-untyped-def]
