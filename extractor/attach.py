@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import cholesky_solve
-from .bridge import held_by
+from .bridge import held_in
 from .cells import Cells
 from .engine import compiled, vectorized
 from .gradients import seen_as, slopes
 from .near import bucketed, nearest
 from .numbering import Numbering
 from .tables import Lattice
-from .touch import UNTURNED, edge_of, spread, turn_like
+from .touch import UNTURNED, edge_of, spread, touch, touching, turn_like
 from .types import Origin
 
 ROUNDS = 40
@@ -56,12 +56,32 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
 def _attach(seen, ink, cell, white, plan, step):  # type: ignore[no-untyped-def]
     """The numbers of the cells with those that could be attached, without those that hang in nothing."""
     center, corner, area, whole = seen
-    cell = np.where(held_by(center, corner, area, whole, cell, white, plan, step), cell, np.int32(-1))
+    beside = touching(center, corner, area, whole, cell, seen_as(cell, plan.ink.shape[0]), plan, step)
+    held = held_in(center, corner, area, whole, cell, white, beside, plan, step)
+    cell, gone = _without(cell, held, beside)
     free, candidates = _candidates(ink, cell, plan.ink)
     if not candidates.any():
         return cell
-    cell = _attached(center, corner, area, whole, ink, candidates, cell, free, plan, step)
-    return np.where(held_by(center, corner, area, whole, cell, white, plan, step), cell, np.int32(-1))
+    more = _attached(center, corner, area, whole, ink, candidates, cell, free, plan, step)
+    fresh = more != cell
+    if gone == 0 and not fresh.any():
+        return cell
+    touch(fresh, center, corner, area, whole, more, seen_as(more, plan.ink.shape[0]), plan, step, beside)
+    return _without(more, held_in(center, corner, area, whole, more, white, beside, plan, step), beside)[0]
+
+
+@compiled
+def _without(cell, held, beside):  # type: ignore[no-untyped-def]
+    """The numbers of the cells without those that are not ``held``, which no cell is ``beside`` any more (in place);
+    and how many these are."""
+    out, gone = cell.copy(), np.flatnonzero((cell >= 0) & ~held)
+    for i in gone:
+        out[i] = -1
+        for k in range(6):
+            if beside[i, k] >= 0:
+                beside[beside[i, k], (k + 3) % 6] = -1
+                beside[i, k] = -1
+    return out, gone.shape[0]
 
 
 @compiled
@@ -102,7 +122,7 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
         touched = spread(center, corner, area, ink, shaped, cell, free, turn, maps, slope, fresh, plan, step)
         fresh = np.concatenate((fresh, touched))
         known = np.flatnonzero((cell >= 0) & whole)
-        if known.shape[0] < MIN_WITNESSES:
+        if known.shape[0] < MIN_WITNESSES or np.all(cell[loose] >= 0):
             break
         xy, places = center[known], np.flatnonzero(free)
         grid = bucketed(xy)

@@ -52,6 +52,12 @@ def unbridged(
 def held_by(center, corner, area, whole, cell, white, plan, step):  # type: ignore[no-untyped-def]
     """(N,) bool, the numbered cells that hold on to the reference's block; ``white`` is NaN where the outline told."""
     beside = touching(center, corner, area, whole, cell, seen_as(cell, plan.ink.shape[0]), plan, step)
+    return held_in(center, corner, area, whole, cell, white, beside, plan, step)
+
+
+@compiled
+def held_in(center, corner, area, whole, cell, white, beside, plan, step):  # type: ignore[no-untyped-def]
+    """The same, by which cells touch (``beside``, as ``touching`` gives it)."""
     block = connected(beside, whole & (cell >= 0))
     sizes = np.zeros(block.max() + 1 if block.shape[0] > 0 else 0, np.int64)
     for i in range(block.shape[0]):
@@ -111,14 +117,15 @@ def _slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-untyped-
 def _held(center, corner, area, cell, block, first, beside, plan, step):  # type: ignore[no-untyped-def]
     """(N,) bool, the cells of the first block and of those that hold on to it, and the single ones between."""
     count, blocks = cell.shape[0], block.max() + 1
-    held = block == first
+    held, alone = block == first, np.flatnonzero((cell >= 0) & (block < 0))
+    if blocks == 1 and alone.shape[0] == 0:
+        return held
     slope, sloped = np.full((count, 2, 2), np.nan), np.zeros(count, np.bool_)
     for i in range(count):
         if block[i] >= 0:
             sloped[i] = _slope(i, center, cell, beside, plan.center_mm, slope[i])
     if blocks > 1:
         _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, step)
-    alone = np.flatnonzero((cell >= 0) & (block < 0))
     if alone.shape[0] > 0:
         _join_alone(center, corner, area, cell, alone, held, slope, sloped, plan, step)
     return held
@@ -129,21 +136,21 @@ def _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, s
     """Let the blocks that hold on be held, in place, the nearest first."""
     count, blocks = cell.shape[0], block.max() + 1
     index, square = np.empty(PAIRS, np.int32), np.empty(PAIRS)
+    one, apart = np.empty(1, np.int32), np.empty(1)
     jump, gap = np.empty(count), np.empty(count)
     least, refused = np.empty(blocks), np.zeros(blocks, np.bool_)
     while True:
+        waiting = np.flatnonzero((block >= 0) & ~held & ~refused[block])
         here = np.flatnonzero(held & sloped)
-        if here.shape[0] < PAIRS:
+        if waiting.shape[0] == 0 or here.shape[0] < PAIRS:
             break
         xy = center[here]
         grid = bucketed(xy)
         least[:] = np.inf
-        for j in range(count):
-            gap[j] = np.inf
-            if block[j] >= 0 and not held[j] and not refused[block[j]]:
-                nearest(xy, grid, center[j, 0], center[j, 1], index, square)
-                gap[j] = np.sqrt(square[0]) / edge_of(area[here[index[0]]])
-                least[block[j]] = min(least[block[j]], gap[j])
+        for j in waiting:
+            nearest(xy, grid, center[j, 0], center[j, 1], one, apart)
+            gap[j] = np.sqrt(apart[0]) / edge_of(area[here[one[0]]])
+            least[block[j]] = min(least[block[j]], gap[j])
         nearest_of_all = least.min()
         if not nearest_of_all < REACH:
             break
@@ -151,7 +158,7 @@ def _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, s
             if least[b] > BESIDE * nearest_of_all:
                 continue
             telling, wide = 0, 0
-            for j in range(count):
+            for j in waiting:
                 if block[j] != b or gap[j] > BESIDE * least[b]:
                     continue
                 nearest(xy, grid, center[j, 0], center[j, 1], index, square)
@@ -161,8 +168,7 @@ def _join_blocks(center, corner, area, cell, block, held, slope, sloped, plan, s
                     wide += own > MAX_JUMP
                     telling += 1
             if telling > 0 and np.median(jump[:telling]) < MAX_JUMP and wide <= MAX_JUMPING * telling:
-                for j in range(count):
-                    held[j] |= block[j] == b
+                held |= block == b
             else:
                 refused[b] = True
 
@@ -191,8 +197,8 @@ def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # ty
         if turn_like(center, corner, j, plan.arms_mm, cell[j], step, like, slope[j]) < 0:
             slope[j] = like
         sloped[j] = True
-    apart = np.empty(near.shape[0])
-    for k in range(near.shape[0]):
+    apart = np.empty(PAIRS)
+    for k in range(PAIRS):
         i = here[near[k]]
         a, b = 0.5 * (slope[i, 0, 0] + slope[j, 0, 0]), 0.5 * (slope[i, 0, 1] + slope[j, 0, 1])
         c, d = 0.5 * (slope[i, 1, 0] + slope[j, 1, 0]), 0.5 * (slope[i, 1, 1] + slope[j, 1, 1])
@@ -201,4 +207,12 @@ def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # ty
         dx = (d * x - b * y) / determinant - plan.center_mm[cell[j], 0] + plan.center_mm[cell[i], 0]
         dy = (a * y - c * x) / determinant - plan.center_mm[cell[j], 1] + plan.center_mm[cell[i], 1]
         apart[k] = np.hypot(dx, dy) / plan.size_mm[cell[j]]
-    return np.median(apart)
+    return _middle(apart[0], apart[1], apart[2])
+
+
+@compiled
+def _middle(a, b, c):  # type: ignore[no-untyped-def]
+    """The median of three numbers (``PAIRS``); NaN if any is none."""
+    if np.isnan(a) or np.isnan(b) or np.isnan(c):
+        return np.nan
+    return max(min(a, b), min(max(a, b), c))

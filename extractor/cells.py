@@ -45,10 +45,7 @@ class Cells:
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) bool, whose centers are to be believed: triangles, if most are, as large as those around them."""
-        shaped = np.isfinite(self.corner_px[:, 0, 0])
-        if shaped.mean() < SHARP_SHARE:
-            shaped[:] = True
-        return np.asarray(shaped & _entire(self.center_px, self.area_px))
+        return np.asarray(_whole(self.center_px, self.area_px, self.corner_px))
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
@@ -100,9 +97,12 @@ def _large(center, area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _entire(center, area):  # type: ignore[no-untyped-def]
-    """(N,) bool, the cells that are about as large as the ones around them."""
-    return _few_larger(center, area, WHOLE_SHARE, NEIGHBOURS // 4 + 1)
+def _whole(center, area, corner):  # type: ignore[no-untyped-def]
+    """(N,) bool, the triangles, or all cells where few are, that are about as large as the ones around them."""
+    shaped = np.isfinite(corner[:, 0, 0])
+    if np.count_nonzero(shaped) < SHARP_SHARE * shaped.shape[0]:
+        shaped[:] = True
+    return shaped & _few_larger(center, area, WHOLE_SHARE, NEIGHBOURS // 4 + 1)
 
 
 @compiled

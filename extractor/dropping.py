@@ -6,7 +6,6 @@ one of the rim that refinement took far from its triangles must have come nearer
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from .engine import compiled
 from .fit import Refined
-from .neighbourhood import MIN_QUADRATIC, deviant, predict, predicted, strays
+from .neighbourhood import MIN_QUADRATIC, predicted, strays
 from .placing import AGREED, Places
 from .sampling import clamp
 from .tables import Lattice
@@ -61,34 +60,41 @@ def believable(refined: Refined, places: Places, lattice: Lattice, size: tuple[i
         size: width and height of the image, px.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    edge_px = _edges(xy, lattice.ring, places.edge_px, places.agreed)
-    near = edge_px * np.where(refined.explained, MAX_DEVIATION, MAX_AGREED_ALONE * places.agreed)
-    slide = cov, refined.free_px, places.xy_px, edge_px, lattice.rim
-    rings = lattice.ring_weights, lattice.neighbours
-    if _sound(xy, near, slide, rings, (lattice.inner_weights, lattice.inner), lattice.present, size):
-        return Believable(xy, cov, edge_px, True)
-    places = replace(places, edge_px=edge_px)
-    kinds = refined.explained | places.agreed, refined.explained, places.whole, places.agreed
-    _drop_outliers(xy, cov, edge_px, near, kinds, *rings, lattice.marker_mm)
-    _drop_frayed(xy, cov, places, lattice)
-    _drop_slid(xy, cov, refined.free_px, places, lattice)
-    return Believable(xy, cov, edge_px, False)
+    seen = refined.explained, refined.free_px, places.xy_px, places.edge_px, places.agreed, places.whole
+    rings = lattice.ring_weights, lattice.neighbours, lattice.inner_weights, lattice.inner, lattice.ring
+    edge_px, sound = _drop(xy, cov, seen, rings, lattice.marker_mm, lattice.present, lattice.rim, size)
+    return Believable(xy, cov, edge_px, sound)
 
 
 @compiled
-def _edges(xy, ring, edge, agreed):  # type: ignore[no-untyped-def]
-    """(M,) the edges at each marker; where no triangles agree, the way to the nearest of its known neighbours, if that
-    is shorter: a share of a longer edge may reach half-way to another marker."""
-    out = edge.copy()
+def _drop(xy, cov, seen, rings, marker_mm, present, rim, size):  # type: ignore[no-untyped-def]
+    """Set to NaN what contradicts its neighbours; (M,) the edges at each marker, and whether all are sound."""
+    explained, free, start, edge, agreed, whole = seen
+    weights, table, inner_weights, inner, ring = rings
+    edge, near = edge.copy(), np.zeros(xy.shape[0])
     for m in range(xy.shape[0]):
-        if agreed[m]:
-            continue
-        for n in ring[m]:
-            if n >= 0:
-                apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
-                if apart < out[m]:
-                    out[m] = apart
-    return out
+        if not agreed[m]:
+            edge[m] = _shortest(xy, m, ring, edge[m])
+        near[m] = edge[m] * (MAX_DEVIATION if explained[m] else MAX_AGREED_ALONE * agreed[m])
+    slide = cov, free, start, edge, rim
+    if _sound(xy, near, slide, (weights, table), (inner_weights, inner), present, size):
+        return edge, True
+    _drop_outliers(xy, cov, edge, near, (explained, whole, agreed), weights, table, marker_mm)
+    _drop_frayed(xy, cov, edge, inner_weights, inner, ring, marker_mm)
+    _drop_slid(xy, cov, _slid(xy, cov, free, start, edge, rim), start, edge, agreed, table, inner, marker_mm)
+    return edge, False
+
+
+@compiled
+def _shortest(xy, m, ring, edge):  # type: ignore[no-untyped-def]
+    """The edge at marker m, or the way to the nearest of its known neighbours, if that is shorter: a share of a longer
+    edge may reach half-way to another marker."""
+    for n in ring[m]:
+        if n >= 0:
+            apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
+            if apart < edge:
+                edge = apart
+    return edge
 
 
 @compiled
@@ -122,108 +128,116 @@ def inside(x, y, size):  # type: ignore[no-untyped-def]
 
 @compiled
 def _drop_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # type: ignore[no-untyped-def]
-    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot.
+    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot."""
+    excess, doubtful = np.zeros(edge.shape[0]), np.zeros(edge.shape[0], np.bool_)
+    stale = np.arange(edge.shape[0])
+    for _ in range(ROUNDS):
+        # only what may be too far is looked at closely, and again where a neighbour has been dropped
+        doubtful[:] = False
+        for m in stale:
+            excess[m] = 0.0
+            doubtful[m] = not np.isnan(xy[m, 0]) and strays(xy, m, near[m], weights, table)
+        place, variance, leverage, support = predicted(xy, doubtful, marker_mm, table)
+        for m in np.flatnonzero(doubtful):
+            apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+            sigma = np.sqrt(variance[m] * (1 + leverage[m]))
+            excess[m] = _excess(m, apart, sigma, support[m], edge[m], kinds)
+        worst = np.zeros(edge.shape[0], np.bool_)
+        for m in np.flatnonzero(excess > 1.0):
+            worst[m] = True
+            for n in table[m]:
+                worst[m] = worst[m] and (n < 0 or excess[m] >= excess[n])
+        if not worst.any():
+            break
+        again = worst.copy()
+        for m in np.flatnonzero(worst):
+            xy[m], cov[m] = np.nan, np.nan
+            for n in table[m]:
+                if n >= 0:
+                    again[n] = True
+        stale = np.flatnonzero(again)
+
+
+@compiled
+def _excess(m, apart, sigma, support, edge, kinds):  # type: ignore[no-untyped-def]
+    """How far a marker lies from where its neighbours put it, over what is allowed; infinite where nobody vouches for
+    it: neither triangles nor neighbours, or these do not know themselves.
 
     What the drawing does not explain must lie nearer, and have neighbours that say so; what triangles do not agree on
     must have some. What all triangles agree on may lie farther off.
     """
-    believed, explained, whole, agreed = kinds
-    excess, stale = np.zeros(edge.shape[0]), np.ones(edge.shape[0], np.bool_)
-    for _ in range(ROUNDS):
-        # only what may be too far is looked at closely, and again where a neighbour has been dropped
-        doubtful = deviant(xy, near, weights, table) & stale
-        place, variance, leverage, support = predicted(xy, doubtful, marker_mm, table)
-        for m in np.flatnonzero(stale):
-            excess[m] = 0.0
-            if not doubtful[m]:
-                continue
-            sigma = np.sqrt(variance[m] * (1 + leverage[m]))
-            allowed = MAX_DEVIATION
-            if whole[m]:
-                allowed = MAX_AGREED
-            elif not believed[m]:
-                allowed = MAX_UNEXPLAINED
-            elif not explained[m]:
-                allowed = MAX_AGREED_ALONE
-            elif support[m] >= MILD_SUPPORT:
-                allowed = clamp(SIGMAS * sigma / edge[m], MAX_DEVIATION, MAX_TOLERANCE)
-            apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
-            if np.isfinite(apart / (edge[m] * allowed)):
-                excess[m] = apart / (edge[m] * allowed)
-            elif not agreed[m]:  # nobody vouches for it: neither triangles nor neighbours
-                excess[m] = np.inf
-            vague = MAX_VAGUE if believed[m] else MAX_UNEXPLAINED
-            if not (explained[m] or whole[m] or sigma < vague * edge[m]):  # they do not know themselves
-                excess[m] = np.inf
-        worst = np.flatnonzero(excess > 1.0)
-        if worst.shape[0] == 0:
-            break
-        stale[:] = False
-        for m in worst:
-            largest = True
-            for n in table[m]:
-                largest = largest and (n < 0 or excess[m] >= excess[n])
-            stale[m] = largest
-        for m in np.flatnonzero(stale):
-            xy[m], cov[m] = np.nan, np.nan
-            for n in table[m]:
-                if n >= 0:
-                    stale[n] = True
+    explained, whole, agreed = kinds
+    believed, allowed = explained[m] or agreed[m], MAX_DEVIATION
+    if whole[m]:
+        allowed = MAX_AGREED
+    elif not believed:
+        allowed = MAX_UNEXPLAINED
+    elif not explained[m]:
+        allowed = MAX_AGREED_ALONE
+    elif support >= MILD_SUPPORT:
+        allowed = clamp(SIGMAS * sigma / edge, MAX_DEVIATION, MAX_TOLERANCE)
+    vague = MAX_VAGUE if believed else MAX_UNEXPLAINED
+    if not (explained[m] or whole[m] or sigma < vague * edge):
+        return np.inf
+    excess = apart / (edge * allowed)
+    if np.isfinite(excess):
+        return excess
+    return 0.0 if agreed[m] else np.inf
 
 
-def _drop_frayed(xy: NDArray[np.float64], cov: NDArray[np.float64], places: Places, lattice: Lattice) -> None:
+@compiled
+def _drop_frayed(xy, cov, edge, weights, table, ring, marker_mm):  # type: ignore[no-untyped-def]
     """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
 
     An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
     """
-    edge, inner = places.edge_px, lattice.inner
-    # only what may be too far is looked at closely
-    doubtful = deviant(xy, FRAYED[0] * edge, lattice.inner_weights, inner) & (inner[:, 0] >= 0)
-    if doubtful.any():
-        place, variance, _, support = predict(xy, doubtful, lattice.marker_mm, inner)
-        with np.errstate(invalid="ignore"):
-            # the worse a quadratic fits the layers inside, the less it tells beyond them
-            allowed = np.clip(BENT_SIGMAS * np.sqrt(variance) / edge, *FRAYED)
-            apart = np.hypot(*(xy - place).T)
-            shortest = _edges(xy, lattice.ring, edge, np.zeros(len(edge), np.bool_))
-            bad = (apart > np.minimum(allowed * edge, MAX_FRAYED * shortest)) & (support >= MIN_QUADRATIC)
-        xy[bad], cov[bad] = np.nan, np.nan
+    frayed = np.zeros(edge.shape[0], np.bool_)
+    for m in np.flatnonzero((table[:, 0] >= 0) & ~np.isnan(xy[:, 0])):
+        # only what may be too far is looked at closely
+        frayed[m] = strays(xy, m, FRAYED[0] * edge[m], weights, table)
+    if not frayed.any():
+        return
+    place, variance, _, support = predicted(xy, frayed, marker_mm, table)
+    for m in np.flatnonzero(frayed):
+        # the worse a quadratic fits the layers inside, the less it tells beyond them
+        allowed = clamp(BENT_SIGMAS * np.sqrt(variance[m]) / edge[m], FRAYED[0], FRAYED[1]) * edge[m]
+        limit = min(allowed, MAX_FRAYED * _shortest(xy, m, ring, edge[m]))
+        apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+        frayed[m] = apart > limit and support[m] >= MIN_QUADRATIC
+    xy[frayed], cov[frayed] = np.nan, np.nan
 
 
-def _drop_slid(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    free_px: NDArray[np.float64],
-    places: Places,
-    lattice: Lattice,
-) -> None:
-    """The markers of the pattern's rim that refinement took far from their triangles and is not sure of stay only where
-    it took them nearer to where the neighbours put them; else they return to their triangles, or are NaN where the
-    neighbours say something else. Where no triangles agree, there was only a guess to be far from: such a marker stays
-    near to where the neighbours put it, with that much doubt.
+@compiled
+def _drop_slid(xy, cov, slid, start, edge, agreed, table, inner, marker_mm):  # type: ignore[no-untyped-def]
+    """The markers of the pattern's rim that refinement took far from their triangles and is not sure of (``slid``) stay
+    only where it took them nearer to where the neighbours put them; else they return to their triangles, or are NaN
+    where the neighbours say something else. Where no triangles agree, there was only a guess to be far from: such a
+    marker stays near to where the neighbours put it, with that much doubt.
 
     Where two gridlines end that may bend, the corner between them slides along both.
     """
-    slid = _slid(xy, cov, free_px, places.xy_px, places.edge_px, lattice.rim)
     if not slid.any():
         return
-    expected, _, _, support = predict(xy, slid, lattice.marker_mm, lattice.neighbours)
+    place, _, _, support = predicted(xy, slid, marker_mm, table)
     # at the corners of the rim two rings hold fewer than a quadratic takes, but the layers inside do not
     few = slid & (support < MIN_QUADRATIC)
     if few.any():
-        inside, _, _, enough = predict(xy, few, lattice.marker_mm, lattice.inner)
-        expected[few], support[few] = inside[few], enough[few]
-    after, before = (np.hypot(*(start - expected).T) for start in (xy, places.xy_px))
-    with np.errstate(invalid="ignore"):
-        near, known = MAX_DEVIATION * places.edge_px, support >= MIN_QUADRATIC
-        nearer = after < before
-        stays = (nearer | ~places.agreed) & (after < near) & known
-        back = slid & ~stays & (before < near) & known & places.agreed
-    bad, guessed = slid & ~stays & ~back, slid & stays & ~nearer
-    xy[bad], cov[bad] = np.nan, np.nan
-    cov[guessed] += (0.25 * after[guessed] ** 2)[:, None, None] * np.eye(2)
-    xy[back] = places.xy_px[back]
-    cov[back] = ((AGREED * places.edge_px[back]) ** 2)[:, None, None] * np.eye(2)
+        inside, _, _, enough = predicted(xy, few, marker_mm, inner)
+        for m in np.flatnonzero(few):
+            place[m], support[m] = inside[m], enough[m]
+    for m in np.flatnonzero(slid):
+        after = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+        before = np.hypot(start[m, 0] - place[m, 0], start[m, 1] - place[m, 1])
+        near, known = MAX_DEVIATION * edge[m], support[m] >= MIN_QUADRATIC
+        if known and after < near and (after < before or not agreed[m]):
+            if not after < before:
+                cov[m, 0, 0] += 0.25 * after**2
+                cov[m, 1, 1] += 0.25 * after**2
+        elif known and before < near and agreed[m]:
+            xy[m] = start[m]
+            cov[m] = np.eye(2) * (AGREED * edge[m]) ** 2
+        else:
+            xy[m], cov[m] = np.nan, np.nan
 
 
 @compiled

@@ -25,11 +25,17 @@ def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
     Where both rings are whole, the first derivatives are those of a cubic (and the second 0: nothing asks for them);
     elsewhere of a quadratic, bending held towards 0, and without bending where fewer than five neighbours are known.
     """
+    return maps_at(xy, np.isfinite(xy[:, 0]), near, offset, stencil)
+
+
+@compiled
+def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
+    """The same at ``which`` (M,) of the known markers only."""
     count = xy.shape[0]
     out = np.full((count, 2, 5), np.nan)
     gram, right = np.empty((5, 5)), np.empty((2, 5))
     for m in range(count):
-        if not np.isfinite(xy[m, 0]):
+        if not which[m]:
             continue
         # there are weights where both rings are whole
         whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
@@ -110,6 +116,23 @@ def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
             out[m, 0], out[m, 1] = x / count, y / count
             put[m] = True
     return out, put
+
+
+@compiled
+def continued(xy, near, offset, stencil, rings):  # type: ignore[no-untyped-def]
+    """``xy`` with the unknown markers of so many rings around known ones put where ``extrapolate`` puts them, by maps
+    that are laid only beside them."""
+    for _ in range(rings):
+        asked = np.zeros(xy.shape[0], np.bool_)
+        for m in np.flatnonzero(~np.isfinite(xy[:, 0])):
+            for k in range(FIRST_RING):
+                n = near[m, k]
+                if n >= 0 and np.isfinite(xy[n, 0]):
+                    asked[n] = True
+        if not np.any(asked):
+            break
+        xy = extrapolate(xy, maps_at(xy, asked, near, offset, stencil), near, offset)[0]
+    return xy
 
 
 @compiled

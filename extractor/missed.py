@@ -46,7 +46,7 @@ def _missed(image, center_px, area_px, cell, plan, small_px):  # type: ignore[no
     free, loose = plan.ink.shape[0] - numbered.shape[0], cell.shape[0] - numbered.shape[0]
     if free == 0:
         return 0
-    if np.median(area_px[numbered]) > small_px:
+    if loose > 0 and np.median(area_px[numbered]) > small_px:
         loose = 0
     return min(loose, free) + _shown(image, center_px, area_px, cell, numbered, plan, small_px)
 
@@ -69,15 +69,26 @@ def _usual(image, center_px, area_px, cell, numbered, ink):  # type: ignore[no-u
 
 
 @compiled
+def _beside_free(seen, cell, beside):  # type: ignore[no-untyped-def]
+    """(N,) int32, the numbers of the cells beside places of the layout where none is ``seen`` (U,), else -1."""
+    out = np.full(cell.shape[0], -1, np.int32)
+    for v in range(seen.shape[0]):
+        for k in range(6):
+            if seen[v] < 0 and beside[v, k] >= 0 and seen[beside[v, k]] >= 0:
+                out[seen[beside[v, k]]] = beside[v, k]
+    return out
+
+
+@compiled
 def _shown(image, center_px, area_px, cell, numbered, plan, small_px):  # type: ignore[no-untyped-def]
     """How many places beside numbered cells, where cells are small, show the ink that must be there."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    usual, strength = _usual(image, center_px, area_px, cell, numbered, plan.ink)
     seen = seen_as(cell, plan.ink.shape[0])
-    slope = slopes(center_px, cell, seen, plan.center_mm, plan.beside)
+    slope = slopes(center_px, _beside_free(seen, cell, plan.beside), seen, plan.center_mm, plan.beside)
+    usual, strength = np.empty((0, 3)), np.empty(0)
     count, color = 0, np.zeros(3)
     for v in range(seen.shape[0]):
-        if seen[v] >= 0 or strength[plan.ink[v]] == 0.0:
+        if seen[v] >= 0:
             continue
         x, y, size, witnesses = 0.0, 0.0, 0.0, 0
         for k in range(6):
@@ -91,6 +102,10 @@ def _shown(image, center_px, area_px, cell, numbered, plan, small_px):  # type: 
             size += area_px[i]
             witnesses += 1
         if witnesses == 0 or size > small_px * witnesses:
+            continue
+        if strength.shape[0] == 0:  # in most images no place comes so far
+            usual, strength = _usual(image, center_px, area_px, cell, numbered, plan.ink)
+        if strength[plan.ink[v]] == 0.0:
             continue
         radius = RADIUS * np.sqrt(size / witnesses)
         if not sample_patch(flat, height, width, x / witnesses, y / witnesses, radius, color):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,8 +50,8 @@ def inner_table(axial: NDArray[np.int32], layer: NDArray[np.int32]) -> NDArray[n
 
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predict`` does; 0 where
-    these are too few."""
+    """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predicted`` does; 0
+    where these are too few."""
     there = table >= 0
     arms = np.where(there[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
     count = there.sum(axis=1)
@@ -81,16 +79,6 @@ def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
             x -= weights[m, k] * xy_px[table[m, k], 0]
             y -= weights[m, k] * xy_px[table[m, k], 1]
     return not x * x + y * y <= limit_px**2  # also where that is not a number
-
-
-@compiled
-def deviant(xy_px, limit_px, weights, table):  # type: ignore[no-untyped-def]
-    """(M,) bool: the known markers that stray from their neighbours beyond the limit (M,)."""
-    out = np.zeros(xy_px.shape[0], np.bool_)
-    for m in range(xy_px.shape[0]):
-        if not np.isnan(xy_px[m, 0]):
-            out[m] = strays(xy_px, m, limit_px[m], weights, table)
-    return out
 
 
 @compiled
@@ -125,7 +113,13 @@ def _solve(factor, terms, vector):  # type: ignore[no-untyped-def]
 
 @compiled
 def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
-    """Predicted places, residual variances, leverages and numbers of neighbours of the wanted markers."""
+    """Where the wanted markers lie by their neighbours in two rings, themselves not counted.
+
+    Returns:
+        (M, 2) places in px; (M,) the variance per axis that the fit leaves in its neighbours, px^2; (M,) the
+        leverage, by which the neighbours' own errors are multiplied; (M,) the number of neighbours. NaN where
+        the neighbours are too few or on a line.
+    """
     count = xy_px.shape[0]
     place = np.full((count, 2), np.nan)
     variance = np.full(count, np.nan)
@@ -244,20 +238,3 @@ def _left_by_cubic(rows, seen):  # type: ignore[no-untyped-def]
                 miss -= rows[k, a] * sides[axis, a]
             squares += miss * miss
     return squares / (2.0 * (rows.shape[0] - CUBIC))
-
-
-def predict(
-    xy_px: NDArray[np.float64],
-    wanted: NDArray[np.bool_],
-    marker_mm: NDArray[np.float64],
-    table: NDArray[np.int32],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
-    """Where the wanted markers lie by their neighbours in two rings, themselves not counted.
-
-    Returns:
-        (M, 2) places in px; (M,) the variance per axis that the fit leaves in its neighbours, px^2; (M,) the
-        leverage, by which the neighbours' own errors are multiplied; (M,) the number of neighbours. NaN where
-        the neighbours are too few or on a line.
-    """
-    result: tuple[Any, Any, Any, Any] = predicted(np.ascontiguousarray(xy_px), wanted, marker_mm, table)
-    return result

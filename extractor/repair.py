@@ -65,8 +65,7 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
     if sound:
         return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
     tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
-    status = _fill(xy, cov, _filled(edge_px, lattice.neighbours), places.xy_px, *tables, size)
-    return Repaired(xy, cov, status)
+    return Repaired(xy, cov, _fill(xy, cov, edge_px, places.xy_px, *tables, size))
 
 
 @compiled
@@ -88,25 +87,30 @@ def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size)
     """Write the places and covariances of the lost markers that can be told, NaN for those outside the image; (M,)
     uint8 the status of all."""
     lost = np.isnan(xy[:, 0])
-    if lost.any():
-        near = predicted(xy, lost, marker_mm, table)
-        nearer = predicted(xy, lost, marker_mm, ring)[0]
-        bent = cubic_variance(xy, lost, marker_mm, table)
-        along, doubt = by_layer(xy, layers)
     status = np.where(lost, LOST, MEASURED)
-    for m in range(xy.shape[0]):
-        if lost[m] and present[m]:
+    lost &= present
+    edge, known = _filled(edge, table), xy.copy()
+    if lost.any():
+        near = predicted(known, lost, marker_mm, table)
+        nearer = predicted(known, lost, marker_mm, ring)[0]
+        for m in np.flatnonzero(lost):
             variance = _by_neighbours(m, near, nearer, edge[m])
             xy[m], status[m] = near[0][m], REPAIRED
             if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
                 variance, xy[m] = _by_cells(m, near, implied, edge[m], size), implied[m]
-            if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
-                variance, xy[m] = _in_whole_rings(bent[m], edge[m]), near[0][m]
+            lost[m] = not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size))
+            cov[m] = variance * np.eye(2)
+    if lost.any():  # what says less, and takes longer, is asked only of these
+        bent = cubic_variance(known, lost, marker_mm, table)
+        along, doubt = by_layer(known, layers)
+        for m in np.flatnonzero(lost):
+            variance, xy[m] = _in_whole_rings(bent[m], edge[m]), near[0][m]
             if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
                 variance, xy[m], status[m] = _by_layer(doubt[m], edge[m]), along[m], FITTED
             cov[m] = variance * np.eye(2)
-        if not (cov[m, 0, 0] >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
-            xy[m], cov[m], status[m] = np.nan, np.nan, LOST
+    for n in range(xy.shape[0]):
+        if not (cov[n, 0, 0] >= 0.0 and inside(xy[n, 0], xy[n, 1], size)):
+            xy[n], cov[n], status[n] = np.nan, np.nan, LOST
     return status
 
 

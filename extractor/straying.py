@@ -8,6 +8,7 @@ bent sharply, at the rim of an object or where it slips, moves from one gridline
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,9 @@ from numpy.typing import NDArray
 from .bending import third_difference
 from .engine import compiled
 from .fit import Fit
-from .gridlines import FIRST_RING
+from .gridlines import FIRST_RING, continued
 from .placing import MAX_APART, Places
 from .sight import Sight
-from .step import completed
 from .topology import Topology
 
 DOUBTED = 0.55  # mean trust in the gridlines read at a marker, below which it is doubted
@@ -39,21 +39,47 @@ def collected(
 ) -> tuple[Fit, Places]:
     """The fit and the places (of the full image), those that dirt has led astray put where their neighbours say;
     ``trusted`` (E,) is how far gridlines look as they should."""
-    known = np.where(fit.beyond[:, None], np.nan, fit.guiding)
-    strays, doubted = astray(mesh, fit, known, trusted, places.edge_px / view.scale)
-    led = strays | (doubted & ~places.agreed)
-    if not led.any():
+    assert fit.reading is not None
+    of_fit = fit.measured, fit.guiding, fit.beyond, fit.maps
+    of_places = places.xy_px, places.edge_px, places.agreed, places.whole
+    doubted, some = doubted_ones(trusted, fit.reading.use, mesh.spokes)
+    if not some:
         return fit, places
-    xy = np.where(led[:, None], np.nan, known)
-    for _ in range(RINGS):
-        xy = completed(mesh, xy)[0]
-    led &= np.isfinite(xy[:, 0])
-    at = led[:, None]
-    fit = fit._replace(measured=np.where(at, xy, fit.measured), guiding=np.where(at, xy, fit.guiding))
-    here = np.where(at, view.full(xy), places.xy_px)
-    with np.errstate(invalid="ignore"):
-        apart = np.linalg.norm(here - places.xy_px, axis=1) > MAX_APART * places.edge_px
-    return fit, replace(places, xy_px=here, agreed=places.agreed & ~apart, whole=places.whole & ~led)
+    led, measured, guiding, xy, agreed, whole = _collected(
+        of_fit, of_places, doubted, view.scale, _lattice(mesh), mesh.offset, mesh.stencil
+    )
+    if not led:
+        return fit, places
+    fit = fit._replace(measured=measured, guiding=guiding)
+    return fit, replace(places, xy_px=xy, agreed=agreed, whole=whole)
+
+
+@compiled
+def _collected(of_fit, of_places, doubted, scale, lattice, offset, stencil):  # type: ignore[no-untyped-def]
+    """Whether any markers were led astray; ``measured`` and ``guiding`` of the fit and ``xy_px``, ``agreed`` and
+    ``whole`` of the places, those put where their neighbours say."""
+    measured, guiding, beyond, maps = of_fit
+    start, edge, agreed, whole = of_places
+    known = guiding.copy()
+    known[beyond] = np.nan
+    led = straying(known, maps, doubted, edge / scale, *lattice)
+    led |= doubted & ~agreed
+    if not np.any(led):
+        return False, measured, guiding, start, agreed, whole
+    measured, guiding, start = measured.copy(), guiding.copy(), start.copy()
+    agreed, whole = agreed.copy(), whole.copy()
+    known[led] = np.nan
+    xy = continued(known, lattice[-1], offset, stencil, RINGS)
+    for m in np.flatnonzero(led):
+        if not np.isfinite(xy[m, 0]):
+            continue
+        measured[m], guiding[m] = xy[m], xy[m]
+        x, y = (xy[m, 0] + 0.5) * scale - 0.5, (xy[m, 1] + 0.5) * scale - 0.5
+        apart = np.sqrt((x - start[m, 0]) ** 2 + (y - start[m, 1]) ** 2)
+        agreed[m] &= not apart > MAX_APART * edge[m]
+        whole[m] = False
+        start[m, 0], start[m, 1] = x, y
+    return True, measured, guiding, start, agreed, whole
 
 
 def astray(
@@ -66,24 +92,28 @@ def astray(
     """(M,) which of the markers ``xy`` (M, 2) strayed, and (M,) which have gridlines that look unlike the pattern;
     without any of these, none strayed."""
     assert fit.reading is not None
-    doubted, some = doubted_ones(trusted, fit.reading.use > 0.0, mesh.spokes)
+    doubted, some = doubted_ones(trusted, fit.reading.use, mesh.spokes)
     if not some:
         return doubted, doubted
-    lattice = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.onward, mesh.near
-    return straying(xy, fit.maps, doubted, edge_px, *lattice), doubted
+    return straying(xy, fit.maps, doubted, edge_px, *_lattice(mesh)), doubted
+
+
+def _lattice(mesh: Topology) -> tuple[NDArray[Any], ...]:
+    """What ``straying`` needs of the mesh."""
+    return mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.onward, mesh.near
 
 
 @compiled
-def doubted_ones(use, read, spokes):  # type: ignore[no-untyped-def]
-    """(M,) bool: markers whose gridlines, of those that were ``read`` (E,), are little trusted (``use``); and whether
-    there are any."""
+def doubted_ones(trusted, use, spokes):  # type: ignore[no-untyped-def]
+    """(M,) bool: markers whose gridlines, of those in ``use`` (E,), are little ``trusted`` (E,); and whether there are
+    any."""
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
         total, count = 0.0, 0
         for k in range(spokes.shape[1]):
             e = spokes[m, k]
-            if e >= 0 and read[e]:
-                total += use[e]
+            if e >= 0 and use[e] > 0.0:
+                total += trusted[e]
                 count += 1
         out[m] = total < DOUBTED * count
     return out, np.any(out)
@@ -100,7 +130,7 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
     move, far, alike = np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)
     bent = np.empty((edges.shape[0], 2))
     for _ in range(ROUNDS):
-        _third_differences(out, maps, edges, ahead, third, bent)
+        _third_differences(out, anew, maps, edges, ahead, third, bent)
         _ask(bent, anew, edges, ahead, spokes, onward, move, far, alike)
         anew[:] = False
         for m in range(count):
@@ -124,12 +154,14 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
 
 
 @compiled
-def _third_differences(xy, maps, edges, ahead, third, out):  # type: ignore[no-untyped-def]
-    """Fill in (E, 2) px, NaN where one of the four markers along a gridline is not known."""
+def _third_differences(xy, anew, maps, edges, ahead, third, out):  # type: ignore[no-untyped-def]
+    """Fill in (E, 2) px along the gridlines with an end that is ``anew`` (M,), NaN where one of the four markers along
+    a gridline is not known."""
     for e in range(edges.shape[0]):
-        out[e, 0], out[e, 1] = np.nan, np.nan
-        if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
-            out[e, 0], out[e, 1] = third_difference(xy, maps, edges, ahead, third, e)
+        if anew[edges[e, 0]] or anew[edges[e, 1]]:
+            out[e, 0], out[e, 1] = np.nan, np.nan
+            if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
+                out[e, 0], out[e, 1] = third_difference(xy, maps, edges, ahead, third, e)
 
 
 @compiled

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, inlined
 from .near import bucketed, nearest
 
 SHARED = 0.3  # of the shorter edge, between the corners of two triangles at one marker
@@ -29,7 +29,7 @@ def edge_of(area):  # type: ignore[no-untyped-def]
     return np.sqrt(area * 4.0 / np.sqrt(3.0))
 
 
-@compiled
+@inlined
 def own_map(center, corner, i, arms, u, turn, step):  # type: ignore[no-untyped-def]
     """The image step per layout step, row by row, that carries the arms of the layout's cell u onto cell i's triangle,
     counted from ``turn``."""
@@ -50,6 +50,13 @@ def touching(center, corner, area, whole, cell, seen_as, plan, step):  # type: i
     """(N, 6) int32, the whole numbered cells that are a whole numbered cell's neighbours and share that corner with it
     by which they are, or -1; close by where a triangle is missing."""
     out = np.full((cell.shape[0], 6), -1, np.int32)
+    touch(np.ones(cell.shape[0], np.bool_), center, corner, area, whole, cell, seen_as, plan, step, out)
+    return out
+
+
+@compiled
+def touch(fresh, center, corner, area, whole, cell, seen_as, plan, step, out):  # type: ignore[no-untyped-def]
+    """Write, in place, what ``fresh`` cells (N,), numbered now, add to what ``touching`` gave."""
     for i in range(cell.shape[0]):
         if cell[i] < 0 or not whole[i]:
             continue
@@ -58,12 +65,11 @@ def touching(center, corner, area, whole, cell, seen_as, plan, step):  # type: i
             if v < 0 or seen_as[v] < 0 or not whole[seen_as[v]]:
                 continue
             j = seen_as[v]
-            if _touch(center, corner, area, i, j, cell[i], v, k, plan, step):
+            if (fresh[i] or fresh[j]) and _touch(center, corner, area, i, j, cell[i], v, k, plan, step):
                 out[i, k], out[j, k + 3] = j, i
-    return out
 
 
-@compiled
+@inlined
 def _touch(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-untyped-def]
     """Whether cells i and j, if they are the layout's u and its neighbour v along k, touch as these do."""
     edge = edge_of(min(area[i], area[j]))
@@ -83,7 +89,7 @@ def _touch(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-
     return False
 
 
-@compiled
+@inlined
 def _leads(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-untyped-def]
     """Whether cell i's triangle, counted from its turn, carries the way from u to v in the layout near cell j."""
     a, b, c, d = own_map(center, corner, i, plan.arms_mm, u, turn, step)

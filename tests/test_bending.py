@@ -20,7 +20,6 @@ from extractor import Extractor, Status, parse_layout
 from extractor.bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
 from extractor.dropping import _drop_slid, _slid
 from extractor.gridlines import KNOWN, LENGTH, UX, local_maps
-from extractor.placing import Places
 from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, SUMS, A, B, C, D
 from extractor.tables import lattice_of
 from extractor.topology import Topology, topology_of
@@ -164,10 +163,9 @@ def test_a_corner_of_the_rim_that_slid_is_not_believed(
     found[corner] += found_off
     cov = np.tile(1e-4 * np.eye(2), (count, 1, 1))
     all_agree = np.full(count, agreed)
-    places = Places(found, np.full(count, 20.0), np.empty((0, 3), np.int32), all_agree, all_agree)
-    after = xy.copy()
-    slid = _slid(after, cov, np.full(count, free_px), found, places.edge_px, lattice.rim)
-    _drop_slid(after, cov, slid, places, lattice)
+    after, edge = xy.copy(), np.full(count, 20.0)
+    slid = _slid(after, cov, np.full(count, free_px), found, edge, lattice.rim)
+    _drop_slid(after, cov, slid, found, edge, all_agree, lattice.neighbours, lattice.inner, lattice.marker_mm)
     others = np.arange(count) != corner
     np.testing.assert_array_equal(after[others], flat[others])
     wanted = {"found": found[corner], "refined": xy[corner], "lost": [np.nan, np.nan]}[expected]

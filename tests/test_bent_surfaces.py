@@ -13,7 +13,7 @@ from cmpdesign.scene.standard import standard_layout
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
 from extractor.cells import Cells
-from extractor.dropping import _drop_slid
+from extractor.dropping import _drop_slid, _slid
 from extractor.fit import Refined
 from extractor.neighbourhood import MIN_CUBIC, MIN_QUADRATIC, cubic_variance
 from extractor.numbering import Numbering
@@ -122,8 +122,9 @@ def test_only_from_a_guess_a_corner_of_the_rim_may_slide(agreed: bool, off_px: f
     xy, cov = flat.copy(), np.tile(1e-4 * np.eye(2), (len(flat), 1, 1))
     xy[corner, 0] += off_px
     all_agree = np.full(len(flat), agreed)
-    places = Places(flat, np.full(len(flat), EDGE_PX), np.empty((0, 3), np.int32), all_agree, all_agree)
-    _drop_slid(xy, cov, np.ones(len(flat)), places, lattice())
+    edge, table = np.full(len(flat), EDGE_PX), lattice()
+    slid = _slid(xy, cov, np.ones(len(flat)), flat, edge, table.rim)
+    _drop_slid(xy, cov, slid, flat, edge, all_agree, table.neighbours, table.inner, table.marker_mm)
     if kept:
         assert xy[corner, 0] == flat[corner, 0] + off_px
         assert np.sqrt(cov[corner, 0, 0]) == pytest.approx(0.5 * off_px, rel=0.01)

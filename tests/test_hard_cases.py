@@ -41,7 +41,7 @@ from extractor.fit import Refined
 from extractor.information import covariances, solve
 from extractor.meeting import overlap
 from extractor.mesh import build_mesh
-from extractor.neighbourhood import predict
+from extractor.neighbourhood import predicted
 from extractor.placing import Places
 from extractor.presets import PRESETS
 from extractor.regions import grow
@@ -383,16 +383,16 @@ def test_quadratics_through_too_few_or_repeated_points_are_refused() -> None:
     for known in range(19):
         xy = np.full_like(mm, np.nan)
         xy[table[0, :known]] = 20.0 * mm[table[0, :known]]
-        place = predict(xy, wanted, mm, table)[0][0]
+        place = predicted(xy, wanted, mm, table)[0][0]
         assert np.isnan(place).all() or np.abs(place - 20.0 * mm[0]).max() < 1e-6
         assert known >= 4 or np.isnan(place).all()
     line = np.abs(mm[table[0], 1]) < 1e-9
     xy = np.full_like(mm, np.nan)
     xy[table[0][line]] = mm[table[0][line]]
-    assert np.isnan(predict(xy, wanted, mm, table)[0]).all()
+    assert np.isnan(predicted(xy, wanted, mm, table)[0]).all()
     repeated = np.repeat(table[:, :1], table.shape[1], axis=1)
-    assert np.isnan(predict(20.0 * mm, wanted, mm, repeated)[0]).all()
-    assert np.isfinite(predict(np.full_like(mm, 7.0), wanted, mm, table)[0][0]).all()
+    assert np.isnan(predicted(20.0 * mm, wanted, mm, repeated)[0]).all()
+    assert np.isfinite(predicted(np.full_like(mm, 7.0), wanted, mm, table)[0][0]).all()
 
 
 def test_a_layer_with_few_markers_left_is_not_invented() -> None:
