@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import hidden_misfit
-from .drawn import Board, Drawing, drawn, drawn_again, room_for
+from .drawn import Board, Drawing, drawn, drawn_again, room_for, usual_length
 from .engine import compiled
 from .fit import Fit
 from .levels import level_change, rebled
 from .offsets import Reading, foot_of
 from .presets import Steps
+from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_deviation
 from .sight import Frame, Sight
-from .step import Judged, listened, moved_on, placed, roughened, solution
+from .step import Judged, lines_of, listened, moved_on, placed, roughened, solution
 from .stepping import middles, trust, votes, widening
 from .synthesis import edge_contrasts
 from .topology import Topology
@@ -31,15 +32,19 @@ SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is k
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
 NOISY_BLUR, NOISY_LEVELS = 0.5, 0.12  # of how far noise moves these, in units of the blur
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
-SMALL_BLUR = 0.12  # of an edge; beyond that, blur, levels and places settle together;
+SMALL_BLUR = 0.12  # of a short edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
 MANY_BENT = 0.25  # of them, each step bends others. Then
 HARD_EFFORT = 3.0  # times the effort is allowed
-LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
-USUAL_EDGE_PX = 10.0
+WIDE_BLUR = 0.1  # of a usual edge: where neighbours' errors look like bending
 # Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
 # UNMIXED of an edge, times MIXED (rendered patterns), and at most by
 MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
+# Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
+# patterns, shifted), and at most by
+OVERLAP, MOST_OVERLAP = 6.75, 0.4
+# Where no fewer markers move after so many more steps, what moves them is nothing that a drawing could explain.
+PATIENCE = 1
 MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -62,26 +67,45 @@ class Draughtsman:
 
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
-        fit, drawing = self._first(view, roughened(self._mesh, fit))
-        size = drawing.edge_px
-        spent, wide = _effort(size), drawing.sigma > SMALL_BLUR * edge_px
+        wide = self._wide(fit, edge_px)
+        fit, drawing = self._first(view, self._free(fit, wide))
+        size, least, tries = drawing.edge_px, len(fit.xy), 0
+        spent = effort(size)
         for step in range(MAX_STEPS - 1):
+            fit = _farther(fit, drawing) if wide else fit
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
-            hard = wide or bent_share(fit.bend, BENT * edge_px) > MANY_BENT
-            few = 0.0 if hard else steps.few
-            anew, moving = still_moving(*about, near, steps.enough, few, self._mesh.edges)
-            everything = _looks_other(fit, drawing, steps.enough) or moving > MAX_AGAIN * len(anew)
-            spent += _effort(size, None if everything else moving / len(anew))
+            hard = not wide and _settles_slowly(fit, edge_px)
+            anew, moving = still_moving(
+                *about, near, steps.enough, 0.0 if hard else steps.few, self._mesh.edges
+            )
+            other = _looks_other(fit, drawing, steps.enough)
+            everything = other or moving > MAX_AGAIN * len(anew)
+            spent += effort(size, None if everything else moving / len(anew))
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
-            if not (everything or moving) or (step > 0 and spent > allowed):
+            tries = tries + 1 if moving >= least and not other else 0
+            if not (everything or moving) or tries > PATIENCE or (step > 0 and spent > allowed):
                 break
-            fit = roughened(self._mesh, placed(self._mesh, fit))
-            if everything:
-                fit, drawing = self._first(view, fit)
-            else:
-                fit, drawing = self._again(view, fit, drawing, anew)
-        return fit._replace(unsettled=unsettled(fit.measured - drawing.xy, drawing.sigma))
+            least = min(least, len(fit.xy) if other else moving)
+            fit = self._free(placed(self._mesh, fit), wide)
+            fit, drawing = self._first(view, fit) if everything else self._again(view, fit, drawing, anew)
+        else:
+            fit = _farther(fit, drawing) if wide else fit
+        slow = SLOW * (drawing.sigma / size) ** 2 if wide else 0.0
+        return fit._replace(unsettled=unsettled(fit.measured - drawing.xy, drawing.sigma, slow))
+
+    def _wide(self, fit: Fit, edge_px: float) -> bool:
+        """Whether a usual edge is blurred into the next; ``edge_px`` is a short one."""
+        if fit.sigma < WIDE_BLUR * edge_px:
+            return False
+        return bool(fit.sigma > WIDE_BLUR * usual_length(lines_of(self._mesh, fit)))
+
+    def _free(self, fit: Fit, wide: bool) -> Fit:
+        """The fit with how freely its gridlines may bend: not at all where the blur is ``wide``. There they would
+        follow what the markers beside them still lack, and these would hardly move."""
+        if wide:
+            return fit._replace(rough=np.zeros_like(fit.rough), bend=np.zeros_like(fit.bend))
+        return roughened(self._mesh, fit)
 
     def _first(self, view: Sight, fit: Fit) -> tuple[Fit, Drawing]:
         """A step from everything."""
@@ -144,10 +168,16 @@ def _step(seen, changes, now, tables, frame):  # type: ignore[no-untyped-def]
     return (sums, use, loose, foot_of(contrasts, black, off), noise) + step
 
 
-def _effort(size_px: float, share: float | None = None) -> float:
-    """What a step costs, 1 for everything with edges of ``USUAL_EDGE_PX``: from everything, or around a share of it."""
-    pixels = min((size_px / USUAL_EDGE_PX) ** 2, 4.0)
-    return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
+def _farther(fit: Fit, drawing: Drawing) -> Fit:
+    """The fit after a step that goes as far as it would have gone, did gridlines not overlap."""
+    hidden = min(OVERLAP * (drawing.sigma / drawing.edge_px) ** 2, MOST_OVERLAP)
+    more = hidden / (1.0 - hidden) * (fit.measured - drawing.xy)
+    return fit._replace(measured=fit.measured + more, guiding=fit.guiding + more)
+
+
+def _settles_slowly(fit: Fit, edge_px: float) -> bool:
+    """Whether some gridlines are much blurred for their length, or many are bent; ``edge_px`` is a short edge."""
+    return fit.sigma > SMALL_BLUR * edge_px or bool(bent_share(fit.bend, BENT * edge_px) > MANY_BENT)
 
 
 def _looks_other(fit: Fit, drawing: Drawing, enough: float) -> bool:
@@ -159,57 +189,3 @@ def _looks_other(fit: Fit, drawing: Drawing, enough: float) -> bool:
         return False
     noise = enough * usual_deviation(fit.information.diagonal) / drawing.sigma
     return bool(blur > max(SAME_BLUR, NOISY_BLUR * noise) or levels > max(SAME_LEVELS, NOISY_LEVELS * noise))
-
-
-@compiled
-def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them; and how many these are. None where no more than ``few`` (a share of all) move."""
-    count = drawn.shape[0]
-    moving, found = np.zeros(count, np.bool_), 0
-    for m in range(count):
-        dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
-        moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
-        found += moving[m]
-    if found <= few * count:
-        return np.zeros(count, np.bool_), 0
-    out = moving.copy()
-    beside(moving, edges, out)
-    return out, np.sum(out)
-
-
-@compiled
-def usual_deviation(diagonal):  # type: ignore[no-untyped-def]
-    """The markers' median standard deviation, px, by their blocks of the information (M, 3), all others known."""
-    return np.sqrt(2.0 / np.median(diagonal[:, 0] + diagonal[:, 2]))
-
-
-@compiled
-def bent_share(bend, limit):  # type: ignore[no-untyped-def]
-    """The share of gridlines that bend (E, 2) by more than a limit, px."""
-    many = 0
-    for e in range(bend.shape[0]):
-        many += max(abs(bend[e, 0]), abs(bend[e, 1])) > limit
-    return many / bend.shape[0]
-
-
-@compiled
-def unsettled(shift, sigma):  # type: ignore[no-untyped-def]
-    """(M, 2, 2) px^2, what the last step may have left of a ``shift`` (M, 2) from where the markers are drawn: the
-    drawing answers to shifts of the size of the blur as it would to smaller ones."""
-    out = np.zeros((shift.shape[0], 2, 2))
-    for m in range(shift.shape[0]):
-        x, y = shift[m, 0], shift[m, 1]
-        share = min(LEFT * np.hypot(x, y) / sigma, MOST_LEFT)
-        out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
-        out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
-    return out
-
-
-@compiled
-def beside(which, edges, out):  # type: ignore[no-untyped-def]
-    """Add to ``out`` (M,) the markers with a gridline to one of ``which`` (M,)."""
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        out[a] |= which[b]
-        out[b] |= which[a]

@@ -24,6 +24,7 @@ BLACK, WHITE = 3, 4
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
 DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
+DISC_BEFORE = 0.43  # where nothing is drawn yet, and the neighbours' ink reaches into it
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
 MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
@@ -62,7 +63,8 @@ def _disc(a, b, c, sigma):  # type: ignore[no-untyped-def]
     around += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
     around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
     inscribed = area / max(around, 1e-9)
-    return inscribed, max(min(DISC * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
+    most = DISC if sigma == 0.0 else DISC_BEFORE
+    return inscribed, max(min(most * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
 
 
 @compiled
@@ -311,13 +313,33 @@ def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64],
     A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
     (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
     """
-    own = np.clip(np.where(np.isfinite(share), share, usual), -MAX_SHARE, MAX_SHARE)[:, None]
-    inks = [levels.cell[color == ink] for ink in range(BLACK)]
-    total = sum(np.median(ink, axis=0) for ink in inks if len(ink)) / (1.0 - 6.0 * min(usual, MAX_SHARE))
-    black = levels.black.copy()
-    black[:, 0] -= min(usual, MAX_SHARE) * total
-    cell = (levels.cell + own * total) / (1.0 - 3.0 * own)
-    return levels._replace(cell=cell, slope=levels.slope / (1.0 - 3.0 * own[:, :, None]), black=black)
+    cell, slope, black = _unbled(levels.cell, levels.slope, levels.black, color, share, usual)
+    return levels._replace(cell=cell, slope=slope, black=black)
+
+
+@compiled
+def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped-def]
+    cell, slope, black = cell.copy(), slope.copy(), black.copy()
+    total, own = np.zeros(3), np.empty(cell.shape[0])
+    usual = min(usual, MAX_SHARE)
+    for ink in range(BLACK):
+        for channel in range(3):
+            count = 0
+            for i in range(cell.shape[0]):
+                if color[i] == ink:
+                    own[count] = cell[i, channel]
+                    count += 1
+            if count > 0:
+                total[channel] += np.median(own[:count]) / (1.0 - 6.0 * usual)
+    for i in range(cell.shape[0]):
+        bleeding = min(max(share[i] if np.isfinite(share[i]) else usual, -MAX_SHARE), MAX_SHARE)
+        for channel in range(3):
+            cell[i, channel] = (cell[i, channel] + bleeding * total[channel]) / (1.0 - 3.0 * bleeding)
+            slope[i, channel, 0] /= 1.0 - 3.0 * bleeding
+            slope[i, channel, 1] /= 1.0 - 3.0 * bleeding
+    for channel in range(3):
+        black[channel, 0] -= usual * total[channel]
+    return cell, slope, black
 
 
 def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float) -> Levels:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import HIDDEN, around
-from .drawing import SMALL_BLUR, Draughtsman, beside
+from .drawing import SMALL_BLUR, Draughtsman
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .information import Information, covariances
@@ -20,9 +20,10 @@ from .offsets import measure
 from .placing import AGREED, MAX_APART, Places
 from .presets import STEPS, Preset
 from .rounds import profiled
+from .settling import beside
 from .sight import Sight, Sights
 from .step import PRIOR_PX, completed, lines_of, placed, roughened
-from .stepping import SHORTEST, short_edges, trusted_markers
+from .stepping import MIN_NOISE, SHORTEST, short_edges, trusted_markers
 from .straying import astray, collected
 from .topology import Topology
 
@@ -30,8 +31,9 @@ SHARP_SIGMA_PX = (
     1.05  # of an image in focus, pixel included: it is looked at first at the scale that this allows
 )
 SHORT = 30  # one in so many gridlines may be smaller than that at a reduced scale
-MIN_EDGE_PX = 4.0  # edges at a reduced scale, and
-MIN_BLURRED_EDGE_PX = 6.5  # where blur makes one edge part of the next
+MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
+MIN_BLURRED_EDGE_PX = 6.5  # either these
+MIN_BLUR_PX = 0.65  # or that blur
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 # Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
@@ -72,16 +74,19 @@ class Refiner:
         view = sights.at(min(self._scale(SHARP_SIGMA_PX, usual), 2))
         fit, sides, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, usual)
-        if scale != view.scale:
+        if scale > view.scale:
+            fit, sides = coarser(fit, sides, view, sights.at(scale))
+        elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
-            view = sights.at(scale)
-            fit, sides, places = self._begin(view, places, xy)
-        return self._finish(view, fit, sides, places, edge)
+            fit, sides, places = self._begin(sights.at(scale), places, xy)
+        return self._finish(sights.at(scale), fit, sides, places, edge)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
-        least = MIN_EDGE_PX if sigma_px < SMALL_BLUR * edge_px else MIN_BLURRED_EDGE_PX
-        return max(1, min(int(sigma_px / self._steps.finest), int(edge_px / least)))
+        scale = min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX))
+        if sigma_px > SMALL_BLUR * edge_px:
+            scale = min(scale, max(int(sigma_px / MIN_BLUR_PX), int(edge_px / MIN_BLURRED_EDGE_PX)))
+        return max(1, scale)
 
     def _begin(
         self, view: Sight, places: Places, start: NDArray[np.float64], before: Seen | None = None
@@ -94,19 +99,9 @@ class Refiner:
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
         seen = before or first_look(view, mesh, xy)
-        about = (
-            seen.sigma,
-            seen.noise,
-            seen.levels,
-            seen.grain,
-            nothing,
-            smooth,
-            stiff,
-            straight,
-            smooth,
-            None,
-        )
-        fit = Fit(xy, xy, xy, beyond, maps, *about)
+        about = seen.sigma, seen.noise, seen.levels, seen.grain
+        free = smooth, stiff, straight, smooth
+        fit = Fit(xy, xy, xy, beyond, maps, *about, nothing, *free, None)
         lines = lines_of(mesh, fit)
         sides = across(view, mesh, fit, lines)
         if before is None:
@@ -187,6 +182,28 @@ class Refiner:
         if fit.unsettled is not None:
             cov += fit.unsettled
         return xy, cov
+
+
+def coarser(fit: Fit, sides: Across, finer: Sight, view: Sight) -> tuple[Fit, Across]:
+    """What a round of profiles left, in a view of a larger scale: what is so blurred needs no second round there."""
+    ratio = finer.scale / view.scale
+    # a pixel's own variance is a twelfth of its area
+    blur2 = (finer.scale * fit.sigma) ** 2 + (view.scale**2 - finer.scale**2) / 12.0
+    room = sides.room.copy()
+    room[:, 0] *= ratio
+    fit = fit._replace(
+        xy=view.reduced(finer.full(fit.xy)),
+        measured=view.reduced(finer.full(fit.measured)),
+        guiding=view.reduced(finer.full(fit.guiding)),
+        maps=ratio * fit.maps,
+        sigma=float(np.sqrt(blur2)) / view.scale,
+        noise=max(ratio * fit.noise, MIN_NOISE),
+        grain=max(ratio * fit.grain, MIN_NOISE),
+        levels=fit.levels._replace(slope=fit.levels.slope / ratio),
+        bend=ratio * fit.bend,
+        information=Information(fit.information.diagonal / ratio**2, fit.information.beside / ratio**2),
+    )
+    return fit, sides._replace(room=room)
 
 
 @compiled

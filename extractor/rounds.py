@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import bending_ones
-from .drawn import touching
 from .engine import compiled
 from .fit import Across, Fit
 from .matched import read_profiles
 from .offsets import Reading
+from .settling import touching
 from .sight import Sight
 from .step import Judged, listened, moved_on, solution
 from .stepping import trust

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,11 +57,34 @@ def _sight(image: NDArray[np.uint8], scale: int) -> Sight:
     if scale == 2:
         image = _halved(image)
     elif scale > 1:
-        width, height = image.shape[1] // scale, image.shape[0] // scale
-        whole = image[: height * scale, : width * scale]
-        image = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
+        image = _averaged(image, scale)
     height, width = image.shape[:2]
     return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
+
+
+@compiled
+def _averaged(image, scale):  # type: ignore[no-untyped-def]
+    """The means of ``scale`` x ``scale`` pixels, halves rounded up; what is left over at the rims is cut off."""
+    height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
+    out = np.empty((height, width, 3), np.uint8)
+    flat, means = image.reshape(-1), out.reshape(-1)
+    column = np.empty(row, np.uint16)  # a sum of up to 256 rows
+    three, size = np.uint64(3), np.uint64(scale)
+    half, share = np.float32(0.5), np.float32(1.0 / scale**2)
+    for y in range(height):
+        column[:] = np.uint16(0)
+        for k in range(scale):
+            line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
+            for i in range(row):
+                column[i] += np.uint16(line[i])
+        own = means[3 * y * width : 3 * (y + 1) * width]
+        for x in range(np.uint64(width)):
+            for channel in range(three):
+                at, total = x * three * size + channel, np.uint32(0)
+                for k in range(size):
+                    total += np.uint32(column[at + k * three])
+                own[x * three + channel] = np.uint8(np.float32(total) * share + half)
+    return out
 
 
 @compiled

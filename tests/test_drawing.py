@@ -17,11 +17,12 @@ from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, compo
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout, refine
-from extractor.drawing import Draughtsman, beside, still_moving, unsettled
-from extractor.drawn import Drawing, chosen, touching
+from extractor.drawing import Draughtsman
+from extractor.drawn import Drawing, chosen
 from extractor.levels import Levels, bled, rebled, unbled
 from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
 from extractor.presets import STEPS
+from extractor.settling import beside, still_moving, touching, unsettled
 
 SIZE = (300, 260)
 LAYERS = 5
@@ -118,9 +119,20 @@ def test_no_image_takes_more_than_its_preset_allows(preset: str, monkeypatch: py
 def test_what_a_step_left_grows_with_it(share: float, angle: float, sigma: float) -> None:
     """A tenth of the blur leaves a hundredth; never more than half of the step; along it, and symmetric."""
     along = np.array([np.cos(angle), np.sin(angle)])
-    left = unsettled((share * sigma * along)[None], sigma)[0]
+    left = unsettled((share * sigma * along)[None], sigma, 0.0)[0]
     expected = min(share, 0.5) * share * sigma
     np.testing.assert_allclose(left, expected**2 * np.outer(along, along), atol=1e-12)
+
+
+def test_where_blur_is_wide_a_share_of_a_usual_step_is_left_everywhere() -> None:
+    rng = np.random.default_rng(0)
+    shift = 0.01 * rng.normal(size=(4000, 2))
+    shift[0] = np.nan  # of a marker that is not known
+    more = unsettled(shift, 1.0, 0.5) - unsettled(shift, 1.0, 0.0)
+    np.testing.assert_allclose(
+        more[1:], np.broadcast_to((0.5 * 0.01) ** 2 * np.eye(2), (3999, 2, 2)), rtol=0.1
+    )
+    assert (unsettled(shift, 1.0, 3.0)[1:] == unsettled(shift, 1.0, 1.0)[1:]).all()
 
 
 def test_moving_markers_bring_their_neighbours() -> None:

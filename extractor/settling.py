@@ -1,0 +1,89 @@
+"""When steps by synthesis end: what still moves, what another step costs, and what is left where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .engine import compiled
+
+USUAL_EDGE_PX = 10.0
+LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
+# Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
+SLOW = 20.0
+OF_MEDIAN = 1.44  # a mean of squares against their median
+
+
+def effort(size_px: float, share: float | None = None) -> float:
+    """What a step costs, 1 for everything with edges of ``USUAL_EDGE_PX``: from everything, or around a share of it."""
+    pixels = min((size_px / USUAL_EDGE_PX) ** 2, 4.0)
+    return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
+
+
+@compiled
+def still_moving(measured, drawn, strides, near, enough, few, edges):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
+    those beside them; and how many these are. None where no more than ``few`` (a share of all) move."""
+    count = drawn.shape[0]
+    moving, found = np.zeros(count, np.bool_), 0
+    for m in range(count):
+        dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
+        moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
+        found += moving[m]
+    if found <= few * count:
+        return np.zeros(count, np.bool_), 0
+    out = moving.copy()
+    beside(moving, edges, out)
+    return out, np.sum(out)
+
+
+@compiled
+def bent_share(bend, limit):  # type: ignore[no-untyped-def]
+    """The share of gridlines that bend (E, 2) by more than a limit, px."""
+    many = 0
+    for e in range(bend.shape[0]):
+        many += max(abs(bend[e, 0]), abs(bend[e, 1])) > limit
+    return many / bend.shape[0]
+
+
+@compiled
+def usual_deviation(diagonal):  # type: ignore[no-untyped-def]
+    """The markers' median standard deviation, px, by their blocks of the information (M, 3), all others known."""
+    return np.sqrt(2.0 / np.median(diagonal[:, 0] + diagonal[:, 2]))
+
+
+@compiled
+def unsettled(shift, sigma, slow):  # type: ignore[no-untyped-def]
+    """(M, 2, 2) px^2, what the last step may have left of a ``shift`` (M, 2) from where the markers are drawn: the
+    drawing answers to shifts of the size of the blur as it would to smaller ones. A share ``slow`` of a usual one is
+    left in any case."""
+    out, square = np.zeros((shift.shape[0], 2, 2)), np.empty(shift.shape[0])
+    for m in range(shift.shape[0]):
+        x, y = shift[m, 0], shift[m, 1]
+        square[m] = x * x + y * y
+        share = min(LEFT * np.sqrt(square[m]) / sigma, MOST_LEFT)
+        out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
+        out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
+    if slow > 0.0:
+        usual = 0.5 * min(slow, 1.0) ** 2 * OF_MEDIAN * np.nanmedian(square)
+        out[:, 0, 0] += usual
+        out[:, 1, 1] += usual
+    return out
+
+
+@compiled
+def beside(which, edges, out):  # type: ignore[no-untyped-def]
+    """Add to ``out`` (M,) the markers with a gridline to one of ``which`` (M,)."""
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        out[a] |= which[b]
+        out[b] |= which[a]
+
+
+@compiled
+def touching(which, groups):  # type: ignore[no-untyped-def]
+    """(G,) bool, the groups (G, n) of markers with one of ``which`` (M,) among them."""
+    out = np.zeros(groups.shape[0], np.bool_)
+    for g in range(groups.shape[0]):
+        for k in range(groups.shape[1]):
+            out[g] |= which[groups[g, k]]
+    return out
