@@ -87,7 +87,7 @@ class Draughtsman:
             if not (everything or moving) or tries > PATIENCE or (step > 0 and spent > allowed):
                 break
             least = min(least, len(fit.xy) if other else moving)
-            fit = self._free(placed(self._mesh, fit), wide)
+            fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)
             fit, drawing = self._first(view, fit) if everything else self._again(view, fit, drawing, anew)
         else:
             fit = _farther(fit, drawing) if wide else fit
@@ -124,37 +124,31 @@ class Draughtsman:
         changes = bettered.cell - levels.cell, bettered.black - levels.black
         now = fit.xy, fit.beyond, fit.rough, drawing.bend, fit.reading.use, fit.noise
         seen = drawing.lines, drawing.contrasts, drawing.black, drawing.sums, drawing.sigma
-        tables = mesh.edges, mesh.spokes, mesh.edge_cells
-        sums, use, loose, foot, noise, *step = _step(seen, changes, now, tables, tuple(frame))
+        tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
+        inks = bettered.cell, bettered.slope
+        read, wider, noise, *step = _step(seen, changes, inks, now, tables, tuple(frame))
+        use, loose, foot = read
         reading = Reading(drawing.lines, drawing.contrasts, foot, NO_ROOM, use, drawing.sigma, noise, True)
-        fit = moved_on(fit, step, loose=loose, reading=reading, noise=noise)
-        wider = self._widened(fit.xy, drawing, sums, use)
-        if max(wider, drawing.sigma) > UNMIXED * drawing.edge_px:
-            bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, wider)
-        return fit._replace(sigma=wider, levels=bettered)
-
-    def _widened(
-        self, xy: NDArray[np.float64], drawing: Drawing, sums: NDArray[np.float64], use: NDArray[np.float64]
-    ) -> float:
-        """The blur that the gridlines say, px."""
-        mesh, lines, bettered, sigma = self._mesh, drawing.lines, drawing.bettered, drawing.sigma
-        now = edge_contrasts(lines, xy, mesh.cells, mesh.edge_cells, bettered.cell, bettered.slope)
-        wider = widening(sums, use, drawing.contrasts, now, sigma)
-        wider /= 1.0 - min(max(MIXED * (sigma / drawing.edge_px - UNMIXED), 0.0), MOST_MIXED)
-        return max(sigma + float(np.clip(wider, -MAX_WIDEN * sigma, MAX_WIDEN * sigma)), MIN_SIGMA_PX)
+        sigma = _widened(drawing.sigma, drawing.edge_px, wider)
+        if max(sigma, drawing.sigma) > UNMIXED * drawing.edge_px:
+            bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, sigma)
+        about = {"loose": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
+        return moved_on(fit, step, **about)
 
 
 @compiled
-def _step(seen, changes, now, tables, frame):  # type: ignore[no-untyped-def]
-    """Sums without bending, use, looseness, foot and noise of what was ``seen``, and the solution.
+def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-def]
+    """Use, looseness and foot of what was ``seen``; by how much it says that the blur is larger; its noise; and the
+    solution.
 
     Args:
         seen: lines, contrasts, black, sums and blur of a drawing.
         changes: of the cells' levels (K, 3) and of the black's polynomial (3, 10) since.
+        inks: the levels now, and their slopes.
     """
     lines, contrasts, black, read, sigma = seen
     xy, beyond, rough, bend, before, noise = now
-    edges, spokes, edge_cells = tables
+    edges, spokes, cells, edge_cells = tables
     values, least, unjudged = JUDGED_BY_PIXELS
     sums = read.copy()
     cell_change, black_change = changes
@@ -165,7 +159,15 @@ def _step(seen, changes, now, tables, frame):  # type: ignore[no-untyped-def]
     noise = found if np.isfinite(found) else noise
     where = xy, beyond, edges, spokes, sigma, noise, True
     step = solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
-    return (sums, use, loose, foot_of(contrasts, black, off), noise) + step
+    current = edge_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
+    wider = widening(sums, use, contrasts, current, sigma)
+    return ((use, loose, foot_of(contrasts, black, off)), wider, noise) + step
+
+
+def _widened(sigma: float, edge_px: float, wider: float) -> float:
+    """The blur, px, where gridlines say that it is so much ``wider`` than was drawn."""
+    wider /= 1.0 - min(max(MIXED * (sigma / edge_px - UNMIXED), 0.0), MOST_MIXED)
+    return max(sigma + min(max(wider, -MAX_WIDEN * sigma), MAX_WIDEN * sigma), MIN_SIGMA_PX)
 
 
 def _farther(fit: Fit, drawing: Drawing) -> Fit:

@@ -18,6 +18,7 @@ from .fit import Fit
 from .gridlines import KNOWN, LENGTH, gridlines
 from .levels import Levels, black_at, cell_means, smoothed
 from .painting import Strokes, draw_cells, erase_cells, room_for_strokes
+from .settling import touching
 from .sight import Sight
 from .stepping import box_of, middles
 from .synthesis import clear, edge_contrasts, read_gridlines
@@ -157,16 +158,6 @@ def usual_length(lines):  # type: ignore[no-untyped-def]
     """The median length of the known gridlines (E, 8), px; 1 without any."""
     known = lines[lines[:, KNOWN] > 0.0, LENGTH]
     return np.median(known) if known.shape[0] > 0 else 1.0
-
-
-@compiled
-def touching(which, groups):  # type: ignore[no-untyped-def]
-    """(G,) bool, the groups (G, n) of markers with one of ``which`` (M,) among them."""
-    out = np.zeros(groups.shape[0], np.bool_)
-    for g in range(groups.shape[0]):
-        for k in range(groups.shape[1]):
-            out[g] |= which[groups[g, k]]
-    return out
 
 
 @compiled

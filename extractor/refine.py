@@ -144,7 +144,7 @@ class Refiner:
             xy[apart], cov[apart] = np.nan, np.nan
         lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
         if lost.any():
-            start = placed(self._mesh, fit._replace(unsettled=None))
+            start = placed(self._mesh, fit._replace(unsettled=None), lost)
             judged, use = self._judged(view, start, sides, lost)
             if use.any():
                 anew, wide = self._sure(judged, places, use)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .bending import bent, eliminate, freedom, roughness
 from .engine import compiled
 from .fit import Fit
-from .gridlines import KNOWN, extrapolate, gridlines, local_maps
+from .gridlines import FIRST_RING, KNOWN, extrapolate, gridlines, local_maps, maps_at
 from .information import Information, assemble, gradient, solve
 from .stepping import PRIOR_BEYOND_PX, moved, shown, strides, trust
 from .topology import Topology
@@ -47,9 +47,31 @@ def _completed(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
     return xy, beyond, maps
 
 
-def placed(mesh: Topology, fit: Fit) -> Fit:
-    """The fit with its pattern where the last step left the markers."""
-    xy, beyond, maps = completed(mesh, fit.guiding)
+@compiled
+def _completed_around(xy, which, maps, near, offset, stencil):  # type: ignore[no-untyped-def]
+    """The same with new maps at the markers ``which`` (M,) bool, and beside them."""
+    asked = which.copy()
+    for m in np.flatnonzero(which):
+        for k in range(FIRST_RING):
+            if near[m, k] >= 0:
+                asked[near[m, k]] = True
+    known = np.isfinite(xy[:, 0])
+    new, maps = maps_at(xy, asked & known, near, offset, stencil), maps.copy()
+    for n in range(xy.shape[0]):
+        if asked[n] or not known[n]:
+            maps[n] = new[n]
+    xy, beyond = extrapolate(xy, maps, near, offset)
+    return xy, beyond, maps
+
+
+def placed(mesh: Topology, fit: Fit, which: NDArray[np.bool_] | None = None) -> Fit:
+    """The fit with its pattern where the last step left the markers; if only gridlines at some are asked for (M,) bool,
+    the maps elsewhere stay as they were."""
+    if which is None:
+        xy, beyond, maps = completed(mesh, fit.guiding)
+    else:
+        about = fit.maps, mesh.near, mesh.offset, mesh.stencil
+        xy, beyond, maps = _completed_around(fit.guiding, which, *about)
     return fit._replace(xy=xy, beyond=beyond, maps=maps)
 
 
