@@ -44,20 +44,16 @@ def unbridged(
     """
     seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
     white = np.full(2, np.nan) if white_px is None else white_px
-    held = held_by(*seen, cell, white, lattice.plan, 1 if mirrored else 2)
+    plan, step = lattice.plan, 1 if mirrored else 2
+    beside = touching(*seen, cell, seen_as(cell, len(plan.ink)), plan, step)
+    held = held_in(*seen, cell, white, beside, plan, step)
     return np.asarray((cell >= 0) & ~held)
 
 
 @compiled
-def held_by(center, corner, area, whole, cell, white, plan, step):  # type: ignore[no-untyped-def]
-    """(N,) bool, the numbered cells that hold on to the reference's block; ``white`` is NaN where the outline told."""
-    beside = touching(center, corner, area, whole, cell, seen_as(cell, plan.ink.shape[0]), plan, step)
-    return held_in(center, corner, area, whole, cell, white, beside, plan, step)
-
-
-@compiled
 def held_in(center, corner, area, whole, cell, white, beside, plan, step):  # type: ignore[no-untyped-def]
-    """The same, by which cells touch (``beside``, as ``touching`` gives it)."""
+    """(N,) bool, the numbered cells that hold on to the reference's block; ``white`` is NaN where the outline told, and
+    ``beside`` the cells that touch, as ``touching`` gives it."""
     block = connected(beside, whole & (cell >= 0))
     sizes = np.zeros(block.max() + 1 if block.shape[0] > 0 else 0, np.int64)
     for i in range(block.shape[0]):

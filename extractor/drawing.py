@@ -44,7 +44,7 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
 # Where no fewer markers move after so many more steps, what moves them is nothing that a drawing could explain.
-PATIENCE = 1
+PATIENCE = 2
 MAX_STEPS = 10
 MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -84,7 +84,7 @@ class Draughtsman:
             spent += effort(size, None if everything else moving / len(anew))
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             tries = tries + 1 if moving >= least and not other else 0
-            if not (everything or moving) or tries > PATIENCE or (step > 0 and spent > allowed):
+            if not (everything or moving) or tries == PATIENCE or (step > 0 and spent > allowed):
                 break
             least = min(least, len(fit.xy) if other else moving)
             fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
 from .engine import compiled, vectorized
-from .sight import Frame
 from .topology import Topology
 
 INKS = 5  # red, green, blue, black, white
@@ -246,7 +245,15 @@ def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
 
 @compiled
 def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """What ``smooth_levels`` gives, one by one."""
+    """``Levels``, one by one, from the cells' own ones.
+
+    Args:
+        drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
+        black: (B, 4) the same for the black cells.
+        xy: (M, 2) the markers, NaN where unknown.
+        noise: grey levels.
+        x0, y0, scale: the frame of the polynomials.
+    """
     fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
     strange = np.zeros(drawn.shape[0], np.bool_)
     place, place_black = _places(xy, cells, x0, y0, scale), _places(xy, black_cells, x0, y0, scale)
@@ -273,25 +280,6 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
     _shrunk(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
     return cell, slope, fields[BLACK], strange
-
-
-def smooth_levels(
-    drawn: NDArray[np.float64],
-    black: NDArray[np.float64],
-    xy: NDArray[np.float64],
-    mesh: Topology,
-    noise: float,
-    frame: Frame,
-) -> Levels:
-    """Levels from the cells' own ones.
-
-    Args:
-        drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
-        black: (B, 4) the same for the black cells.
-        xy: (M, 2) the markers, NaN where unknown.
-        noise: grey levels.
-    """
-    return Levels(*smoothed(drawn, black, xy, mesh.cells, mesh.black, mesh.cell_color, noise, *frame))
 
 
 @compiled

@@ -208,7 +208,7 @@ def coarser(fit: Fit, sides: Across, finer: Sight, view: Sight) -> tuple[Fit, Ac
 
 @compiled
 def _sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, whole, which):  # type: ignore[no-untyped-def]
-    """Markers and covariances, NaN where a marker lies far from its ``start`` or is not sure."""
+    """Markers and covariances, NaN where a marker lies far from its ``start``, is not sure, or not one of ``which``."""
     xy, hidden = measured.copy(), around(loose, spokes)
     cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
     for m in range(xy.shape[0]):

@@ -19,10 +19,13 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout, refine
 from extractor.drawing import Draughtsman
 from extractor.drawn import Drawing, chosen
+from extractor.information import covariances
 from extractor.levels import Levels, bled, rebled, unbled
 from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
 from extractor.presets import STEPS
 from extractor.settling import beside, still_moving, touching, unsettled
+from extractor.step import placed
+from extractor.topology import topology_of
 
 SIZE = (300, 260)
 LAYERS = 5
@@ -196,6 +199,43 @@ def test_the_first_estimate_of_the_blur_is_close(
     assert 0.75 < ratios[-1] < 1.1
     if blur <= 1.0:
         assert 0.95 < ratios[-1] < 1.06
+
+
+def test_maps_are_laid_anew_around_some_markers_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits: list[Any] = []
+    plain = refine.Draughtsman.steps
+
+    def kept(self: Draughtsman, view: Any, fit: Any, *given: Any) -> Any:
+        fits.append((self._mesh, fit))
+        return plain(self, view, fit, *given)
+
+    monkeypatch.setattr(Draughtsman, "steps", kept)
+    extractor("honeycomb").extract(shown("honeycomb").image)
+    mesh, fit = fits[0]
+    moved = fit.guiding + np.random.default_rng(1).normal(0.0, 0.3, fit.guiding.shape)
+    moved[3] = np.nan
+    fit, which = fit._replace(guiding=moved), np.zeros(len(moved), np.bool_)
+    which[[5, 20]] = True
+    near, whole = placed(mesh, fit, which), placed(mesh, fit)
+    np.testing.assert_array_equal(near.beyond, whole.beyond)
+    ends = np.unique(mesh.edges[touching(which, mesh.edges)])
+    np.testing.assert_array_equal(near.maps[ends], whole.maps[ends])
+    others = np.setdiff1d(np.flatnonzero(np.isfinite(moved[:, 0])), ends)
+    np.testing.assert_array_equal(near.maps[others], fit.maps[others])
+    assert (near.maps[others] != whole.maps[others]).any() and np.isnan(near.maps[3]).all()
+
+
+def test_covariances_of_some_markers_are_those_among_all() -> None:
+    mesh = topology_of(extractor("honeycomb").layout)
+    count, rng = len(mesh.spokes), np.random.default_rng(2)
+    diagonal = np.tile([900.0, 0.0, 900.0], (count, 1)) + rng.uniform(0.0, 200.0, (count, 3))
+    beside = rng.uniform(0.0, 60.0, (len(mesh.edges), 4))
+    some = rng.random(count) < 0.3
+    tables = mesh.edges, mesh.spokes, 4e-2
+    every = covariances(diagonal, beside, *tables, np.ones(count, np.bool_))
+    chosen = covariances(diagonal, beside, *tables, some)
+    assert np.isfinite(every).all() and np.isnan(chosen[~some]).all()
+    np.testing.assert_allclose(chosen[some], every[some], rtol=1e-12)
 
 
 def one_cell(bow: float, sigma: float, picture: NDArray[np.float32], size: float = 1.0) -> tuple[Any, ...]:
