@@ -28,7 +28,7 @@ from .topology import Topology
 
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MAX_WIDEN = 0.3  # of the blur, in one step
-SAME_BLUR = 0.02  # of the blur, by which it may be wrong in a drawing that is kept
+SAME_BLUR = 0.03  # of the blur, by which it may be wrong in a drawing that is kept
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
 NOISY_BLUR, NOISY_LEVELS = 0.5, 0.12  # of how far noise moves these, in units of the blur
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
@@ -46,7 +46,7 @@ OVERLAP, MOST_OVERLAP = 6.75, 0.4
 # Where no fewer markers move after so many more steps, what moves them is nothing that a drawing could explain.
 PATIENCE = 2
 MAX_STEPS = 10
-MAX_AGAIN = 0.4  # of the markers may be drawn anew; for more, everything is
+MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
 
