@@ -30,8 +30,8 @@ class Seeds:
         center: (N, 2) float64, the domain's geometric center.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) int64, the domain's area.
-        runs: (R, 4) int32, the horizontal runs of one ink: y, first x, last x, ink.
-        domain: (R,) int32, the domain that a run belongs to, -1 where it is clutter.
+        runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
+        domain: (R,) int32, the domain that a run belongs to.
         crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
     """
 
@@ -109,8 +109,8 @@ def _runs(label):  # type: ignore[no-untyped-def]
 
 @compiled
 def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
-    """(R,) int32 the domain of each run, -1 where that is too small, or there are more than ``crowd`` and it is none a
-    cell could be; the areas of the others; and whether there are more."""
+    """The runs of the domains that are large enough, or, where there are more than ``crowd``, that a cell could be;
+    (R,) int32 the domain of each; the domains' areas; and whether there are more."""
     domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
     count = 0
     for i in range(runs.shape[0]):
@@ -122,20 +122,29 @@ def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
         area[domain[i]] += runs[i, 2] - runs[i, 1] + 1
     area = area[:count]
     crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
-    area = _keep(domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
+    runs, domain, area = _kept(runs, domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
     if crowded:
-        area = _keep(domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
-    return domain, area, crowded
+        runs, domain, area = _kept(runs, domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
+    return runs, domain, area, crowded
 
 
 @compiled
-def _keep(domain, area, keep):  # type: ignore[no-untyped-def]
-    """Number the domains to keep anew, in place, with -1 for the others; their areas."""
-    number = np.where(keep, np.cumsum(keep) - 1, -1)
+def _kept(runs, domain, area, keep):  # type: ignore[no-untyped-def]
+    """The runs of the domains to keep, these numbered anew, and their areas."""
+    number, few, own = np.empty(area.shape[0], np.int32), 0, 0
+    for d in range(area.shape[0]):
+        number[d] = few
+        few += keep[d]
+    if few == area.shape[0]:
+        return runs, domain, area
+    some, of = np.empty_like(runs), np.empty_like(domain)
     for i in range(domain.shape[0]):
-        if domain[i] >= 0:
-            domain[i] = number[domain[i]]
-    return area[keep]
+        d = domain[i]
+        # written over where it is not kept: no branch is to be guessed
+        some[own, 0], some[own, 1], some[own, 2], some[own, 3] = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
+        of[own] = number[d]
+        own += keep[d]
+    return some[:own], of[:own], area[keep]
 
 
 @compiled
@@ -143,10 +152,7 @@ def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
     """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
     sums = np.zeros((area.shape[0], 5))
     for i in range(domain.shape[0]):
-        d = domain[i]
-        if d < 0:
-            continue
-        y, length = runs[i, 0], runs[i, 2] - runs[i, 1] + 1
+        d, y, length = domain[i], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
         x = 0.5 * (runs[i, 1] + runs[i, 2])
         sums[d, 0] += length * x
         sums[d, 1] += length * y
@@ -169,12 +175,10 @@ def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
     count = area.shape[0]
     ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
     for i in range(runs.shape[0]):
-        d = domain[i]
-        if d >= 0:
-            length = runs[i, 2] - runs[i, 1] + 1
-            ink[d] = runs[i, 3]
-            center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
-            center[d, 1] += length * runs[i, 0]
+        d, length = domain[i], runs[i, 2] - runs[i, 1] + 1
+        ink[d] = runs[i, 3]
+        center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
+        center[d, 1] += length * runs[i, 0]
     middle, best = np.empty(count, np.int64), np.full(count, np.inf)
     for d in range(count):
         center[d, 0] /= area[d]
@@ -183,8 +187,6 @@ def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
     xy = np.zeros((count, 2), np.int32)
     for i in range(runs.shape[0]):
         d = domain[i]
-        if d < 0:
-            continue
         x = min(max(middle[d], runs[i, 1]), runs[i, 2])
         distance = (x - center[d, 0]) ** 2 + (runs[i, 0] - center[d, 1]) ** 2
         if distance < best[d]:
@@ -204,7 +206,7 @@ def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
             many times more than any pattern.
     """
     runs, parent = _runs(segmentation.label)
-    domain, area, crowded = _domains(runs, parent, crowd)
+    runs, domain, area, crowded = _domains(runs, parent, crowd)
     xy, center, ink, area_px = _seeds(runs, domain, area)
     return Seeds(xy, center, ink, area_px, runs, domain, crowded)
 
@@ -215,8 +217,6 @@ def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
     out = np.zeros((seed_xy.shape[0], MOMENTS))
     for i in range(runs.shape[0]):
         d = domain[i]
-        if d < 0:
-            continue
         row, y = out[d], float(runs[i, 0] - seed_xy[d, 1])
         for k in range(runs[i, 1], runs[i, 2] + 1):
             x = float(k - seed_xy[d, 0])
