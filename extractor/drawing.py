@@ -75,13 +75,11 @@ class Draughtsman:
             fit = _farther(fit, drawing) if wide else fit
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = fit.measured, drawing.xy, fit.strides
-            hard = not wide and _settles_slowly(fit, edge_px)
-            anew, moving = still_moving(
-                *about, near, steps.enough, 0.0 if hard else steps.few, self._mesh.edges
-            )
+            anew, moving = still_moving(*about, near, steps.enough, steps.few, self._mesh.edges)
             other = _looks_other(fit, drawing, steps.enough)
             everything = other or moving > MAX_AGAIN * len(anew)
             spent += effort(size, None if everything else moving / len(anew))
+            hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             tries = tries + 1 if moving >= least and not other else 0
             if not (everything or moving) or tries == PATIENCE or (step > 0 and spent > allowed):
