@@ -43,8 +43,7 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
-# Where no fewer markers move after so many more steps, what moves them is nothing that a drawing could explain.
-PATIENCE = 2
+WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move
 MAX_STEPS = 10
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
@@ -70,6 +69,7 @@ class Draughtsman:
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
         size, least, tries = drawing.edge_px, len(fit.xy), 0
+        patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         spent = effort(size)
         for step in range(MAX_STEPS - 1):
             fit = _farther(fit, drawing) if wide else fit
@@ -82,7 +82,7 @@ class Draughtsman:
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             tries = tries + 1 if moving >= least and not other else 0
-            if not (everything or moving) or tries == PATIENCE or (step > 0 and spent > allowed):
+            if not (everything or moving) or tries == patience or (step > 0 and spent > allowed):
                 break
             least = min(least, len(fit.xy) if other else moving)
             fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)

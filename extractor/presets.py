@@ -23,7 +23,8 @@ class Steps(NamedTuple):
             allowed in any case.
         enough: no more steps once no marker moves by more than so many of its standard deviations
         near: and by more than this share of the blur,
-        few: but for this share of the markers.
+        few: but for this share of the markers;
+        patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
     """
 
     profiles: tuple[int, int]
@@ -34,10 +35,11 @@ class Steps(NamedTuple):
     enough: float
     near: float
     few: float
+    patience: int
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0),
+    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2),
 }

@@ -27,7 +27,7 @@ from .stepping import MIN_NOISE, SHORTEST, short_edges, trusted_markers
 from .straying import astray, collected
 from .topology import Topology
 
-SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: it is looked at first at the scale that this allows
+SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: the scale for it is looked at first
 SHORT = 30  # one in so many gridlines may be smaller than that at a reduced scale
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
 MIN_BLURRED_EDGE_PX = 6.5  # either these

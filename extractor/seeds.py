@@ -141,7 +141,12 @@ def _kept(runs, domain, area, keep):  # type: ignore[no-untyped-def]
     for i in range(domain.shape[0]):
         d = domain[i]
         # written over where it is not kept: no branch is to be guessed
-        some[own, 0], some[own, 1], some[own, 2], some[own, 3] = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
+        some[own, 0], some[own, 1], some[own, 2], some[own, 3] = (
+            runs[i, 0],
+            runs[i, 1],
+            runs[i, 2],
+            runs[i, 3],
+        )
         of[own] = number[d]
         own += keep[d]
     return some[:own], of[:own], area[keep]
