@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled
-from .near import bucketed, nearest
+from .near import bucketed, count_around, nearest
 from .seeds import Seeds
 from .triangles import Triangles
 
@@ -18,6 +18,8 @@ MIN_AREA_SHARE = 0.2  # of the median around it; smaller domains are dirt
 WHOLE_SHARE = (
     0.7  # of the upper quartile around it; smaller cells have lost a part, and their centers lie aside
 )
+GIANTS = 64  # so many of the largest domains, as of a background, are looked at one by one
+REACH = 2.9  # buckets' sides, beyond which nothing lies of what the buckets around a point hold
 SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, too
 
 
@@ -108,14 +110,16 @@ def _whole(center, area, corner):  # type: ignore[no-untyped-def]
 @compiled
 def _few_larger(center, area, share, most):  # type: ignore[no-untyped-def]
     """(N,) bool, of which less than so many of the nearest are so much larger that it is but a ``share`` of them."""
-    few = np.ones(area.shape[0], np.bool_)
-    if area.shape[0] <= NEIGHBOURS or area.min() >= share * area.max():
+    few, count = np.ones(area.shape[0], np.bool_), area.shape[0]
+    if count <= NEIGHBOURS or area.min() >= share * area.max():
         return few
-    last = area.shape[0] - most  # where less than so many are larger at all, there is no need to look
+    last = count - most  # where less than so many are larger at all, there is no need to look
     small = np.flatnonzero(area < share * np.partition(area, last)[last])
     if small.shape[0] == 0:
         return few
     grid = bucketed(center)
+    if small.shape[0] > GIANTS:  # as where a few large blots make all cells small
+        small = _beside_giants(center, area, grid, small, share, most)
     index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
     for i in small:
         nearest(center, grid, center[i, 0], center[i, 1], index, square)
@@ -124,3 +128,25 @@ def _few_larger(center, area, share, most):  # type: ignore[no-untyped-def]
             larger += area[i] < share * area[j]
         few[i] = larger < most
     return few
+
+
+@compiled
+def _beside_giants(center, area, grid, small, share, most):  # type: ignore[no-untyped-def]
+    """Those of the ``small`` ones with so many among the nearest that can be much larger: in reach of the buckets
+    around them, if these hold enough, or not known to be among the ``GIANTS``."""
+    least = np.partition(area, area.shape[0] - GIANTS)[area.shape[0] - GIANTS]
+    tiny = area < share * least
+    if 2 * np.count_nonzero(tiny[small]) > small.shape[0]:  # it would tell little
+        return small
+    x, y, reach = center[:, 0].copy(), center[:, 1].copy(), REACH * grid[2]
+    near = np.where(tiny, most, 0)
+    for j in np.flatnonzero(area >= least):
+        limit, at_x, at_y = share * area[j], x[j], y[j]
+        for i in range(area.shape[0]):
+            dx, dy = x[i] - at_x, y[i] - at_y
+            near[i] += (area[i] < limit) & (dx * dx + dy * dy <= reach * reach)
+    kept = np.empty(small.shape[0], np.bool_)
+    for k in range(small.shape[0]):
+        i = small[k]
+        kept[k] = near[i] >= most or count_around(grid, x[i], y[i]) < NEIGHBOURS
+    return small[kept]

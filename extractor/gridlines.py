@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .algebra import cholesky_solve
 from .engine import compiled, inlined, vectorized
+from .quadratics import lay_quadratics
 
 # columns of a gridline
 X, Y, UX, UY, LENGTH, LEAVE, ARRIVE, KNOWN = range(8)
@@ -31,10 +31,9 @@ def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
 @compiled
 def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
     """The same at ``which`` (M,) of the known markers only."""
-    count = xy.shape[0]
-    out = np.full((count, 2, 5), np.nan)
-    gram, right = np.empty((5, 5)), np.empty((2, 5))
-    for m in range(count):
+    out = np.full((xy.shape[0], 2, 5), np.nan)
+    broken, count = np.empty(xy.shape[0], np.int64), 0
+    for m in range(xy.shape[0]):
         if not which[m]:
             continue
         # there are weights where both rings are whole
@@ -44,8 +43,10 @@ def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
             out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
             for k in range(2, 5):
                 out[m, 0, k], out[m, 1, k] = 0.0, 0.0
-        elif _quadratic(xy, m, near[m], offset[m], gram, right):
-            out[m] = right
+        else:
+            broken[count] = m
+            count += 1
+    lay_quadratics(xy, broken[:count], near, offset, out)
     return out
 
 
@@ -62,35 +63,6 @@ def _cubic(xy, m, near, stencil):  # type: ignore[no-untyped-def]
         yu += u * dy
         yv += v * dy
     return xu, xv, yu, yv
-
-
-@compiled
-def _quadratic(xy, m, near, offset, gram, right):  # type: ignore[no-untyped-def]
-    """Write the five derivatives at marker m into ``right``; False where its neighbours do not tell them."""
-    terms = np.empty(5)
-    gram[:] = 0.0
-    right[:] = 0.0
-    known = 0
-    for k in range(near.shape[0]):
-        n = near[k]
-        if n < 0 or not np.isfinite(xy[n, 0]):
-            continue
-        known += 1
-        x, y = offset[k, 0], offset[k, 1]
-        weight = 1.0 / (x * x + y * y) ** 2
-        terms[0], terms[1], terms[2], terms[3], terms[4] = x, y, 0.5 * x * x, x * y, 0.5 * y * y
-        for i in range(5):
-            v = weight * terms[i]
-            for j in range(i + 1):
-                gram[i, j] += v * terms[j]
-            for axis in range(2):
-                right[axis, i] += v * (xy[n, axis] - xy[m, axis])
-    if known < 2 or gram[0, 0] * gram[1, 1] - gram[1, 0] ** 2 < 0.05 * gram[0, 0] * gram[1, 1]:
-        return False
-    for i in range(2, 5):
-        gram[i, i] += (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
-    cholesky_solve(gram, right, 5)
-    return True
 
 
 @compiled

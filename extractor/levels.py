@@ -286,12 +286,27 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
 def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
     """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
     blur ``assumed``, NaN where the cell is not known; and the median of that."""
-    out = np.full(cells.shape[0], np.nan)
+    inscribed, variance = _discs(xy, cells, assumed)
+    return _bled(inscribed, variance, sigma)
+
+
+@compiled
+def _discs(xy, cells, sigma):  # type: ignore[no-untyped-def]
+    """(K,) the radius of each cell's inscribed circle, and the variance in one direction of the pixels that its level
+    is taken from."""
+    inscribed, variance = np.empty(cells.shape[0]), np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        inscribed, radius = _disc(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], assumed)
-        if np.isfinite(inscribed):
-            # a disc's pixels have a quarter of its squared radius of variance in one direction
-            out[i] = 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
+        inscribed[i], radius = _disc(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], sigma)
+        variance[i] = 0.25 * radius * radius
+    return inscribed, variance
+
+
+@compiled
+def _bled(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
+    out = np.full(inscribed.shape[0], np.nan)
+    for i in range(inscribed.shape[0]):
+        if np.isfinite(inscribed[i]):
+            out[i] = 0.5 * math.erfc(inscribed[i] / np.sqrt(2.0 * (sigma * sigma + variance[i])))
     return out, np.nanmedian(out)
 
 
@@ -332,12 +347,21 @@ def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped
 
 def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float) -> Levels:
     """The levels that the cells' middles would have shown, had the blur not been ``drawn`` but ``sigma``, px."""
-    before, usual = bled(xy, mesh.cells, drawn, 0.0)
-    after, more = bled(xy, mesh.cells, sigma, 0.0)
+    inks = levels.cell, levels.slope, levels.black
+    differ, cell, slope, black = _rebled(*inks, mesh.cell_color, xy, mesh.cells, drawn, sigma)
+    return levels._replace(cell=cell, slope=slope, black=black) if differ else levels
+
+
+@compiled
+def _rebled(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
+    """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
+    inscribed, variance = _discs(xy, cells, 0.0)
+    before, usual = _bled(inscribed, variance, drawn)
+    after, more = _bled(inscribed, variance, sigma)
     if max(usual, more) < LITTLE:
-        return levels
+        return False, cell, slope, black
     left = 1.0 - 6.0 * min(usual, MAX_SHARE)
-    return unbled(levels, mesh.cell_color, (after - before) / left, (more - usual) / left)
+    return (True, *_unbled(cell, slope, black, color, (after - before) / left, (more - usual) / left))
 
 
 @compiled

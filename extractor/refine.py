@@ -10,21 +10,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .bending import HIDDEN, around
+from .bending import around
 from .drawing import SMALL_BLUR, Draughtsman
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
-from .information import Information, covariances
+from .information import Information
 from .look import across, cleared, first_look
 from .offsets import measure
-from .placing import AGREED, MAX_APART, Places
+from .placing import AGREED, Places
 from .presets import STEPS, Preset
+from .regained import regain
 from .rounds import profiled
-from .settling import beside
 from .sight import Sight, Sights
-from .step import PRIOR_PX, completed, lines_of, placed, roughened
-from .stepping import MIN_NOISE, SHORTEST, short_edges, trusted_markers
+from .step import completed, lines_of, placed, roughened
+from .stepping import MIN_NOISE, SHORTEST, short_edges
 from .straying import astray, collected
+from .sure import doubt, lost_ones, sure_ones
 from .topology import Topology
 
 SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: the scale for it is looked at first
@@ -32,15 +33,8 @@ SHORT = 30  # one in so many gridlines may be smaller than that at a reduced sca
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
-MAX_SHIFT = 0.25  # in units of the edges around the marker
-MAX_SIGMA = 0.03  # of what is measured, in the same units
-# Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
-UNEXPLAINED = 0.015
-FAR_APART = 0.03  # where all triangles of a marker were found
-# Where the drawing leaves more than so many times the noise, it explains nothing so well that a marker may be moved by
-STRANGE, MAX_STRANGE = 3.0, 0.13  # of an edge.
-JUDGING_STATIONS = 16  # stations per gridline where synthesis has failed
-ELSEWHERE = 5  # one of so many other gridlines shows how well the pattern is explained where nothing is wrong
+# Where the drawing leaves more than so many times the noise, it explains nothing so well that it may move a marker far.
+STRANGE = 3.0
 
 
 class Refiner:
@@ -61,7 +55,7 @@ class Refiner:
             places: where the markers were found, to about a pixel.
             before: how the image before it looked, in a sequence.
 
-        A marker that would be moved by more than ``MAX_SHIFT`` of an edge is lost.
+        A marker that would be moved by more than ``sure.MAX_SHIFT`` of an edge is lost.
         """
         edge, usual = short_edges(places.xy_px, self._mesh.edges, SHORTEST, SHORT)
         if before is not None and before.scale == self._scale(before.scale * before.sigma, usual):
@@ -116,38 +110,21 @@ class Refiner:
             start = roughened(mesh, start)
             lines = lines_of(mesh, start)
             fit, use = profiled(view, mesh, start, lines, sides, steps.profiles[1], judged=True)
-            xy, cov = self._sure(fit, places, self._all)
+            xy, cov = self._sure(fit, places)
             strays, doubted = astray(mesh, fit, xy, use, places.edge_px)
             xy[strays], cov[strays] = np.nan, np.nan
-            _doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
+            doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
             return self._refined(view, fit, xy, cov, ~doubted, places)
         fit = self._draughtsman.steps(view, start, steps, edge_px)
         return self._result(view, fit, sides, places)
 
-    def _judged(
-        self, view: Sight, fit: Fit, sides: Across, which: NDArray[np.bool_]
-    ) -> tuple[Fit, NDArray[np.bool_]]:
-        """A round of profiles around some markers, judged by these and some elsewhere; (M,) which it trusts."""
-        mesh = self._mesh
-        some = sides._replace(room=_room_around(which, mesh.edges, sides.room))
-        lines = lines_of(mesh, fit)
-        fit, use = profiled(view, mesh, fit, lines, some, JUDGING_STATIONS, judged=True)
-        return fit, which & trusted_markers(use, mesh.spokes)
-
     def _result(self, view: Sight, fit: Fit, sides: Across, places: Places) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
-        xy, cov = self._sure(fit, places, self._all)
-        apart = _far(xy, places.xy_px, places.edge_px, MAX_STRANGE)
-        if apart.any() and fit.noise > STRANGE * fit.grain:
-            xy[apart], cov[apart] = np.nan, np.nan
-        lost = np.isnan(xy[:, 0]) & np.isfinite(places.xy_px[:, 0])
-        if lost.any():
-            start = placed(self._mesh, fit._replace(unsettled=None), lost)
-            judged, use = self._judged(view, start, sides, lost)
-            if use.any():
-                anew, wide = self._sure(judged, places, use)
-                _doubt(anew, wide, use, places.xy_px, places.edge_px, places.whole)
-                xy[use], cov[use] = anew[use], wide[use]
+        xy, cov = self._sure(fit, places)
+        strange = fit.noise > STRANGE * fit.grain
+        lost, some = lost_ones(xy, cov, places.xy_px, places.edge_px, strange)
+        if some:
+            regain(view, self._mesh, fit, sides, places, lost, xy, cov)
         return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(
@@ -170,13 +147,11 @@ class Refiner:
         seen = Seen(scale, fit.sigma, fit.noise, fit.levels, fit.grain) if reading.drawn else None
         return Refined(xy, cov, explained, free, blur, noise, seen, points)
 
-    def _sure(
-        self, fit: Fit, places: Places, which: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Markers and covariances of a fit; NaN where it is far from the places or not sure, and beyond ``which``."""
+    def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Markers and covariances of a fit; NaN where it is far from the places or not sure."""
         tables = self._mesh.edges, self._mesh.spokes
         start = places.xy_px, places.edge_px, places.whole
-        xy, cov = _sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start, which)
+        xy, cov = sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start, self._all)
         if fit.unsettled is not None:
             cov += fit.unsettled
         return xy, cov
@@ -205,43 +180,6 @@ def coarser(fit: Fit, sides: Across, finer: Sight, view: Sight) -> tuple[Fit, Ac
 
 
 @compiled
-def _sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, whole, which):  # type: ignore[no-untyped-def]
-    """Markers and covariances, NaN where a marker lies far from its ``start``, is not sure, or not one of ``which``."""
-    xy, hidden = measured.copy(), around(loose, spokes)
-    cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
-    for m in range(xy.shape[0]):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
-        cov[m, 0, 0] += HIDDEN**2 * hidden[m]
-        cov[m, 1, 1] += HIDDEN**2 * hidden[m]
-        spread = cov[m, 0, 0] + cov[m, 1, 1]
-        if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
-            xy[m], cov[m] = np.nan, np.nan
-    return xy, cov
-
-
-@compiled
-def _room_around(which, edges, room):  # type: ignore[no-untyped-def]
-    """(E, 4) ``room``, 0 where a gridline is neither near to ``which`` (M,) bool nor one of those elsewhere."""
-    near, out = which.copy(), room.copy()
-    beside(which, edges, near)
-    for e in range(edges.shape[0]):
-        if not (near[edges[e, 0]] or near[edges[e, 1]] or e % ELSEWHERE == 0):
-            out[e] = 0.0
-    return out
-
-
-@compiled
-def _far(xy, start, edge, limit):  # type: ignore[no-untyped-def]
-    """(M,) bool, markers that lie more than ``limit`` edges from their ``start``."""
-    out = np.zeros(xy.shape[0], np.bool_)
-    for m in range(xy.shape[0]):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        out[m] = np.sqrt(dx * dx + dy * dy) > limit * edge[m]
-    return out
-
-
-@compiled
 def _in_full(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignore[no-untyped-def]
     """Markers and covariances in the full image, and (M,) px how freely gridlines bend at each; what was lost though
     triangles ``agreed`` is where these put it."""
@@ -254,24 +192,6 @@ def _in_full(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignor
             wide[m, 0, 0] = wide[m, 1, 1] = scale**2 * (AGREED * edge[m]) ** 2
             wide[m, 0, 1] = wide[m, 1, 0] = 0.0
     return places, wide, free
-
-
-@compiled
-def _doubt(xy, cov, which, start, edge, whole):  # type: ignore[no-untyped-def]
-    """Put markers on which something lies between what profiles and triangles (``start``) say, in place; NaN where
-    these differ."""
-    for m in np.flatnonzero(which):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        apart = np.sqrt(dx * dx + dy * dy)
-        if not apart < MAX_APART * edge[m]:
-            xy[m], cov[m] = np.nan, np.nan
-            continue
-        # all triangles around a marker are seldom wrong together: the farther off, the more they count
-        share = 0.5 / (1.0 + (apart / (FAR_APART * edge[m])) ** 2) if whole[m] else 0.5
-        xy[m, 0], xy[m, 1] = start[m, 0] + share * dx, start[m, 1] + share * dy
-        doubt = 0.25 * apart**2 + (UNEXPLAINED * edge[m]) ** 2
-        cov[m, 0, 0] += doubt
-        cov[m, 1, 1] += doubt
 
 
 def _in(view: Sight, places: Places) -> Places:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, inlined
 
 
 class Frame(NamedTuple):
@@ -69,7 +69,7 @@ def _averaged(image, scale):  # type: ignore[no-untyped-def]
     out = np.empty((height, width, 3), np.uint8)
     flat, means = image.reshape(-1), out.reshape(-1)
     column = np.empty(row, np.uint16)  # a sum of up to 256 rows
-    three, size = np.uint64(3), np.uint64(scale)
+    total = np.empty(3 * width, np.uint32)
     half, share = np.float32(0.5), np.float32(1.0 / scale**2)
     for y in range(height):
         column[:] = np.uint16(0)
@@ -77,14 +77,26 @@ def _averaged(image, scale):  # type: ignore[no-untyped-def]
             line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
             for i in range(row):
                 column[i] += np.uint16(line[i])
+        _add_up(column, scale, width, total)
         own = means[3 * y * width : 3 * (y + 1) * width]
-        for x in range(np.uint64(width)):
-            for channel in range(three):
-                at, total = x * three * size + channel, np.uint32(0)
-                for k in range(size):
-                    total += np.uint32(column[at + k * three])
-                own[x * three + channel] = np.uint8(np.float32(total) * share + half)
+        for i in range(3 * width):
+            own[i] = np.uint8(np.float32(total[i]) * share + half)
     return out
+
+
+@inlined
+def _add_up(column, scale, width, total):  # type: ignore[no-untyped-def]
+    """Write the sums of ``scale`` pixels side by side, all channels of a pixel at once."""
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    at = np.uint64(0)
+    for x in range(np.uint64(width)):
+        red, green, blue = np.uint32(0), np.uint32(0), np.uint32(0)
+        for _ in range(scale):
+            red += np.uint32(column[at])
+            green += np.uint32(column[at + one])
+            blue += np.uint32(column[at + two])
+            at += three
+        total[three * x], total[three * x + one], total[three * x + two] = red, green, blue
 
 
 @compiled

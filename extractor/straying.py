@@ -128,29 +128,39 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
     count = xy.shape[0]
     out, strays, anew = xy.copy(), np.zeros(count, np.bool_), np.ones(count, np.bool_)
     move, far, alike = np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)
-    bent = np.empty((edges.shape[0], 2))
+    least = np.where(doubted, LEAST[0], LEAST[1]) * edge
+    # few markers could have to move at all; only these, and those around them, are asked
+    moving, asked, bent = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.empty((edges.shape[0], 2))
     for _ in range(ROUNDS):
         _third_differences(out, anew, maps, edges, ahead, third, bent)
-        _ask(bent, anew, edges, ahead, spokes, onward, move, far, alike)
+        _may_move(anew, least, bent, spokes, onward, moving, asked)
+        _ask(moving, bent, edges, ahead, spokes, onward, asked, move, far, alike)
+        moving &= alike & (far > least)
+        _ask(_around(moving, near), bent, edges, ahead, spokes, onward, asked, move, far, alike)
         anew[:] = False
-        for m in range(count):
-            unusual, least = (UNUSUAL[0], LEAST[0]) if doubted[m] else (UNUSUAL[1], LEAST[1])
-            if not (alike[m] and far[m] > least * edge[m]):
-                continue
+        for m in np.flatnonzero(moving):
             first = True  # of its neighbours in how far it would have to move
             for k in range(FIRST_RING):
                 n = near[m, k]
                 first = first and not (n >= 0 and far[n] > far[m])
-            if first and far[m] > unusual * _usual(far, near[m]):
+            if first and far[m] > UNUSUAL[0 if doubted[m] else 1] * _usual(far, near[m]):
                 out[m, 0] -= move[m, 0]
                 out[m, 1] -= move[m, 1]
                 strays[m] = anew[m] = True
-                for k in range(near.shape[1]):
-                    n = near[m, k]
-                    anew[n if n >= 0 else m] = True
         if not np.any(anew):
             break
+        anew |= _around(anew, near)
     return strays
+
+
+@compiled
+def _around(which, near):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers in the two rings of ``which`` (M,)."""
+    out = np.zeros(which.shape[0], np.bool_)
+    for m in np.flatnonzero(which):
+        for n in near[m]:
+            out[n if n >= 0 else m] = True
+    return out
 
 
 @compiled
@@ -165,23 +175,43 @@ def _third_differences(xy, anew, maps, edges, ahead, third, out):  # type: ignor
 
 
 @compiled
-def _ask(bent, anew, edges, ahead, spokes, onward, move, far, alike):  # type: ignore[no-untyped-def]
-    """Fill in, of the markers that are ``anew``: ``move`` (M, 2), the error that the gridlines through each agree on
-    (their median, by their third differences ``bent``), ``far`` (M,), how large it is, NaN where fewer than three are
-    known, and whether they are alike."""
-    said, column = np.empty((spokes.shape[1], 2)), np.empty(spokes.shape[1])
+def _may_move(anew, least, bent, spokes, onward, moving, asked):  # type: ignore[no-untyped-def]
+    """Of the markers that are ``anew``: none is ``asked`` yet, and those are ``moving`` whose gridlines could agree on
+    a move by more than ``least`` px: by no more than what the largest third differences ask for in x and in y."""
     for m in range(anew.shape[0]):
         if not anew[m]:
             continue
-        known = 0
-        for spoke in range(spokes.shape[1]):
-            # where no gridline goes on behind the marker, it is the last of the next four
-            for e, part in ((spokes[m, spoke], PART), (onward[m, spoke], 1.0)):
-                if e >= 0 and np.isfinite(bent[e, 0]):
-                    part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
-                    said[known, 0], said[known, 1] = part * bent[e, 0], part * bent[e, 1]
-                    known += 1
-                    break
+        x, y, known = 0.0, 0.0, 0
+        for k in range(spokes.shape[1]):
+            e, part = spokes[m, k], PART
+            if e < 0 or not np.isfinite(bent[e, 0]):
+                e, part = onward[m, k], 1.0
+            if e >= 0 and np.isfinite(bent[e, 0]):
+                x, y = max(x, part * abs(bent[e, 0])), max(y, part * abs(bent[e, 1]))
+                known += 1
+        asked[m] = False
+        moving[m] = known >= FEWEST and x * x + y * y > 0.99 * least[m] ** 2  # rounding left aside
+
+
+@compiled
+def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  # type: ignore[no-untyped-def]
+    """Fill in, of the markers ``which`` (M,) that are not ``asked`` yet: ``move`` (M, 2), the error that the gridlines
+    through each agree on (their median, by their third differences ``bent``), ``far`` (M,), how large it is, NaN where
+    fewer than three are known, and whether they are ``alike`` (M,)."""
+    said, column = np.empty((spokes.shape[1], 2)), np.empty(spokes.shape[1])
+    for m in range(which.shape[0]):
+        if asked[m] or not which[m]:
+            continue
+        asked[m], known = True, 0
+        for k in range(spokes.shape[1]):
+            e, part = spokes[m, k], PART
+            if e < 0 or not np.isfinite(bent[e, 0]):
+                # where no gridline goes on behind the marker, it is the last of the next four
+                e, part = onward[m, k], 1.0
+            if e >= 0 and np.isfinite(bent[e, 0]):
+                part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
+                said[known, 0], said[known, 1] = part * bent[e, 0], part * bent[e, 1]
+                known += 1
         if known < FEWEST:
             continue
         for axis in range(2):

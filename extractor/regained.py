@@ -1,0 +1,142 @@
+"""What synthesis has lost, as under dirt and glare, is measured by profiles: around the lost markers, and there alone.
+
+The gridlines at the lost markers and at those beside them are read, judged and solved for the markers at their ends;
+what these cost is all that the round costs. Some gridlines elsewhere show how well the pattern is explained where
+nothing is wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bending import bending_ones
+from .engine import compiled
+from .fit import Across, Fit
+from .gridlines import KNOWN, gridlines
+from .information import assemble, gradient, solve
+from .matched import STRENGTH, read_profiles
+from .placing import Places
+from .rounds import JUDGED_BY_SAMPLES, PARDON
+from .settling import beside
+from .sight import Sight
+from .step import PRIOR_PX, listened, placed
+from .stepping import PRIOR_BEYOND_PX, trust, trusted_markers
+from .sure import doubt, sure_ones
+from .synthesis import A, B
+from .topology import Topology
+
+STATIONS = 16  # a gridline
+ELSEWHERE = 5  # one of so many other gridlines is read
+
+
+def regain(
+    view: Sight,
+    mesh: Topology,
+    fit: Fit,
+    across: Across,
+    places: Places,
+    lost: NDArray[np.bool_],
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+) -> None:
+    """Fill in markers (M, 2) and covariances (M, 2, 2) of those ``lost`` (M,) whose gridlines look as they should; NaN
+    where these are not sure, or far from the ``places`` (in the view)."""
+    assert fit.reading is not None
+    before, fit = fit.reading.use, placed(mesh, fit, lost)
+    pattern = fit.xy, fit.beyond, fit.maps, fit.rough, fit.bend, before, fit.sigma, fit.noise
+    start = places.xy_px, places.edge_px, places.whole
+    tables = mesh.edges, mesh.spokes, mesh.along
+    _regain(view.image, pattern, tuple(across), start, tables, lost, xy, cov)
+
+
+@compiled
+def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: ignore[no-untyped-def]
+    at, beyond, _, _, _, _, sigma, noise = pattern
+    edges, spokes, _ = tables
+    which, count = _gridlines_around(lost, edges)
+    lines, sums, to_a, to_b, use, loose = _read(image, pattern, across, tables, which)
+    which, use, loose = which[:count], use[:count], loose[:count]
+    markers, ends, turned = _alone(which, edges, spokes)
+    asked = lost[markers] & trusted_markers(use, turned)
+    if not np.any(asked):
+        return
+    believed, variance = use * lines[:count, KNOWN], noise**2
+    prior = np.where(beyond[markers], PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
+    diagonal, joined = np.empty((len(markers), 3)), np.empty((count, 4))
+    geometry = lines[:count], _rows(across[0], which), ends, turned, sigma, variance, prior
+    assemble(sums[:count], believed, False, *geometry, diagonal, joined)
+    right = gradient(to_a[:count], to_b[:count], believed, variance, lines[:count], ends, len(markers))
+    measured = _rows(at, markers) + solve(diagonal, joined, ends, right)
+    near = _rows(start[0], markers), start[1][markers], start[2][markers]
+    own, wide = sure_ones(measured, diagonal, joined, loose, ends, turned, *near, asked)
+    doubt(own, wide, asked, *near)
+    for k in np.flatnonzero(asked):
+        xy[markers[k]], cov[markers[k]] = own[k], wide[k]
+
+
+@compiled
+def _gridlines_around(lost, edges):  # type: ignore[no-untyped-def]
+    """The gridlines at the lost markers and at those beside them, then some of the others; and how many come first."""
+    near = lost.copy()
+    beside(lost, edges, near)
+    own, others, count, more = np.empty(len(edges), np.int64), np.empty(len(edges), np.int64), 0, 0
+    for e in range(len(edges)):
+        if near[edges[e, 0]] or near[edges[e, 1]]:
+            own[count] = e
+            count += 1
+        elif e % ELSEWHERE == 0:
+            others[more] = e
+            more += 1
+    own[count : count + more] = others[:more]
+    return own[: count + more], count
+
+
+@compiled
+def _read(image, pattern, across, tables, which):  # type: ignore[no-untyped-def]
+    """Of the gridlines ``which`` (n,): how they run, what was read across them, their votes, how far they look as they
+    should, and how freely they bend."""
+    at, _, maps, rough, bend, before, sigma, noise = pattern
+    edges, _, along = tables
+    values, least, unjudged = JUDGED_BY_SAMPLES
+    ends, bend, room = _rows(edges, which), _rows(bend, which), _rows(across[2], which)
+    lines = gridlines(at, maps, bend, ends, _rows(along, which))
+    weights, bending = _rows(across[1], which), bending_ones(rough, bend, ends)
+    sums = read_profiles(image, lines, weights, room, sigma, bending, STATIONS)
+    to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which))
+    said = bend, rough, before[which], lines, ends, noise
+    loose, _ = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
+    use, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
+    return lines, sums, to_a, to_b, use, loose
+
+
+@compiled
+def _alone(which, edges, spokes):  # type: ignore[no-untyped-def]
+    """The markers at the ends of the gridlines ``which`` (n,), as if there were no others: their numbers (m,), these
+    gridlines' ends among them, and the gridlines around each among these, -1 for those that are not."""
+    number, place = np.full(len(spokes), -1, np.int32), np.full(len(edges), -1, np.int32)
+    markers, ends, count = np.empty(len(spokes), np.int64), np.empty((len(which), 2), np.int32), 0
+    for k in range(len(which)):
+        place[which[k]] = k
+        for side in range(2):
+            m = edges[which[k], side]
+            if number[m] < 0:
+                number[m], markers[count] = count, m
+                count += 1
+            ends[k, side] = number[m]
+    around = np.full((count, spokes.shape[1]), -1, np.int32)
+    for k in range(count):
+        for i in range(spokes.shape[1]):
+            e = spokes[markers[k], i]
+            around[k, i] = place[e] if e >= 0 else -1
+    return markers[:count], ends, around
+
+
+@compiled
+def _rows(table, which):  # type: ignore[no-untyped-def]
+    """Some rows of a table of two dimensions."""
+    out = np.empty((len(which), table.shape[1]), table.dtype)
+    for i in range(len(which)):
+        for k in range(table.shape[1]):
+            out[i, k] = table[which[i], k]
+    return out

@@ -1,0 +1,65 @@
+"""Which markers of a fit are sure, and what becomes of those on which something lies."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .bending import HIDDEN, around
+from .engine import compiled
+from .information import covariances
+from .placing import MAX_APART
+from .step import PRIOR_PX
+
+MAX_SHIFT = 0.25  # in units of the edges around the marker
+MAX_SIGMA = 0.03  # of what is measured, in the same units
+MAX_STRANGE = 0.13  # likewise, that a marker may be moved by where the drawing explains nothing well
+# Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
+UNEXPLAINED = 0.015
+FAR_APART = 0.03  # where all triangles of a marker were found
+
+
+@compiled
+def sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, whole, which):  # type: ignore[no-untyped-def]
+    """Markers and covariances, NaN where a marker lies far from its ``start``, is not sure, or not one of ``which``."""
+    xy, hidden = measured.copy(), around(loose, spokes)
+    cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
+    for m in range(xy.shape[0]):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
+        cov[m, 0, 0] += HIDDEN**2 * hidden[m]
+        cov[m, 1, 1] += HIDDEN**2 * hidden[m]
+        spread = cov[m, 0, 0] + cov[m, 1, 1]
+        if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
+            xy[m], cov[m] = np.nan, np.nan
+    return xy, cov
+
+
+@compiled
+def lost_ones(xy, cov, start, edge, strange):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers that are known to start with but not sure; and whether there are any. Where all is
+    ``strange``, those that lie far from their ``start`` are made unsure, in place."""
+    out = np.zeros(xy.shape[0], np.bool_)
+    for m in range(xy.shape[0]):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        if strange and np.sqrt(dx * dx + dy * dy) > MAX_STRANGE * edge[m]:
+            xy[m], cov[m] = np.nan, np.nan
+        out[m] = np.isnan(xy[m, 0]) and np.isfinite(start[m, 0])
+    return out, np.any(out)
+
+
+@compiled
+def doubt(xy, cov, which, start, edge, whole):  # type: ignore[no-untyped-def]
+    """Put markers on which something lies between what profiles and triangles (``start``) say, in place; NaN where
+    these differ."""
+    for m in np.flatnonzero(which):
+        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
+        apart = np.sqrt(dx * dx + dy * dy)
+        if not apart < MAX_APART * edge[m]:
+            xy[m], cov[m] = np.nan, np.nan
+            continue
+        # all triangles around a marker are seldom wrong together: the farther off, the more they count
+        share = 0.5 / (1.0 + (apart / (FAR_APART * edge[m])) ** 2) if whole[m] else 0.5
+        xy[m, 0], xy[m, 1] = start[m, 0] + share * dx, start[m, 1] + share * dy
+        doubted = 0.25 * apart**2 + (UNEXPLAINED * edge[m]) ** 2
+        cov[m, 0, 0] += doubted
+        cov[m, 1, 1] += doubted

@@ -1,0 +1,51 @@
+"""Maps where rings are not whole: for many markers at once what they are for one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cmpdesign.scene.standard import standard_layout
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import parse_layout
+from extractor.quadratics import LANES, lay_quadratics
+from extractor.topology import Topology, topology_of
+
+Array = NDArray[np.float64]
+
+
+def lone(xy: Array, mesh: Topology, m: int) -> Array:
+    """(2, 5) the derivatives at one marker by numpy."""
+    known = [k for k, n in enumerate(mesh.near[m]) if n >= 0 and np.isfinite(xy[n, 0])]
+    x, y = mesh.offset[m, known].T
+    terms, weight = np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), (x * x + y * y) ** -2
+    held = 1e9 if len(known) < 5 else 0.02 if len(known) < 8 else 0.001
+    gram = (weight * terms) @ terms.T + np.diag([0.0, 0.0, held, held, held])
+    return np.asarray(np.linalg.solve(gram, (weight * terms) @ (xy[mesh.near[m, known]] - xy[m])).T)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3, 0.75])
+def test_each_is_the_weighted_least_squares_quadratic(missing: float) -> None:
+    mesh = topology_of(parse_layout(layout_to_json(standard_layout("honeycomb", 5))))
+    rng = np.random.default_rng(int(100 * missing))
+    xy = rng.normal(size=(len(mesh.near), 2))
+    xy[rng.random(len(xy)) < missing] = np.nan
+    asked = np.flatnonzero(np.isfinite(xy[:, 0]))[: 2 * LANES + 3]
+    out = np.full((len(xy), 2, 5), np.nan)
+    lay_quadratics(xy, asked, mesh.near, mesh.offset, out)
+    told = [m for m in asked if np.isfinite(out[m, 0, 0])]
+    assert len(told) > LANES
+    for m in told:
+        np.testing.assert_allclose(out[m], lone(xy, mesh, m), rtol=1e-6, atol=1e-9)
+    assert np.isnan(np.delete(out, asked, axis=0)).all()
+
+
+def test_neighbours_along_one_line_tell_nothing() -> None:
+    offset = np.zeros((1, 18, 2))
+    offset[0, :3] = [[1.0, 0.1], [-1.0, -0.1], [2.0, 0.21]]
+    near = np.full((1, 18), -1, np.int32)
+    near[0, :3] = 0
+    out = np.full((1, 2, 5), np.nan)
+    lay_quadratics(np.zeros((1, 2)), np.zeros(1, np.int64), near, offset, out)
+    assert np.isnan(out).all()
