@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, inlined
 from .lattice import layer_of, marker_id
 from .ring_maps import (
     BENT,
@@ -80,7 +80,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     return weights
 
 
-@compiled
+@inlined
 def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
     """Whether a known marker lies farther than the limit from where its neighbours put it, or these are not all known,
     or too few."""

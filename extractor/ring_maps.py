@@ -31,7 +31,7 @@ def room_for_maps(neighbours):  # type: ignore[no-untyped-def]
     return np.zeros(neighbours * LAID * LANES), rows
 
 
-@compiled
+@inlined
 def lay_neighbours(xy, m, lane, marker_mm, table, room):  # type: ignore[no-untyped-def]
     """Write the known neighbours of marker m into a lane; how many there are."""
     around, rows = room
