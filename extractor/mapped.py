@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
+from .engine import compiled, inlined, vectorized
 
 WITNESSES = 20  # numbered cells through which a map is laid
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
@@ -59,7 +59,7 @@ def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no
     return middle_x + terms[0, 0], middle_y + terms[1, 0], size
 
 
-@compiled
+@inlined
 def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
     """Write the products of a witness's terms with each other and with its place (u, v)."""
     row[0], row[1], row[2], row[3], row[4], row[5] = 1.0, x, y, x * x, x * y, y * y
