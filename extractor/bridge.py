@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
-from .engine import compiled
+from .engine import compiled, inlined
 from .gradients import seen_as
 from .near import bucketed, nearest
 from .parts import connected
@@ -87,7 +87,7 @@ def _largest_near(center, block, sizes, white):  # type: ignore[no-untyped-def]
     return best
 
 
-@compiled
+@inlined
 def _slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-untyped-def]
     """Write the image step per layout step around cell i by the cells that touch it; False where they are in a row."""
     xx, xy, yy, count = 0.0, 0.0, 0.0, 0
@@ -184,7 +184,7 @@ def _join_alone(center, corner, area, cell, alone, held, slope, sloped, plan, st
         held[j] = own < MAX_ALONE and np.sqrt(square[0]) < REACH * edge_of(area[here[index[0]]])
 
 
-@compiled
+@inlined
 def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
     """How far, in cells, cell j is from where its number puts it, by the slopes there and at those ``here`` near it;
     the median over these. A cell without a slope has that of its triangle, or else of the others, and keeps it."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, inlined
 from .fit import Refined
 from .neighbourhood import MIN_QUADRATIC, predicted, strays
 from .placing import AGREED, Places
@@ -85,7 +85,7 @@ def _drop(xy, cov, seen, rings, marker_mm, present, rim, size):  # type: ignore[
     return edge, False
 
 
-@compiled
+@inlined
 def _shortest(xy, m, ring, edge):  # type: ignore[no-untyped-def]
     """The edge at marker m, or the way to the nearest of its known neighbours, if that is shorter: a share of a longer
     edge may reach half-way to another marker."""
@@ -240,7 +240,7 @@ def _drop_slid(xy, cov, slid, start, edge, agreed, table, inner, marker_mm):  # 
             xy[m], cov[m] = np.nan, np.nan
 
 
-@compiled
+@inlined
 def _slides(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
     """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
     spread = cov[m, 0, 0] + cov[m, 1, 1]

@@ -5,19 +5,30 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, inlined
 from .lattice import layer_of, marker_id
+from .ring_maps import (
+    BENT,
+    LANES,
+    LEFT,
+    PIVOT,
+    PLANE,
+    SIDE,
+    SOUND,
+    TERMS,
+    lay_neighbours,
+    room_for_maps,
+    solve_maps,
+)
 
 RING = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
 )
 INNER = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING])
-TERMS = 6  # 1, x, y, x^2, xy, y^2 in units of the local edge
 MIN_QUADRATIC = 9  # neighbours for the quadratic; fewer get the linear map
 MIN_LINEAR = 4
 CUBIC = 10  # the same terms and x^3, x^2 y, x y^2, y^3
 MIN_CUBIC = 16  # neighbours, which leave a cubic something to miss
-PIVOT = 1e-7
 
 
 @compiled
@@ -60,7 +71,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * there[..., None]
     weights = np.zeros(table.shape)
     quadratic = count >= MIN_QUADRATIC
-    for terms, use in ((TERMS, quadratic), (3, (count >= MIN_LINEAR) & ~quadratic)):
+    for terms, use in ((TERMS, quadratic), (PLANE, (count >= MIN_LINEAR) & ~quadratic)):
         map_rows = rows[use, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
         sound = np.linalg.eigvalsh(gram)[:, 0] > PIVOT * count[use]
@@ -69,7 +80,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     return weights
 
 
-@compiled
+@inlined
 def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
     """Whether a known marker lies farther than the limit from where its neighbours put it, or these are not all known,
     or too few."""
@@ -121,64 +132,41 @@ def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
         the neighbours are too few or on a line.
     """
     count = xy_px.shape[0]
-    place = np.full((count, 2), np.nan)
-    variance = np.full(count, np.nan)
-    leverage = np.full(count, np.nan)
-    support = np.zeros(count, np.int32)
-    normal, sides = np.zeros((TERMS, TERMS)), np.zeros((2, TERMS))
-    rows, unit = np.zeros((RING.shape[0], TERMS)), np.zeros(TERMS)
+    out = (
+        np.full((count, 2), np.nan),
+        np.full(count, np.nan),
+        np.full(count, np.nan),
+        np.zeros(count, np.int32),
+    )
+    room, filled, members = room_for_maps(table.shape[1]), 0, np.empty(LANES, np.int64)
     for m in range(count):
         if not wanted[m]:
             continue
-        scale, n = 0.0, 0
-        for k in range(table.shape[1]):
-            j = table[m, k]
-            if j >= 0 and not np.isnan(xy_px[j, 0]):
-                scale += np.hypot(marker_mm[j, 0] - marker_mm[m, 0], marker_mm[j, 1] - marker_mm[m, 1])
-                n += 1
-        support[m] = n
-        if n < MIN_LINEAR:
-            continue
-        terms = TERMS if n >= MIN_QUADRATIC else 3
-        scale /= n
-        normal[:] = 0.0
-        sides[:] = 0.0
-        n = 0
-        for k in range(table.shape[1]):
-            j = table[m, k]
-            if j < 0 or np.isnan(xy_px[j, 0]):
-                continue
-            x, y = (marker_mm[j, 0] - marker_mm[m, 0]) / scale, (marker_mm[j, 1] - marker_mm[m, 1]) / scale
-            rows[n, 0], rows[n, 1], rows[n, 2] = 1.0, x, y
-            rows[n, 3], rows[n, 4], rows[n, 5] = x * x, x * y, y * y
-            for a in range(terms):
-                sides[0, a] += rows[n, a] * xy_px[j, 0]
-                sides[1, a] += rows[n, a] * xy_px[j, 1]
-                for b in range(a + 1):
-                    normal[a, b] += rows[n, a] * rows[n, b]
-            n += 1
-        if not _factor(normal, terms):
-            continue
-        _solve(normal, terms, sides[0])
-        _solve(normal, terms, sides[1])
-        place[m, 0], place[m, 1] = sides[0, 0], sides[1, 0]
-        squares, n = 0.0, 0
-        for k in range(table.shape[1]):
-            j = table[m, k]
-            if j < 0 or np.isnan(xy_px[j, 0]):
-                continue
-            dx, dy = xy_px[j, 0], xy_px[j, 1]
-            for a in range(terms):
-                dx -= sides[0, a] * rows[n, a]
-                dy -= sides[1, a] * rows[n, a]
-            squares += dx * dx + dy * dy
-            n += 1
-        unit[:] = 0.0
-        unit[0] = 1.0
-        _solve(normal, terms, unit)
-        leverage[m] = unit[0]
-        variance[m] = squares / (2.0 * max(n - terms, 1))
-    return place, variance, leverage, support
+        n = lay_neighbours(xy_px, m, filled, marker_mm, table, room)
+        out[3][m] = n
+        if n >= MIN_LINEAR:
+            room[1][BENT * LANES + filled], members[filled] = n >= MIN_QUADRATIC, m
+            filled += 1
+        if filled == LANES:
+            _predict(members, room, out)
+            filled = 0
+    if filled > 0:
+        _predict(members[:filled], room, out)
+    return out
+
+
+@compiled
+def _predict(members, room, out):  # type: ignore[no-untyped-def]
+    """Write what ``predicted`` returns of these markers, which have the first lanes."""
+    solve_maps(room, members.shape[0])
+    place, variance, leverage, support = out
+    for lane in range(members.shape[0]):
+        one = room[1][lane:]
+        if one[SOUND * LANES] > 0.0:
+            m, terms = members[lane], TERMS if one[BENT * LANES] > 0.0 else PLANE
+            place[m, 0], place[m, 1] = one[SIDE * LANES], one[(SIDE + TERMS) * LANES]
+            leverage[m] = one[(SIDE + 2 * TERMS) * LANES]
+            variance[m] = one[LEFT * LANES] / (2.0 * max(support[m] - terms, 1))
 
 
 @compiled

@@ -16,7 +16,7 @@ from .arcs import by_layer
 from .dropping import MILD_SUPPORT, believable, inside
 from .engine import compiled
 from .fit import Refined
-from .neighbourhood import cubic_variance, predicted
+from .neighbourhood import MIN_CUBIC, cubic_variance, predicted
 from .placing import Places
 from .tables import Lattice
 from .types import Status
@@ -99,19 +99,26 @@ def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size)
             if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
                 variance, xy[m] = _by_cells(m, near, implied, edge[m], size), implied[m]
             lost[m] = not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size))
-            cov[m] = variance * np.eye(2)
+            _spread(cov[m], variance)
     if lost.any():  # what says less, and takes longer, is asked only of these
-        bent = cubic_variance(known, lost, marker_mm, table)
+        bent = cubic_variance(known, lost & (near[3] >= MIN_CUBIC), marker_mm, table)
         along, doubt = by_layer(known, layers)
         for m in np.flatnonzero(lost):
             variance, xy[m] = _in_whole_rings(bent[m], edge[m]), near[0][m]
             if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
                 variance, xy[m], status[m] = _by_layer(doubt[m], edge[m]), along[m], FITTED
-            cov[m] = variance * np.eye(2)
+            _spread(cov[m], variance)
     for n in range(xy.shape[0]):
         if not (cov[n, 0, 0] >= 0.0 and inside(xy[n, 0], xy[n, 1], size)):
             xy[n], cov[n], status[n] = np.nan, np.nan, LOST
     return status
+
+
+@compiled
+def _spread(cov, variance):  # type: ignore[no-untyped-def]
+    """Write the covariance of a place that is as sure along as across."""
+    cov[0, 0], cov[1, 1] = variance, variance
+    cov[0, 1], cov[1, 0] = 0.0, 0.0
 
 
 @compiled

@@ -102,7 +102,7 @@ def _leads(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-unt
     return aside_x * aside_x + aside_y * aside_y < MAX_ASIDE**2 * (x * x + y * y)
 
 
-@compiled
+@inlined
 def turn_like(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no-untyped-def]
     """From which corner the triangle of cell i, the layout's u, is counted for its map, written to ``out``, to be like
     the wanted one; -1 where none is, or it has none."""
@@ -176,7 +176,7 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, slope, fres
     return queue[first:end]
 
 
-@compiled
+@inlined
 def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
     """Whether a place of the layout beside u is free."""
     for k in range(6):
@@ -186,7 +186,7 @@ def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled
+@inlined
 def _turn_beside(center, corner, area, i, j, u, v, k, turn, plan, step):  # type: ignore[no-untyped-def]
     """From which corner cell j's triangle is counted if it is v, the neighbour along k of u, which is cell i counted
     from ``turn``; -1 where it does not touch as v does."""

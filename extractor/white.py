@@ -42,10 +42,10 @@ OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
 DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
 # How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
 WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
-RINGS = [
-    (STEPS[(low < DISTANCES) & (high >= DISTANCES)], OFFSETS[(low < DISTANCES) & (high >= DISTANCES)])
-    for low, high in zip((0.0, *WHITE_REACHES), WHITE_REACHES, strict=False)
-]
+DISTANT = np.digitize(DISTANCES, WHITE_REACHES, right=True)
+ORDER = np.argsort(DISTANT, kind="stable")
+STEPS, OFFSETS = STEPS[ORDER], OFFSETS[ORDER]
+RINGS = np.searchsorted(DISTANT[ORDER], np.arange(len(WHITE_REACHES) + 1))  # where in these each reach begins
 
 
 class Way(NamedTuple):
@@ -83,40 +83,63 @@ def ways_from_white(
         return []
     radius, level, inks, strongest = _shown(image, center, cells.area_px, cells.ink, known)
     layout = lattice.cell_of, lattice.layers, *lattice.white_place, lattice.center_mm
-    refused = np.empty((0, 2), np.int32)  # places that have been tried nearer
-    for number, (steps, offsets) in enumerate(RINGS):
-        far = number > 0
-        dark, places, mean, white, black = _bright(
-            image, center, at, known, basis, radius, level, strongest, steps, offsets, far
-        )
-        if not dark:
-            return []
-        cell, inside, middle = _tried(image, center, at, known, places, refused, layout, inks, black)
-        fits = np.flatnonzero(inside)
-        if len(fits) > 0:
-            like = [n for n in fits if mean[n] > SAME_WHITE * mean[fits[0]]]
-            return [
-                Way(cell[n], int(inside[n]), len(known) - int(inside[n]), middle[n], float(white[n]), not far)
-                for n in like
-            ]
-        refused = np.concatenate((refused, places))
-    return []
+    seen = known, basis, radius, level
+    ring, cell, inside, middle, mean, white = _searched(image, center, at, seen, inks, strongest, layout)
+    fits = np.flatnonzero(inside)
+    return [
+        Way(cell[n], int(inside[n]), len(known) - int(inside[n]), middle[n], float(white[n]), ring == 0)
+        for n in fits
+        if mean[n] > SAME_WHITE * mean[fits[0]]
+    ]
 
 
 @compiled
-def _bright(image, center, at, known, basis, radius, level, strongest, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """Whether it is dark between the inks at these steps from the known cells, which is not asked ``far`` away; the
-    bright places there, the brightest first, how bright, how white they are; and the color of the others."""
-    places, mean, white, votes, color = _whiteness(
-        image, center, at, known, basis, radius, level, strongest, steps, offsets, far
-    )
-    bright, black = np.empty(0, np.int64), np.empty(3)
-    dark = far or _dark(mean, votes)
-    if dark:
+def _searched(image, center, at, seen, inks, strongest, layout):  # type: ignore[no-untyped-def]
+    """In which ring around the known cells the white one was found, and of each bright place there, the brightest
+    first, what ``_tried`` tells and how bright and white it is.
+
+    What three cells surround has been seen as well as it can be; it is not looked at again from farther off, nor is
+    what was tried.
+    """
+    known = seen[0]
+    grid = _axial_grid(at, known)
+    closed, black = np.zeros(grid[2] * grid[3], np.bool_), np.empty(3)
+    for ring in range(RINGS.shape[0] - 1):
+        begin, end, far = RINGS[ring], RINGS[ring + 1], ring > 0
+        sums = _foreseen(center, at, seen, STEPS[begin:end], OFFSETS[begin:end], grid)
+        places, mean, white, votes, color = _colored(image, sums, closed, grid, strongest, far)
+        if not far:
+            if not _dark(mean, votes):
+                break
+            _between(color, votes, black)
+            _close(closed, places[votes == 3], grid)
         bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
-    if bright.shape[0] > 0:
-        _between(color, votes, black)
-    return dark, places[bright], mean[bright], white[bright], black
+        if bright.shape[0] == 0:
+            continue
+        cell, inside, middle = _tried(image, center, at, known, places[bright], layout, inks, black)
+        if inside.any():
+            return ring, cell, inside, middle, mean[bright], white[bright]
+        _close(closed, places[bright], grid)
+    nothing = np.empty(0)
+    return -1, np.empty((0, 0), np.int32), np.empty(0, np.int64), np.empty((0, 2)), nothing, nothing
+
+
+@compiled
+def _axial_grid(at, known):  # type: ignore[no-untyped-def]
+    """The least axial q and r of a grid that holds all places which the known cells see, and its rows and columns."""
+    low_q, low_r, high_q, high_r = 1 << 20, 1 << 20, -(1 << 20), -(1 << 20)
+    for i in known:
+        low_q, high_q = min(low_q, at[i, 0]), max(high_q, at[i, 0])
+        low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
+    rows, columns = high_q - low_q + 2 * STEP_REACH + 1, high_r - low_r + 2 * STEP_REACH + 1
+    return low_q - STEP_REACH, low_r - STEP_REACH, rows, columns
+
+
+@compiled
+def _close(closed, places, grid):  # type: ignore[no-untyped-def]
+    """Mark places as not to be looked at again, in place."""
+    for n in range(places.shape[0]):
+        closed[(places[n, 0] - grid[0]) * grid[3] + places[n, 1] - grid[1]] = True
 
 
 @compiled
@@ -229,21 +252,12 @@ def _shown(image, center, area, ink, known):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _whiteness(image, center, at, known, basis, radius_of, level_of, strongest, steps, offsets, far):  # type: ignore[no-untyped-def]
-    """The down-cells at these steps from numbered cells: axial places, brightness against the inks, how white, 0 where
-    it is colored, how many cells tell, and (D, 3) their colors.
-
-    Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
-    """
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    low_q, low_r, high_q, high_r = 1 << 20, 1 << 20, -(1 << 20), -(1 << 20)
-    for i in known:
-        low_q, high_q = min(low_q, at[i, 0]), max(high_q, at[i, 0])
-        low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
-    low_q, low_r = low_q - STEP_REACH, low_r - STEP_REACH
-    rows, columns = high_q + STEP_REACH - low_q + 1, high_r + STEP_REACH - low_r + 1
-    # x, y, radius and level, summed over the cells that see the place, and their number
-    sums, found = np.zeros((rows * columns, 5)), 0
+def _foreseen(center, at, seen, steps, offsets, grid):  # type: ignore[no-untyped-def]
+    """(P, 5) of each place of the grid x, y, radius and level, summed over the known cells that see it at one of these
+    steps, and the number of these."""
+    low_q, low_r, rows, columns = grid
+    known, basis, radius_of, level_of = seen
+    sums = np.zeros((rows * columns, 5))
     way = np.empty(steps.shape[0], np.int64)
     for k in range(steps.shape[0]):
         way[k] = steps[k, 0] * columns + steps[k, 1]
@@ -256,26 +270,31 @@ def _whiteness(image, center, at, known, basis, radius_of, level_of, strongest, 
         here = (at[i, 0] - low_q) * columns + at[i, 1] - low_r
         for k in range(steps.shape[0]):
             to = np.uint64(here + way[k])
-            found += sums[to, 4] == 0.0
             sums[to, 0] += x + a * offsets[k, 0] + b * offsets[k, 1]
             sums[to, 1] += y + c * offsets[k, 0] + d * offsets[k, 1]
             sums[to, 2] += radius
             sums[to, 3] += level
             sums[to, 4] += 1.0
-    return _colored(flat, height, width, sums, found, low_q, low_r, columns, strongest, far)
+    return sums
 
 
 @compiled
-def _colored(flat, height, width, sums, count, low_q, low_r, columns, strongest, far):  # type: ignore[no-untyped-def]
-    """What ``_whiteness`` returns, of the ``count`` places that any cell sees."""
+def _colored(image, sums, closed, grid, strongest, far):  # type: ignore[no-untyped-def]
+    """The places that any cell sees and that are not closed: axial, brightness against the inks, how white, 0 where it
+    is colored, how many cells tell, and (D, 3) their colors.
+
+    Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
+    """
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    count = np.count_nonzero((sums[:, 4] > 0.0) & ~closed)
     places, seen = np.empty((count, 2), np.int32), np.zeros((count, 3))
     ratio, white, votes = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
     room, begin, found = room_for_samples(), 0, 0
     patches, level = room.patches, np.empty(POINTS)
     for place in range(sums.shape[0]):
         number = sums[place, 4]
-        if number > 0.0:
-            places[found, 0], places[found, 1] = place // columns + low_q, place % columns + low_r
+        if number > 0.0 and not closed[place]:
+            places[found, 0], places[found, 1] = place // grid[3] + grid[0], place % grid[3] + grid[1]
             votes[found] = int(number)
             n = found - begin
             patches[X + n], patches[Y + n] = sums[place, 0] / number, sums[place, 1] / number
@@ -304,18 +323,13 @@ def _judged(patches, n, level, strongest, far, seen):  # type: ignore[no-untyped
 
 
 @compiled
-def _tried(image, center, at, known, places, refused, layout, inks, black):  # type: ignore[no-untyped-def]
-    """(P, N) int32 what ``_put`` makes of the known cells at each place that is not refused, (P,) how many cells have a
-    place in the layout, and (P, 2) px the middle of the white cell: 0 and NaN where it is not there."""
+def _tried(image, center, at, known, places, layout, inks, black):  # type: ignore[no-untyped-def]
+    """(P, N) int32 what ``_put`` makes of the known cells at each place, (P,) how many of them have one in the layout,
+    and (P, 2) px the middle of the white cell: 0 and NaN where it is not there."""
     cell_of, layers, white_mm, to_mm, center_mm = layout
     cell, inside = np.empty((places.shape[0], at.shape[0]), np.int32), np.zeros(places.shape[0], np.int64)
     middle = np.full((places.shape[0], 2), np.nan)
     for n in range(places.shape[0]):
-        anew = True
-        for k in range(refused.shape[0]):
-            anew = anew and (refused[k, 0] != places[n, 0] or refused[k, 1] != places[n, 1])
-        if not anew:
-            continue
         count = _put(at, known, places[n], cell_of, layers, cell[n])
         if count > 0:
             middle[n] = white_cell(image, center, cell[n], white_mm, to_mm, center_mm, inks, black)

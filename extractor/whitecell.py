@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from .algebra import cholesky_solve, dot
+from .batch import COLOR, POINTS, RADIUS, X, Y, room_for_samples, sample_patches
+from .batch import INSIDE as INSIDE_IMAGE
 from .engine import compiled
 from .sampling import sample_patch
 
@@ -32,6 +34,8 @@ SIDES = [
 ]
 OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(SIDES) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]])
 GRID, GRID_REACH = 4, 0.8  # places over which the centroid is taken
+STEP = np.arange(-GRID, GRID + 1)
+AROUND = GRID_REACH / GRID * np.array([[a, b] for a in STEP for b in STEP if abs(a + b) <= GRID])
 
 
 @compiled
@@ -149,24 +153,40 @@ def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _place(middle, slope, u, v):  # type: ignore[no-untyped-def]
+    """The place in the image this axial way from the middle."""
+    return middle[0] + slope[0, 0] * u + slope[0, 1] * v, middle[1] + slope[1, 0] * u + slope[1, 1] * v
+
+
+@compiled
+def _radius(slope):  # type: ignore[no-untyped-def]
+    """Over which a color is taken, px."""
+    return 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
+
+
+@compiled
 def _sampled(image, middle, slope, u, v, out):  # type: ignore[no-untyped-def]
     """Write the mean color around this axial way from the middle; False outside the image."""
-    radius = 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
-    px = middle[0] + slope[0, 0] * u + slope[0, 1] * v
-    py = middle[1] + slope[1, 0] * u + slope[1, 1] * v
-    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, radius, out)
+    px, py = _place(middle, slope, u, v)
+    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, _radius(slope), out)
 
 
 @compiled
 def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
     """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
+    room, radius = room_for_samples(), _radius(slope)
+    patches = room.patches
+    for n in range(AROUND.shape[0]):
+        patches[X + n], patches[Y + n] = _place(where, slope, AROUND[n, 0], AROUND[n, 1])
+        patches[RADIUS + n] = radius
+    sample_patches(image.reshape(-1), image.shape[0], image.shape[1], AROUND.shape[0], room)
     total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
-    for a in range(-GRID, GRID + 1):
-        for b in range(-GRID, GRID + 1):
-            u, v = GRID_REACH * a / GRID, GRID_REACH * b / GRID
-            if abs(a + b) <= GRID and _sampled(image, where, slope, u, v, own):
-                weight = max(_whiteness(own, strongest) - ground, 0.0)
-                total, q, r = total + weight, q + weight * u, r + weight * v
+    for n in range(AROUND.shape[0]):
+        if patches[INSIDE_IMAGE + n] > 0.0:
+            for channel in range(3):
+                own[channel] = patches[COLOR + channel * POINTS + n]
+            weight = max(_whiteness(own, strongest) - ground, 0.0)
+            total, q, r = total + weight, q + weight * AROUND[n, 0], r + weight * AROUND[n, 1]
     return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
 
 

@@ -15,9 +15,11 @@ from benchmarks.stress_suite.frames import PATTERNS, RGB, Frame, plain
 from benchmarks.stress_suite.reading import extractor_of
 from benchmarks.stress_suite.score import Score, score
 from extractor.arcs import by_layer
+from extractor.attach import attach
 from extractor.bridge import unbridged
 from extractor.cells import Cells
 from extractor.near import bucketed, nearest
+from extractor.numbering import Numbering
 from extractor.tables import Lattice, cells_at, lattice_of
 
 
@@ -128,3 +130,21 @@ def test_cells_that_touch_by_corners_are_numbered(pattern: str) -> None:
     figures = [read(plain(pattern, seed).damaged(missing_share=0.3)) for seed in (3, 4, 5)]
     assert all(one.wrong == 0 for one in figures)
     assert sum(one.kept for one in figures) >= 0.99 * sum(one.sure for one in figures)
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 3])
+def test_a_cell_in_pieces_beyond_a_gap_has_no_number(pieces: int) -> None:
+    """Each of them would be taken for the cell; without triangles, only the prediction tells which that is."""
+    own, px = lattice("honeycomb"), 20.0
+    x = own.center_mm[:, 0]
+    known, beyond = np.flatnonzero(x < 0.0), np.flatnonzero((x > 3.0) & (np.abs(own.center_mm[:, 1]) < 2.0))
+    target = beyond[np.argmin(x[beyond])]
+    held = np.concatenate([known, np.repeat(target, pieces)])
+    center = px * own.center_mm[held]
+    center[len(known) :, 1] += 4.0 * np.arange(pieces)
+    count, area = len(held), px * px * own.size_mm[held] ** 2 * 0.75**0.5 / 2
+    numbers = np.concatenate([known, np.full(pieces, -1)]).astype(np.int32)
+    cells = Cells(center, own.ink[held], area, np.full((count, 3, 2), np.nan))
+    after = attach(cells, Numbering(numbers, False, center[: len(known)].mean(axis=0), 0), own)
+    assert (after.cell[: len(known)] == known).all()
+    assert after.cell[len(known) :].tolist() == ([target] if pieces == 1 else [-1] * pieces)

@@ -1,0 +1,207 @@
+"""Quadratic maps from layout to image through the markers of two rings: for many markers at once.
+
+Up to ``LANES`` markers stand side by side, and each operation is done for all of them: one by one, their small systems
+wait for every root and quotient. A neighbour that is not known is 0 throughout.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .engine import compiled, inlined
+
+LANES = 16  # markers at most
+TERMS, SIDES = 6, 3  # 1, x, y, x^2, xy, y^2 in units of the local edge; right sides: x, y and the leverage
+PLANE = 3  # the terms of a linear map
+PIVOT = 1e-7
+# Rows of lanes: of a neighbour the terms and its place in the image; the neighbours' mean distance in the layout; 1 for
+# a quadratic, 0 for a linear map; the squares that the map leaves; 1 where the neighbours determine it;
+PLACE_X, PLACE_Y, SCALE, BENT, LEFT, SOUND = 6, 7, 8, 9, 10, 11
+# of the normal equations the lower triangle; their right sides, which the solutions replace.
+NORMAL, SIDE = 12, 12 + TERMS * (TERMS + 1) // 2
+ROWS = SIDE + SIDES * TERMS
+KNOWN, X, Y, U, V, LAID = 0, 1, 2, 3, 4, 5  # rows of what is laid of every neighbour
+
+
+@compiled
+def room_for_maps(neighbours):  # type: ignore[no-untyped-def]
+    """What ``LANES`` maps through so many neighbours are computed in: these, and the rows, both flat."""
+    rows = np.zeros(ROWS * LANES)
+    rows[SCALE * LANES : (BENT + 1) * LANES] = 1.0
+    return np.zeros(neighbours * LAID * LANES), rows
+
+
+@inlined
+def lay_neighbours(xy, m, lane, marker_mm, table, room):  # type: ignore[no-untyped-def]
+    """Write the known neighbours of marker m into a lane; how many there are."""
+    around, rows = room
+    scale, n = 0.0, 0
+    for k in range(table.shape[1]):
+        j, at = table[m, k], k * LAID * LANES + lane
+        if j < 0 or np.isnan(xy[j, 0]):
+            for row in range(LAID):
+                around[at + row * LANES] = 0.0
+            continue
+        x, y = marker_mm[j, 0] - marker_mm[m, 0], marker_mm[j, 1] - marker_mm[m, 1]
+        around[at + KNOWN * LANES], around[at + X * LANES], around[at + Y * LANES] = 1.0, x, y
+        around[at + U * LANES], around[at + V * LANES] = xy[j, 0], xy[j, 1]
+        scale += np.hypot(x, y)
+        n += 1
+    rows[SCALE * LANES + lane] = scale / n if n > 0 else 1.0
+    return n
+
+
+@compiled
+def solve_maps(room, lanes):  # type: ignore[no-untyped-def]
+    """Lay the maps through the neighbours of the first lanes; terms of x, y and leverage are the right sides' rows."""
+    around, rows = room
+    rows[LEFT * LANES : SOUND * LANES], rows[NORMAL * LANES :] = 0.0, 0.0
+    rows[SOUND * LANES : NORMAL * LANES] = 1.0
+    for k in range(0, around.shape[0], LAID * LANES):
+        _take(around[k:], rows, lanes)
+        _add(rows, lanes)
+    for lane in range(lanes):
+        rows[(SIDE + 2 * TERMS) * LANES + lane] = 1.0
+        for a in range(PLANE, TERMS):
+            rows[_product(a, a) * LANES + lane] += 1.0 - rows[BENT * LANES + lane]
+    _factor(rows, lanes)
+    for side in range(SIDE, ROWS, TERMS):
+        _solve(rows, side, lanes)
+    for k in range(0, around.shape[0], LAID * LANES):
+        _take(around[k:], rows, lanes)
+        _leave(rows, lanes)
+
+
+@inlined
+def _product(a, b):  # type: ignore[no-untyped-def]
+    """The row of the product of two terms, b not after a."""
+    return NORMAL + a * (a + 1) // 2 + b
+
+
+@compiled
+def _take(laid, rows, lanes):  # type: ignore[no-untyped-def]
+    """Write the terms of a neighbour of every lane, and its place."""
+    for lane in range(lanes):
+        scale, bent = rows[SCALE * LANES + lane], rows[BENT * LANES + lane]
+        x, y = laid[X * LANES + lane] / scale, laid[Y * LANES + lane] / scale
+        rows[lane] = laid[lane]
+        rows[LANES + lane] = x
+        rows[2 * LANES + lane] = y
+        rows[3 * LANES + lane] = x * x * bent
+        rows[4 * LANES + lane] = x * y * bent
+        rows[5 * LANES + lane] = y * y * bent
+        rows[PLACE_X * LANES + lane] = laid[U * LANES + lane]
+        rows[PLACE_Y * LANES + lane] = laid[V * LANES + lane]
+
+
+@compiled
+def _add(rows, lanes):  # type: ignore[no-untyped-def]
+    """Add a neighbour of every lane to the normal equations.
+
+    Written out: so the machine adds several lanes at once, which it does only in a loop that holds no other.
+    """
+    for lane in range(lanes):
+        one, x, y = rows[lane], rows[LANES + lane], rows[2 * LANES + lane]
+        xx, xy, yy = rows[3 * LANES + lane], rows[4 * LANES + lane], rows[5 * LANES + lane]
+        u, v = rows[PLACE_X * LANES + lane], rows[PLACE_Y * LANES + lane]
+        rows[NORMAL * LANES + lane] += one * one
+        rows[(NORMAL + 1) * LANES + lane] += x * one
+        rows[(NORMAL + 2) * LANES + lane] += x * x
+        rows[(NORMAL + 3) * LANES + lane] += y * one
+        rows[(NORMAL + 4) * LANES + lane] += y * x
+        rows[(NORMAL + 5) * LANES + lane] += y * y
+        rows[(NORMAL + 6) * LANES + lane] += xx * one
+        rows[(NORMAL + 7) * LANES + lane] += xx * x
+        rows[(NORMAL + 8) * LANES + lane] += xx * y
+        rows[(NORMAL + 9) * LANES + lane] += xx * xx
+        rows[(NORMAL + 10) * LANES + lane] += xy * one
+        rows[(NORMAL + 11) * LANES + lane] += xy * x
+        rows[(NORMAL + 12) * LANES + lane] += xy * y
+        rows[(NORMAL + 13) * LANES + lane] += xy * xx
+        rows[(NORMAL + 14) * LANES + lane] += xy * xy
+        rows[(NORMAL + 15) * LANES + lane] += yy * one
+        rows[(NORMAL + 16) * LANES + lane] += yy * x
+        rows[(NORMAL + 17) * LANES + lane] += yy * y
+        rows[(NORMAL + 18) * LANES + lane] += yy * xx
+        rows[(NORMAL + 19) * LANES + lane] += yy * xy
+        rows[(NORMAL + 20) * LANES + lane] += yy * yy
+        rows[SIDE * LANES + lane] += one * u
+        rows[(SIDE + 1) * LANES + lane] += x * u
+        rows[(SIDE + 2) * LANES + lane] += y * u
+        rows[(SIDE + 3) * LANES + lane] += xx * u
+        rows[(SIDE + 4) * LANES + lane] += xy * u
+        rows[(SIDE + 5) * LANES + lane] += yy * u
+        rows[(SIDE + 6) * LANES + lane] += one * v
+        rows[(SIDE + 7) * LANES + lane] += x * v
+        rows[(SIDE + 8) * LANES + lane] += y * v
+        rows[(SIDE + 9) * LANES + lane] += xx * v
+        rows[(SIDE + 10) * LANES + lane] += xy * v
+        rows[(SIDE + 11) * LANES + lane] += yy * v
+
+
+@inlined
+def _less(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
+    """Take a product of two rows from a third."""
+    out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
+    for k in range(lanes):
+        lane = np.uint64(k)
+        rows[out + lane] -= rows[one + lane] * rows[two + lane]
+
+
+@inlined
+def _over(rows, to, by, lanes):  # type: ignore[no-untyped-def]
+    """Divide a row by another."""
+    out, one = np.uint64(to * LANES), np.uint64(by * LANES)
+    for k in range(lanes):
+        lane = np.uint64(k)
+        rows[out + lane] /= rows[one + lane]
+
+
+@compiled
+def _factor(rows, lanes):  # type: ignore[no-untyped-def]
+    """Cholesky factors in place; not sound where the neighbours do not determine the map, which has any then."""
+    for i in range(TERMS):
+        own = _product(i, i)
+        for j in range(i):
+            for k in range(j):
+                _less(rows, _product(i, j), _product(i, k), _product(j, k), lanes)
+            _over(rows, _product(i, j), _product(j, j), lanes)
+            _less(rows, own, _product(i, j), _product(i, j), lanes)
+        for lane in range(lanes):
+            determined = rows[own * LANES + lane] > PIVOT
+            rows[SOUND * LANES + lane] = rows[SOUND * LANES + lane] if determined else 0.0
+            rows[own * LANES + lane] = np.sqrt(rows[own * LANES + lane] if determined else 1.0)
+
+
+@compiled
+def _solve(rows, side, lanes):  # type: ignore[no-untyped-def]
+    """Replace a right side by the solution."""
+    for i in range(TERMS):
+        for k in range(i):
+            _less(rows, side + i, _product(i, k), side + k, lanes)
+        _over(rows, side + i, _product(i, i), lanes)
+    for i in range(TERMS - 1, -1, -1):
+        for k in range(i + 1, TERMS):
+            _less(rows, side + i, _product(k, i), side + k, lanes)
+        _over(rows, side + i, _product(i, i), lanes)
+
+
+@compiled
+def _leave(rows, lanes):  # type: ignore[no-untyped-def]
+    """Add the squared distance of a neighbour of every lane from where the map puts it."""
+    for lane in range(lanes):
+        one, x, y = rows[lane], rows[LANES + lane], rows[2 * LANES + lane]
+        xx, xy, yy = rows[3 * LANES + lane], rows[4 * LANES + lane], rows[5 * LANES + lane]
+        u = rows[PLACE_X * LANES + lane] - rows[SIDE * LANES + lane] * one
+        v = rows[PLACE_Y * LANES + lane] - rows[(SIDE + 6) * LANES + lane] * one
+        u -= rows[(SIDE + 1) * LANES + lane] * x
+        v -= rows[(SIDE + 7) * LANES + lane] * x
+        u -= rows[(SIDE + 2) * LANES + lane] * y
+        v -= rows[(SIDE + 8) * LANES + lane] * y
+        u -= rows[(SIDE + 3) * LANES + lane] * xx
+        v -= rows[(SIDE + 9) * LANES + lane] * xx
+        u -= rows[(SIDE + 4) * LANES + lane] * xy
+        v -= rows[(SIDE + 10) * LANES + lane] * xy
+        u -= rows[(SIDE + 5) * LANES + lane] * yy
+        v -= rows[(SIDE + 11) * LANES + lane] * yy
+        rows[LEFT * LANES + lane] += u * u + v * v
