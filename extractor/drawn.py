@@ -138,19 +138,17 @@ def _drawn_again(image, board, about, how, anew, before):  # type: ignore[no-unt
     (xy, maps, bend, rough), (cells, cell_edges, edges, edge_cells, along) = about
     (cell, slope), black, frame, sigma, box = how
     old_xy, old_lines, old_bend, old_contrasts, old_black, old_sums = before
-    again, which = touching(anew, edges), touching(anew, cells)
-    xy, bend = chosen(anew, xy, old_xy), chosen(again, bend, old_bend)
-    lines = chosen(again, gridlines(xy, maps, bend, edges, along), old_lines)
-    contrasts = edge_contrasts(lines, xy, cells, edge_cells, cell, slope)
-    colors = cell, slope, sigma, box, picture, strokes
+    some, which = np.flatnonzero(touching(anew, edges)), touching(anew, cells)
+    xy, bend, ends = chosen(anew, xy, old_xy), bend[some], edges[some]
+    own = gridlines(xy, maps, bend, ends, along[some])
+    contrasts = edge_contrasts(own, xy, cells, edge_cells[some], cell, slope)
+    lines, colors = replaced(old_lines, some, own), (cell, slope, sigma, box, picture, strokes)
     erase_cells(which, old_xy, cells, cell_edges, edges, old_lines, *colors)
     draw_cells(which, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    below, loose = black_at(black, middles(lines), *frame), bending_ones(rough, bend, edges)
-    some = lines.copy()
-    some[~again, KNOWN] = 0.0
-    sums = read_gridlines(image, picture, some, contrasts, below, sigma, box, loose, residual)
-    contrasts, below = chosen(again, contrasts, old_contrasts), chosen(again, below, old_black)
-    return xy, lines, bend, contrasts, below, chosen(again, sums, old_sums)
+    below, loose = black_at(black, middles(own), *frame), bending_ones(rough, bend, ends)
+    sums = read_gridlines(image, picture, own, contrasts, below, sigma, box, loose, residual)
+    contrasts, below = replaced(old_contrasts, some, contrasts), replaced(old_black, some, below)
+    return xy, lines, replaced(old_bend, some, bend), contrasts, below, replaced(old_sums, some, sums)
 
 
 @compiled
@@ -167,4 +165,12 @@ def chosen(which, ones, others):  # type: ignore[no-untyped-def]
     for i in range(which.shape[0]):
         if which[i]:
             out[i] = ones[i]
+    return out
+
+
+@compiled
+def replaced(rows, some, ones):  # type: ignore[no-untyped-def]
+    """The rows with others at these numbers (n,)."""
+    out = rows.copy()
+    out[some] = ones
     return out

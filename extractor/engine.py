@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+ANY_ORDER = {"reassoc", "contract", "nsz", "arcp"}
+
 log = logging.getLogger("extractor")
 
 numba: Any
@@ -32,7 +34,7 @@ def vectorized(function: Function) -> Function:
 
     NaN and infinity keep their meaning.
     """
-    return _compiled(function, {"reassoc", "contract", "nsz", "arcp"})
+    return _compiled(function, ANY_ORDER)
 
 
 def inlined(function: Function) -> Function:
@@ -40,10 +42,25 @@ def inlined(function: Function) -> Function:
     return _compiled(function, False, forceinline=True)
 
 
-def _compiled(function: Function, fastmath: bool | set[str], forceinline: bool = False) -> Function:
+def lent(function: Function) -> Function:
+    """The same as ``inlined`` for what neither makes nor returns arrays: references to those it is lent are not
+    counted.
+
+    Every row or slice of an array that is taken counts as one until it is dropped, each time by a locked write: where
+    a loop takes some for every item, that is a good part of its time.
+    """
+    return _compiled(function, False, forceinline=True, _nrt=False)
+
+
+def lent_vectorized(function: Function) -> Function:
+    """The same for loops whose sums may be taken in any order."""
+    return _compiled(function, ANY_ORDER, forceinline=True, _nrt=False)
+
+
+def _compiled(function: Function, fastmath: bool | set[str], **more: bool) -> Function:
     if numba is None:
         return function
-    options = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": forceinline}
+    options = {"cache": True, "nogil": True, "error_model": "numpy", **more}
     kernel: Function = numba.njit(**options, fastmath=fastmath)(function)
     return kernel
 

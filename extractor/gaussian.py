@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import lent
 
 REACH = 3.3  # a side farther away than this is not seen
 WEDGE_STEPS = 8
@@ -50,14 +50,14 @@ HALF = np.float32(0.5)
 WEDGE = _wedge_table()
 
 
-@compiled
+@lent
 def normal(z):  # type: ignore[no-untyped-def]
     """The normal distribution of a float32 as far as ``REACH`` to both sides."""
     zz = z * z
     return HALF + z * (N0 + zz * (N1 + zz * (N2 + zz * (N3 + zz * (N4 + zz * (N5 + zz * (N6 + zz * N7)))))))
 
 
-@compiled
+@lent
 def side_of_wedge(d, t):  # type: ignore[no-untyped-def]
     """G(d, t) of float32 for |d| < 4, bilinearly from its table (error below 3e-4)."""
     steps, reach = np.float32(WEDGE_STEPS), np.float32(WEDGE_REACH)

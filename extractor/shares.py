@@ -13,18 +13,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, lent
 from .gaussian import REACH, normal, side_of_wedge
 from .gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, X, Y
+from .walking import LANES, lanes_of
 
-CHUNK = (
-    2128  # pixels of one cell at once, at most; no power of 2, which would lay all columns on one cache line
-)
-LANES = 16
+CHUNK = 2128  # pixels of one cell at once, at most
+COLUMN = (
+    CHUNK + LANES
+)  # whole lanes are laid out; no power of 2, which would lay all columns on one cache line
 NEAR = np.float32(REACH)
+STEPS = np.arange(COLUMN, dtype=np.float32)
 # columns of pixels: place; for each side the distance inside it, and how far along it they lie from its second and its
 # first corner, along the curve's direction there
-PX, PY = 0, CHUNK
+PX, PY = 0, COLUMN
 D, TO_END, TO_START, OF_SIDE = 0, CHUNK, 2 * CHUNK, 3 * CHUNK
 # where two sides are near, the first of them
 NO_PAIR, ALL = -1, 3
@@ -33,7 +35,7 @@ NO_PAIR, ALL = -1, 3
 BEFORE, TO_IT, AFTER, FROM_IT = (k * 3 * CHUNK for k in range(4))
 
 
-@compiled
+@lent
 def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
     """A cell's side in units of the blur: d = out[0] + out[1] x + out[2] y inside, t from its first corner likewise.
 
@@ -54,7 +56,7 @@ def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-de
         out[7], out[8] = -sense * line[ARRIVE], -sense * line[LEAVE]
 
 
-@compiled
+@lent
 def lay_sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
     """Fill in a cell's three sides; how far they can lie off their chords."""
     bulge = 0.0
@@ -66,7 +68,7 @@ def lay_sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ign
     return bulge
 
 
-@compiled
+@lent
 def opening_of(side, other, sigma):  # type: ignore[no-untyped-def]
     """The angle at the corner between a side's end and the next one's start, over 2 pi."""
     cosine = -(side[4] * other[4] + side[5] * other[5]) * sigma * sigma
@@ -75,22 +77,35 @@ def opening_of(side, other, sigma):  # type: ignore[no-untyped-def]
     return (angle + np.arctan(side[8]) - np.arctan(other[7])) / (2.0 * np.pi)
 
 
-@compiled
-def columns(side, y, far, left, right):  # type: ignore[no-untyped-def]
-    """The columns of row y that lie less than ``far`` outside of every side."""
-    low, high = left, right
+@lent
+def lay_rows(side, top, count, far, left, right, low, high):  # type: ignore[no-untyped-def]
+    """Fill in the columns, ``left`` to ``right`` at most, between which rows from ``top`` on lie less than ``far``
+    outside of every side."""
+    padded = lanes_of(count)
+    low[:padded], high[:padded] = left, right
     for k in range(3):
-        rest = side[k, 0] + side[k, 2] * y + far
-        if side[k, 1] > 0.0:
-            low = max(low, np.ceil(-rest / side[k, 1]))
-        elif side[k, 1] < 0.0:
-            high = min(high, np.floor(-rest / side[k, 1]))
-        elif rest < 0.0:
-            high = low - 1.0
-    return low, high
+        # where a side runs along the rows, it takes all of them or leaves them
+        nx = side[k, 1] if abs(side[k, 1]) > 1e-9 else 1e-9
+        x, lean = -(side[k, 0] + side[k, 2] * top + far) / nx, -side[k, 2] / nx
+        if nx > 0.0:
+            for i in range(padded):
+                low[i] = max(low[i], x + lean * i)
+        else:
+            for i in range(padded):
+                high[i] = min(high[i], x + lean * i)
 
 
-@compiled
+@lent
+def lay_pixels(places, at, count, x, y):  # type: ignore[no-untyped-def]
+    """Lay out ``count`` pixels of a row from (x, y) on; what comes after them may be written over."""
+    px, py = np.float32(x), np.float32(y)
+    to_x, to_y = np.uint64(PX + at), np.uint64(PY + at)
+    for j in range(lanes_of(count)):
+        k = np.uint64(j)
+        places[to_x + k], places[to_y + k] = px + STEPS[k], py
+
+
+@lent
 def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
     """Fill in the pixels' distances from a side; (x0, y0) is what their places count from."""
     zero, one, limit = np.float32(0.0), np.float32(1.0), np.float32(far)
@@ -112,7 +127,7 @@ def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untype
         out[D + k], out[TO_END + k], out[TO_START + k] = d, length - t - arrive * d, t + leave * d
 
 
-@compiled
+@lent
 def _one_side(sides, count, shares, pairs):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares where one side at most is near, and which they are elsewhere."""
     zero, one = np.float32(0.0), np.float32(1.0)
@@ -131,7 +146,7 @@ def _one_side(sides, count, shares, pairs):  # type: ignore[no-untyped-def]
         pairs[k] = pair if (middle < NEAR) & (low > -NEAR) else np.float32(NO_PAIR)
 
 
-@compiled
+@lent
 def _lay_corner(sides, k, first, corners, at):  # type: ignore[no-untyped-def]
     """Lay out how pixel k lies in the corner between a side and the next one."""
     a, b = first * OF_SIDE + k, (first + 1 if first < 2 else 0) * OF_SIDE + k
@@ -139,7 +154,7 @@ def _lay_corner(sides, k, first, corners, at):  # type: ignore[no-untyped-def]
     corners[AFTER + at], corners[FROM_IT + at] = sides[D + b], sides[TO_START + b]
 
 
-@compiled
+@lent
 def _wedges(corners, count):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares of the wedges, less those of the openings."""
     for k in range(count):
@@ -147,7 +162,7 @@ def _wedges(corners, count):  # type: ignore[no-untyped-def]
         corners[BEFORE + k] = share + side_of_wedge(corners[AFTER + k], corners[FROM_IT + k])
 
 
-@compiled
+@lent
 def _more_sides(sides, count, openings, pixels, corners, shares, pairs):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares where two or three sides are near."""
     found, laid = 0, 0
@@ -164,9 +179,9 @@ def _more_sides(sides, count, openings, pixels, corners, shares, pairs):  # type
         for side in range(3):
             _lay_corner(sides, k, side, corners, laid + side)
         laid += 3
-    for k in range(laid, (laid + LANES - 1) // LANES * LANES):
+    for k in range(laid, lanes_of(laid)):
         corners[BEFORE + k], corners[AFTER + k] = np.float32(0.0), np.float32(0.0)
-    _wedges(corners, (laid + LANES - 1) // LANES * LANES)
+    _wedges(corners, lanes_of(laid))
     laid = 0
     for i in range(found):
         k = pixels[i]
@@ -191,11 +206,11 @@ def room_for_shares():  # type: ignore[no-untyped-def]
     return sides, pairs, np.empty(CHUNK, np.int64), np.zeros(12 * CHUNK, np.float32)
 
 
-@compiled
+@lent
 def fill_shares(places, count, x0, y0, side, openings, far, room, shares):  # type: ignore[no-untyped-def]
     """Fill in the shares of a cell in the pixels that are laid out in ``places``, which count from (x0, y0)."""
     sides, pairs, pixels, corners = room
-    padded = (count + LANES - 1) // LANES * LANES
+    padded = lanes_of(count)
     for k in range(3):
         _from_side(places, padded, side[k], x0, y0, far, sides[k * OF_SIDE :])
     _one_side(sides, padded, shares, pairs)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, inlined, vectorized
+from .engine import compiled, lent, lent_vectorized
 from .gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
 from .walking import ALONG, ASIDE, CHUNK, FROM, TO, gather_squares, lanes_of, lay_rows, row_sizes
 
@@ -72,7 +72,7 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
     return out
 
 
-@compiled
+@lent
 def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
     """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
     gridline's place by those of its start and end."""
@@ -97,7 +97,7 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@inlined
+@lent
 def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
@@ -119,7 +119,7 @@ def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leav
             out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
 
 
-@vectorized
+@lent_vectorized
 def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
@@ -153,7 +153,7 @@ def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     sums[PIXELS] += pixels
 
 
-@vectorized
+@lent_vectorized
 def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending, with weights t (1 - t) and t (1 - t) (1 - 2 t)."""
     zero = np.float32(0.0)
@@ -207,7 +207,7 @@ def _area(lines, reach, box):  # type: ignore[no-untyped-def]
     )
 
 
-@vectorized
+@lent_vectorized
 def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
     """Write image - model within the area into the flat ``residual``."""
     width = 3 * (area[2] - area[0])
@@ -230,16 +230,24 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose, res
     the pixels in the box.
     """
     out = np.zeros((lines.shape[0], SUMS))
-    inverse, reach = 1.0 / sigma, BAND * sigma
-    area = _area(lines, reach, box)
+    area = _area(lines, BAND * sigma, box)
     _subtract(image, model, area, residual)
-    width, height = area[2] - area[0], area[3] - area[1]
     at, rows, weights = (
         np.empty(CHUNK, np.int64),
         np.empty(4 * CHUNK, np.float32),
         np.empty(6 * CHUNK, np.float32),
     )
-    rest, squares = np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
+    room = at, rows, weights, np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
+    _read(residual, lines, contrasts, black, sigma, area, loose, room, out)
+    return out
+
+
+@lent
+def _read(residual, lines, contrasts, black, sigma, area, loose, room, out):  # type: ignore[no-untyped-def]
+    """Fill in the sums (E, 24) from the residual within the area."""
+    at, rows, weights, rest, squares = room
+    inverse, reach = 1.0 / sigma, BAND * sigma
+    width, height = area[2] - area[0], area[3] - area[1]
     for e in range(lines.shape[0]):
         color = np.float32(contrasts[e, 0]), np.float32(contrasts[e, 1]), np.float32(contrasts[e, 2])
         strength = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
@@ -282,4 +290,3 @@ def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose, res
             sums[k] *= inverse
         for k in (SHARE_A, SHARE_B, SHARE_C, SHARE_D):
             sums[k] *= 0.5 * inverse
-    return out

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, vectorized
+from .engine import lent, lent_vectorized
 
 CHUNK = 2128  # pixels of one gridline at once, at most; no power of 2, which would lay all columns on one cache line
 LANES = 16  # rows are handled so many at once
@@ -18,7 +18,7 @@ LANES = 16  # rows are handled so many at once
 ALONG, ASIDE, FROM, TO = (k * CHUNK for k in range(4))
 
 
-@compiled
+@lent
 def row_sizes(half, most):  # type: ignore[no-untyped-def]
     """How many pixels of a row may lie within its band, ``half`` to both sides, ``most`` at most; and how many rows of
     them fit into a chunk."""
@@ -26,13 +26,13 @@ def row_sizes(half, most):  # type: ignore[no-untyped-def]
     return wide, CHUNK // (wide * LANES) * LANES
 
 
-@compiled
+@lent
 def lanes_of(count):  # type: ignore[no-untyped-def]
     """So many rows, filled up to whole lanes."""
     return (count + LANES - 1) // LANES * LANES
 
 
-@vectorized
+@lent_vectorized
 def lay_rows(  # type: ignore[no-untyped-def]
     first,
     every,
@@ -77,7 +77,7 @@ def lay_rows(  # type: ignore[no-untyped-def]
         rows[TO + i] = -1.0 if i >= count else stop - base
 
 
-@compiled
+@lent
 def gather(flat, at, count, wide, step, color, beneath, rest):  # type: ignore[no-untyped-def]
     """Fill in what the pixels of ``count`` rows show along ``color``, less ``beneath``."""
     c0, c1, c2 = color
@@ -90,7 +90,7 @@ def gather(flat, at, count, wide, step, color, beneath, rest):  # type: ignore[n
             own[i] = shown - beneath
 
 
-@compiled
+@lent
 def gather_squares(flat, at, count, wide, step, color, beneath, rest, squares):  # type: ignore[no-untyped-def]
     """The same where a color lies ``beneath``, and the squared distances from that color."""
     c0, c1, c2 = color
