@@ -12,20 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled, lent
-from .gaussian import REACH
+from .gaussian import OF_CORNER, REACH
 from .gridlines import KNOWN
-from .shares import (
-    CHUNK,
-    COLUMN,
-    PX,
-    PY,
-    fill_shares,
-    lay_pixels,
-    lay_rows,
-    lay_sides,
-    opening_of,
-    room_for_shares,
-)
+from .shares import CHUNK, COLUMN, OF_SIDE, PX, PY, fill_shares, lay_corners, lay_pixels, lay_rows, lay_sides
 from .walking import LANES, lanes_of
 
 KEPT_SHARES, KEPT_RUNS = (
@@ -112,12 +101,11 @@ def _draw(i, sense, geometry, ink, canvas, room):  # type: ignore[no-untyped-def
     """Draw a cell, and keep its strokes where it is added and there is room."""
     (xy, cells, cell_edges, edges, lines), (levels, slopes, sigma, box) = geometry, ink
     flat, width, (kept, all_runs, all_shares, used) = canvas
-    side, openings, places, near, colors, shares, runs, low, high = room
+    side, corners, places, distances, colors, shares, runs, low, high = room
     a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
     turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
     far = REACH + lay_sides(cells[i], cell_edges[i], edges, lines, turn, 1.0 / sigma, side)
-    for k in range(3):
-        openings[k] = opening_of(side[k], side[(k + 1) % 3], sigma)
+    lay_corners(side, sigma, corners)
     top = max(int(np.ceil(min(a[1], b[1], c[1]) - far * sigma)), box[1])
     bottom = min(int(max(a[1], b[1], c[1]) + far * sigma), box[3] - 1)
     left = max(np.ceil(min(a[0], b[0], c[0]) - far * sigma), float(box[0]))
@@ -132,7 +120,7 @@ def _draw(i, sense, geometry, ink, canvas, room):  # type: ignore[no-untyped-def
     while y <= bottom:
         x, y, filled, count = _lay(x, y, top, bottom, low, high, x0, y0, places, runs)
         fits = fits and y > bottom
-        fill_shares(places, count, x0, y0, side, openings, far, near, shares)
+        fill_shares(places, count, x0, y0, side, corners, far, distances, shares)
         _color(places, count, shares, cx - x0, cy - y0, levels[i], slopes[i], sense, colors)
         _add(flat, width, runs[:filled], colors)
     if fits:
@@ -159,12 +147,13 @@ def _erase(i, xy, cells, levels, slopes, canvas, places, colors):  # type: ignor
 
 @compiled
 def _room_for_cell(height):  # type: ignore[no-untyped-def]
-    """Arrays for one cell: its sides and openings; its pixels' places, what is near them, their colors, shares and
+    """Arrays for one cell: its sides and corners; its pixels' places, distances inside the sides, colors, shares and
     runs; and the rows' ends."""
-    places, colors = np.zeros(2 * COLUMN, np.float32), np.empty(3 * CHUNK, np.float32)
-    shares, runs = np.empty(CHUNK, np.float32), np.empty((CHUNK, 3), np.int32)
-    low, high = np.empty(height + LANES), np.empty(height + LANES)
-    return np.zeros((3, 9)), np.zeros(3), places, room_for_shares(), colors, shares, runs, low, high
+    side, corners = np.zeros((3, OF_SIDE)), np.zeros((3, OF_CORNER), np.float32)
+    places, distances = np.zeros(2 * COLUMN, np.float32), np.empty(3 * COLUMN, np.float32)
+    colors, shares = np.empty(3 * CHUNK, np.float32), np.empty(CHUNK, np.float32)
+    runs, low, high = np.empty((CHUNK, 3), np.int32), np.empty(height + LANES), np.empty(height + LANES)
+    return side, corners, places, distances, colors, shares, runs, low, high
 
 
 @compiled

@@ -1,20 +1,20 @@
 """How much of each pixel is a cell: its share under a Gaussian (the optics' blur and the pixel's box in one).
 
-The three sides of a cell are half planes, where two of them are near they form a wedge (``gaussian``); inclusion and
-exclusion joins them:
+The three sides of a cell are half planes, every two of them form a wedge (``gaussian``); inclusion and exclusion joins
+them:
 
-    share = wedge01 + wedge12 + wedge20 - side0 - side1 - side2 + 1.
+    share = wedge01 + wedge12 + wedge20 - side0 - side1 - side2 + 1,
 
-The pixels of a cell stand in arrays, with places from a pixel near its middle, so that float32 does, and all that needs
-no table is done for many at once.
+which is the wedge of two sides where the third is not near. The pixels of a cell stand in arrays, with places from a
+pixel near its middle, so that float32 does, and all is done for many at once, without tables and branches.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, lent
-from .gaussian import REACH, normal, side_of_wedge
+from .engine import lent
+from .gaussian import REACH, correlated, lay_corner, normal
 from .gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, X, Y
 from .walking import LANES, lanes_of
 
@@ -22,17 +22,10 @@ CHUNK = 2128  # pixels of one cell at once, at most
 COLUMN = (
     CHUNK + LANES
 )  # whole lanes are laid out; no power of 2, which would lay all columns on one cache line
+PX, PY = 0, COLUMN  # columns of pixels: their places
+OF_SIDE = 9  # numbers
 NEAR = np.float32(REACH)
 STEPS = np.arange(COLUMN, dtype=np.float32)
-# columns of pixels: place; for each side the distance inside it, and how far along it they lie from its second and its
-# first corner, along the curve's direction there
-PX, PY = 0, COLUMN
-D, TO_END, TO_START, OF_SIDE = 0, CHUNK, 2 * CHUNK, 3 * CHUNK
-# where two sides are near, the first of them
-NO_PAIR, ALL = -1, 3
-# of a corner between two sides: distance inside the first and how far before its end, inside the second and how far
-# after its start
-BEFORE, TO_IT, AFTER, FROM_IT = (k * 3 * CHUNK for k in range(4))
 
 
 @lent
@@ -69,12 +62,15 @@ def lay_sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ign
 
 
 @lent
-def opening_of(side, other, sigma):  # type: ignore[no-untyped-def]
-    """The angle at the corner between a side's end and the next one's start, over 2 pi."""
-    cosine = -(side[4] * other[4] + side[5] * other[5]) * sigma * sigma
-    # the first side bows inwards with slope 8 along its direction; seen from the corner that turns it outwards
-    angle = np.arccos(min(max(cosine, -1.0), 1.0))
-    return (angle + np.arctan(side[8]) - np.arctan(other[7])) / (2.0 * np.pi)
+def lay_corners(side, sigma, corners):  # type: ignore[no-untyped-def]
+    """Fill in the corners (3, 9) between the cell's sides and the next ones."""
+    for k in range(3):
+        one, other = side[k], side[(k + 1) % 3]
+        end, start = one[8], other[7]
+        # sides that bow inwards leave and arrive as their chords do, turned by their slopes
+        x, y = one[4] + end * one[1], one[5] + end * one[2]
+        cosine = x * (other[4] + start * other[1]) + y * (other[5] + start * other[2])
+        lay_corner(cosine * sigma * sigma / np.sqrt((1.0 + end * end) * (1.0 + start * start)), corners[k])
 
 
 @lent
@@ -107,111 +103,101 @@ def lay_pixels(places, at, count, x, y):  # type: ignore[no-untyped-def]
 
 @lent
 def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
-    """Fill in the pixels' distances from a side; (x0, y0) is what their places count from."""
+    """Fill in how far inside of a side the pixels lie; (x0, y0) is what their places count from."""
     zero, one, limit = np.float32(0.0), np.float32(1.0), np.float32(far)
-    d0, dx, dy = side[0] + side[1] * x0 + side[2] * y0, side[1], side[2]
-    t0, tx, ty = side[3] + side[4] * x0 + side[5] * y0, side[4], side[5]
-    length, short = np.float32(side[6]), np.float32(1.0 / side[6])
-    leave, arrive, three = np.float32(side[7]), np.float32(side[8]), np.float32(3.0)
+    # what is near is the difference of what is far
+    d0, dx, dy = np.float32(side[0] + side[1] * x0 + side[2] * y0), np.float32(side[1]), np.float32(side[2])
+    short, start = 1.0 / side[6], side[3] + side[4] * x0 + side[5] * y0
+    t0, tx, ty = np.float32(start * short), np.float32(side[4] * short), np.float32(side[5] * short)
+    leave, arrive = np.float32(side[6] * side[7]), np.float32(side[6] * side[8])
+    # blur draws a curved edge towards the centre of its curvature, by half of that times the squared blur
+    bend, bent = np.float32(3.0 * (side[7] + side[8]) * short), np.float32((2.0 * side[7] + side[8]) * short)
     for k in range(count):
-        x, y = np.float64(places[PX + k]), np.float64(places[PY + k])
-        # what is near is the difference of what is far
-        d, t = np.float32(d0 + dx * x + dy * y), np.float32(t0 + tx * x + ty * y)
-        part = t * short
-        inside = min(max(part, zero), one)
-        off = inside * (one - inside) * (leave * (one - inside) - arrive * inside)
-        off += leave * min(part, zero) + arrive * max(part - one, zero)
-        # blur draws a curved edge towards the centre of its curvature, by half of that times the squared blur
-        drawn = (three * (leave + arrive) * inside - (leave + leave + arrive)) * short
-        d = d - length * off - drawn if d < limit else d
-        out[D + k], out[TO_END + k], out[TO_START + k] = d, length - t - arrive * d, t + leave * d
+        x, y = places[PX + k], places[PY + k]
+        d, t = d0 + dx * x + dy * y, t0 + tx * x + ty * y
+        inside = min(max(t, zero), one)
+        rest = one - inside
+        off = inside * rest * (leave * rest - arrive * inside)
+        off += leave * min(t, zero) + arrive * max(t - one, zero)
+        out[k] = d - off - (bend * inside - bent) if d < limit else d
 
 
 @lent
-def _one_side(sides, count, shares, pairs):  # type: ignore[no-untyped-def]
-    """Fill in the pixels' shares where one side at most is near, and which they are elsewhere."""
-    zero, one = np.float32(0.0), np.float32(1.0)
+def _side_share(d):  # type: ignore[no-untyped-def]
+    """The share of a side, by the distance inside it."""
+    return np.float32(1.0) if d >= NEAR else normal(max(d, -NEAR))
+
+
+@lent
+def _joint(d, other, corner):  # type: ignore[no-untyped-def]
+    """The share of a wedge beyond the product of its sides' shares."""
+    d, other = max(d, -NEAR), max(other, -NEAR)
+    share = correlated(d * d + other * other, d * other, corner)
+    return share if max(d, other) < NEAR else np.float32(0.0)
+
+
+@lent
+def _corner(corners, k):  # type: ignore[no-untyped-def]
+    c = corners[k]
+    return c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]
+
+
+@lent
+def _picked(which, one, other):  # type: ignore[no-untyped-def]
+    """Nine numbers of one corner or of another."""
+    a0, a1, a2, b0, b1, b2, w0, w1, w2 = one
+    c0, c1, c2, d0, d1, d2, v0, v1, v2 = other
+    a0, a1, a2 = a0 if which else c0, a1 if which else c1, a2 if which else c2
+    b0, b1, b2 = b0 if which else d0, b1 if which else d1, b2 if which else d2
+    w0, w1, w2 = w0 if which else v0, w1 if which else v1, w2 if which else v2
+    return a0, a1, a2, b0, b1, b2, w0, w1, w2
+
+
+@lent
+def _two_sides(sides, corners, count, shares):  # type: ignore[no-untyped-def]
+    """Fill in the pixels' shares where two sides at most are near."""
+    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
     for k in range(count):
-        d0, d1, d2 = sides[D + k], sides[OF_SIDE + D + k], sides[2 * OF_SIDE + D + k]
-        low = min(min(d0, d1), d2)
-        high = max(max(d0, d1), d2)
+        d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
+        low, high = min(min(d0, d1), d2), max(max(d0, d1), d2)
         middle = max(min(d0, d1), min(max(d0, d1), d2))
-        share = normal(min(max(low, -NEAR), NEAR))
-        share = one if low >= NEAR else share
-        shares[k] = share if low > -NEAR else zero
         # the one that is far says which two are near
-        pair = one if high == d0 else np.float32(2.0)
-        pair = zero if high == d2 else pair
-        pair = np.float32(ALL) if high < NEAR else pair
-        pairs[k] = pair if (middle < NEAR) & (low > -NEAR) else np.float32(NO_PAIR)
+        corner = _picked(high == d2, c01, _picked(high == d0, c12, c20))
+        one = _side_share(low)
+        share = one if middle >= NEAR else one * _side_share(middle) + _joint(low, middle, corner)
+        shares[k] = share if low > -NEAR else np.float32(0.0)
 
 
 @lent
-def _lay_corner(sides, k, first, corners, at):  # type: ignore[no-untyped-def]
-    """Lay out how pixel k lies in the corner between a side and the next one."""
-    a, b = first * OF_SIDE + k, (first + 1 if first < 2 else 0) * OF_SIDE + k
-    corners[BEFORE + at], corners[TO_IT + at] = sides[D + a], sides[TO_END + a]
-    corners[AFTER + at], corners[FROM_IT + at] = sides[D + b], sides[TO_START + b]
-
-
-@lent
-def _wedges(corners, count):  # type: ignore[no-untyped-def]
-    """Fill in the pixels' shares of the wedges, less those of the openings."""
+def _three_sides(sides, corners, count, shares):  # type: ignore[no-untyped-def]
+    """Fill in the pixels' shares wherever they lie."""
+    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
     for k in range(count):
-        share = side_of_wedge(corners[BEFORE + k], corners[TO_IT + k])
-        corners[BEFORE + k] = share + side_of_wedge(corners[AFTER + k], corners[FROM_IT + k])
+        d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
+        s0, s1, s2 = _side_share(d0), _side_share(d1), _side_share(d2)
+        share = np.float32(1.0) - s0 - s1 - s2 + s0 * s1 + s1 * s2 + s2 * s0
+        share += _joint(d0, d1, c01) + _joint(d1, d2, c12) + _joint(d2, d0, c20)
+        shares[k] = max(share, np.float32(0.0)) if min(min(d0, d1), d2) > -NEAR else np.float32(0.0)
 
 
 @lent
-def _more_sides(sides, count, openings, pixels, corners, shares, pairs):  # type: ignore[no-untyped-def]
-    """Fill in the pixels' shares where two or three sides are near."""
-    found, laid = 0, 0
-    for k in range(count):
-        pixels[found] = k  # written over where only one is: no branch is to be guessed
-        found += int(pairs[k] >= np.float32(0.0))
-    for i in range(found):
-        k = pixels[i]
-        pair = int(pairs[k])
-        if pair != ALL:
-            _lay_corner(sides, k, pair, corners, laid)
-            laid += 1
-            continue
-        for side in range(3):
-            _lay_corner(sides, k, side, corners, laid + side)
-        laid += 3
-    for k in range(laid, lanes_of(laid)):
-        corners[BEFORE + k], corners[AFTER + k] = np.float32(0.0), np.float32(0.0)
-    _wedges(corners, lanes_of(laid))
-    laid = 0
-    for i in range(found):
-        k = pixels[i]
-        pair = int(pairs[k])
-        if pair != ALL:
-            shares[k] = np.float32(openings[pair]) + corners[BEFORE + laid]
-            laid += 1
-            continue
-        share = np.float32(1.0)
-        for side in range(3):
-            share += (
-                np.float32(openings[side]) + corners[BEFORE + laid] - normal(sides[side * OF_SIDE + D + k])
-            )
-            laid += 1
-        shares[k] = max(share, np.float32(0.0))
-
-
-@compiled
-def room_for_shares():  # type: ignore[no-untyped-def]
-    """Arrays for the pixels of one cell: sides, pairs, pixels and corners."""
-    sides, pairs = np.empty(3 * OF_SIDE, np.float32), np.empty(CHUNK, np.float32)
-    return sides, pairs, np.empty(CHUNK, np.int64), np.zeros(12 * CHUNK, np.float32)
+def is_small(side):  # type: ignore[no-untyped-def]
+    """Whether all three sides of a cell may be near: by the radius of its inscribed circle."""
+    a, b, c = side[0, 6], side[1, 6], side[2, 6]
+    around, bow = a + b + c, 0.0
+    for k in range(3):
+        bow = max(bow, 0.25 * side[k, 6] * max(abs(side[k, 7]), abs(side[k, 8])))
+    square = (around - 2.0 * a) * (around - 2.0 * b) * (around - 2.0 * c) / (4.0 * around)
+    return square < (REACH + bow) ** 2
 
 
 @lent
-def fill_shares(places, count, x0, y0, side, openings, far, room, shares):  # type: ignore[no-untyped-def]
+def fill_shares(places, count, x0, y0, side, corners, far, sides, shares):  # type: ignore[no-untyped-def]
     """Fill in the shares of a cell in the pixels that are laid out in ``places``, which count from (x0, y0)."""
-    sides, pairs, pixels, corners = room
     padded = lanes_of(count)
     for k in range(3):
-        _from_side(places, padded, side[k], x0, y0, far, sides[k * OF_SIDE :])
-    _one_side(sides, padded, shares, pairs)
-    _more_sides(sides, count, openings, pixels, corners, shares, pairs)
+        _from_side(places, padded, side[k], x0, y0, far, sides[k * COLUMN :])
+    if is_small(side):
+        _three_sides(sides, corners, padded, shares)
+    else:
+        _two_sides(sides, corners, padded, shares)

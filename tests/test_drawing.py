@@ -73,7 +73,7 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
 
     monkeypatch.setattr(Draughtsman, "_again", checked)
     if pattern == "dirty honeycomb":
-        extractor("honeycomb").extract(dirty((1.5, 0.4)).image)
+        extractor("honeycomb").extract(dirty((-2.0, 1.5)).image)
     else:
         extractor(pattern).extract(shown(pattern, surface=composed(Press(4.0, 0.6))).image)
     assert parts and min(parts) > 0

@@ -1,14 +1,39 @@
-"""How much of each pixel is a cell: small and large ones against finely sampled ones."""
+"""How much of each pixel is a cell: wedges against their distribution, whole cells against finely sampled ones."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import ndtr, owens_t
 
+from extractor.gaussian import OF_CORNER, correlated, lay_corner, normal
 from extractor.painting import draw_cells, erase_cells, room_for_strokes
 
 FINE, SIGMA, SHAPE = 15, 2.0, (100, 110)  # an odd number: pixels' middles are sampled
+near = st.floats(-3.2, 3.2).filter(lambda z: abs(z) > 1e-3)
+
+
+def wedge(h: float, k: float, r: float) -> float:
+    """How often two normal deviates with the correlation r lie below h and k, by Owen's T."""
+    root = np.sqrt(1 - r * r)
+    apart = 0.5 if h * k < 0 else 0.0
+    joint = owens_t(h, (k / h - r) / root) + owens_t(k, (h / k - r) / root)
+    return float(0.5 * (ndtr(h) + ndtr(k)) - joint - apart)
+
+
+@settings(deadline=None)
+@given(h=near, k=near, opening_deg=st.floats(20.0, 160.0))
+def test_a_wedge_is_seen_as_it_should(h: float, k: float, opening_deg: float) -> None:
+    r, corner = -np.cos(np.radians(opening_deg)), np.zeros(OF_CORNER, np.float32)
+    lay_corner(r, corner)
+    one, other = np.float32(h), np.float32(k)
+    share = normal(one) * normal(other)
+    share += correlated(one * one + other * other, one * other, tuple(corner))
+    atol = 1e-4 if 30.0 <= opening_deg <= 150.0 else 4e-4
+    np.testing.assert_allclose(share, wedge(h, k, r), atol=atol)
 
 
 @pytest.mark.parametrize("turned_deg", [0.0, 20.0, 90.0, 180.0])
