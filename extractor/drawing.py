@@ -31,11 +31,12 @@ MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.03  # of the blur, by which it may be wrong in a drawing that is kept
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
 NOISY_BLUR, NOISY_LEVELS = 0.5, 0.12  # of how far noise moves these, in units of the blur
+MOST_BLUR = 0.2  # of the blur, which no noise explains
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
 SMALL_BLUR = 0.12  # of a short edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
 MANY_BENT = 0.25  # of them, each step bends others. Then
-HARD_EFFORT = 3.0  # times the effort is allowed
+HARD_EFFORT = 1.5  # times the effort is allowed
 WIDE_BLUR = 0.1  # of a usual edge: where neighbours' errors look like bending
 # Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
 # UNMIXED of an edge, times MIXED (rendered patterns), and at most by
@@ -188,4 +189,4 @@ def _looks_other(fit: Fit, drawing: Drawing, enough: float) -> bool:
     if blur < SAME_BLUR and levels < SAME_LEVELS:
         return False
     noise = enough * usual_deviation(fit.information.diagonal) / drawing.sigma
-    return bool(blur > max(SAME_BLUR, NOISY_BLUR * noise) or levels > max(SAME_LEVELS, NOISY_LEVELS * noise))
+    return bool(blur > min(max(SAME_BLUR, NOISY_BLUR * noise), MOST_BLUR) or levels > max(SAME_LEVELS, NOISY_LEVELS * noise))
