@@ -189,4 +189,5 @@ def _looks_other(fit: Fit, drawing: Drawing, enough: float) -> bool:
     if blur < SAME_BLUR and levels < SAME_LEVELS:
         return False
     noise = enough * usual_deviation(fit.information.diagonal) / drawing.sigma
-    return bool(blur > min(max(SAME_BLUR, NOISY_BLUR * noise), MOST_BLUR) or levels > max(SAME_LEVELS, NOISY_LEVELS * noise))
+    same = min(max(SAME_BLUR, NOISY_BLUR * noise), MOST_BLUR), max(SAME_LEVELS, NOISY_LEVELS * noise)
+    return bool(blur > same[0] or levels > same[1])
