@@ -6,20 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled, inlined
+from .lanes import LANES
 from .lattice import layer_of, marker_id
-from .ring_maps import (
-    BENT,
-    LANES,
-    LEFT,
-    PIVOT,
-    PLANE,
-    SIDE,
-    SOUND,
-    TERMS,
-    lay_neighbours,
-    room_for_maps,
-    solve_maps,
-)
+from .ring_maps import BENT, LEFT, PIVOT, PLANE, SIDE, SOUND, TERMS, lay_neighbours, room_for_maps, solve_maps
 
 RING = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32

@@ -1,7 +1,6 @@
 """Quadratic maps from layout to image through the markers of two rings: for many markers at once.
 
-Up to ``LANES`` markers stand side by side, and each operation is done for all of them: one by one, their small systems
-wait for every root and quotient. A neighbour that is not known is 0 throughout.
+Up to ``LANES`` markers stand side by side. A neighbour that is not known is 0 throughout.
 """
 
 from __future__ import annotations
@@ -9,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, inlined
+from .lanes import LANES, factor, place, solve
 
-LANES = 16  # markers at most
 TERMS, SIDES = 6, 3  # 1, x, y, x^2, xy, y^2 in units of the local edge; right sides: x, y and the leverage
 PLANE = 3  # the terms of a linear map
 PIVOT = 1e-7
@@ -63,19 +62,13 @@ def solve_maps(room, lanes):  # type: ignore[no-untyped-def]
     for lane in range(lanes):
         rows[(SIDE + 2 * TERMS) * LANES + lane] = 1.0
         for a in range(PLANE, TERMS):
-            rows[_product(a, a) * LANES + lane] += 1.0 - rows[BENT * LANES + lane]
-    _factor(rows, lanes)
+            rows[(NORMAL + place(a, a)) * LANES + lane] += 1.0 - rows[BENT * LANES + lane]
+    factor(rows, NORMAL, TERMS, PIVOT, SOUND, lanes)
     for side in range(SIDE, ROWS, TERMS):
-        _solve(rows, side, lanes)
+        solve(rows, NORMAL, TERMS, side, lanes)
     for k in range(0, around.shape[0], LAID * LANES):
         _take(around[k:], rows, lanes)
         _leave(rows, lanes)
-
-
-@inlined
-def _product(a, b):  # type: ignore[no-untyped-def]
-    """The row of the product of two terms, b not after a."""
-    return NORMAL + a * (a + 1) // 2 + b
 
 
 @compiled
@@ -137,53 +130,6 @@ def _add(rows, lanes):  # type: ignore[no-untyped-def]
         rows[(SIDE + 9) * LANES + lane] += xx * v
         rows[(SIDE + 10) * LANES + lane] += xy * v
         rows[(SIDE + 11) * LANES + lane] += yy * v
-
-
-@inlined
-def _less(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
-    """Take a product of two rows from a third."""
-    out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
-    for k in range(lanes):
-        lane = np.uint64(k)
-        rows[out + lane] -= rows[one + lane] * rows[two + lane]
-
-
-@inlined
-def _over(rows, to, by, lanes):  # type: ignore[no-untyped-def]
-    """Divide a row by another."""
-    out, one = np.uint64(to * LANES), np.uint64(by * LANES)
-    for k in range(lanes):
-        lane = np.uint64(k)
-        rows[out + lane] /= rows[one + lane]
-
-
-@compiled
-def _factor(rows, lanes):  # type: ignore[no-untyped-def]
-    """Cholesky factors in place; not sound where the neighbours do not determine the map, which has any then."""
-    for i in range(TERMS):
-        own = _product(i, i)
-        for j in range(i):
-            for k in range(j):
-                _less(rows, _product(i, j), _product(i, k), _product(j, k), lanes)
-            _over(rows, _product(i, j), _product(j, j), lanes)
-            _less(rows, own, _product(i, j), _product(i, j), lanes)
-        for lane in range(lanes):
-            determined = rows[own * LANES + lane] > PIVOT
-            rows[SOUND * LANES + lane] = rows[SOUND * LANES + lane] if determined else 0.0
-            rows[own * LANES + lane] = np.sqrt(rows[own * LANES + lane] if determined else 1.0)
-
-
-@compiled
-def _solve(rows, side, lanes):  # type: ignore[no-untyped-def]
-    """Replace a right side by the solution."""
-    for i in range(TERMS):
-        for k in range(i):
-            _less(rows, side + i, _product(i, k), side + k, lanes)
-        _over(rows, side + i, _product(i, i), lanes)
-    for i in range(TERMS - 1, -1, -1):
-        for k in range(i + 1, TERMS):
-            _less(rows, side + i, _product(k, i), side + k, lanes)
-        _over(rows, side + i, _product(i, i), lanes)
 
 
 @compiled

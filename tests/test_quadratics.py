@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from cmpdesign.scene.standard import standard_layout
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import parse_layout
-from extractor.quadratics import LANES, lay_quadratics
+from extractor.lanes import LANES
+from extractor.quadratics import lay_quadratics
 from extractor.topology import Topology, topology_of
 
 Array = NDArray[np.float64]

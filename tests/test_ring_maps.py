@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from extractor.lanes import LANES
 from extractor.lattice import axial
 from extractor.mapped import WITNESSES, _median
 from extractor.neighbourhood import MIN_LINEAR, MIN_QUADRATIC, neighbour_table, predicted
-from extractor.ring_maps import LANES
 
 LAYERS = 5
 
