@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import hidden_misfit
+from .bleeding import rebled
 from .drawn import Board, Drawing, drawn, drawn_again, room_for, usual_length
 from .engine import compiled
 from .fit import Fit
-from .levels import level_change, rebled
+from .levels import level_change
 from .offsets import Reading, foot_of
 from .presets import Steps
 from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_deviation

@@ -8,7 +8,6 @@ shadows, a cell that fell out) the cell's own level stays.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from .algebra import cholesky_solve
 from .engine import compiled, vectorized
-from .topology import Topology
 
 INKS = 5  # red, green, blue, black, white
 BLACK, WHITE = 3, 4
@@ -26,8 +24,6 @@ DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at
 DISC_BEFORE = 0.47  # where nothing is drawn yet, and the neighbours' ink reaches into it
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
-MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
-LITTLE = 0.002  # of a neighbour, which makes no difference
 ROUNDS = 2  # of the robust fit
 TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
@@ -55,7 +51,7 @@ def monomials(x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _disc(a, b, c, sigma):  # type: ignore[no-untyped-def]
+def disc_of(a, b, c, sigma):  # type: ignore[no-untyped-def]
     """The radius of a cell's inscribed circle, and of the disc about its centroid that its level is taken from."""
     area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
     around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
@@ -82,7 +78,7 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
         if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
             continue
-        _, radius = _disc(a, b, c, sigma)
+        _, radius = disc_of(a, b, c, sigma)
         count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
         for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
             half = np.sqrt(max(radius * radius - (y - cy) ** 2, 0.0))
@@ -280,88 +276,6 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
     _shrunk(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
     return cell, slope, fields[BLACK], strange
-
-
-@compiled
-def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
-    """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
-    blur ``assumed``, NaN where the cell is not known; and the median of that."""
-    inscribed, variance = _discs(xy, cells, assumed)
-    return _bled(inscribed, variance, sigma)
-
-
-@compiled
-def _discs(xy, cells, sigma):  # type: ignore[no-untyped-def]
-    """(K,) the radius of each cell's inscribed circle, and the variance in one direction of the pixels that its level
-    is taken from."""
-    inscribed, variance = np.empty(cells.shape[0]), np.empty(cells.shape[0])
-    for i in range(cells.shape[0]):
-        inscribed[i], radius = _disc(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], sigma)
-        variance[i] = 0.25 * radius * radius
-    return inscribed, variance
-
-
-@compiled
-def _bled(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
-    out = np.full(inscribed.shape[0], np.nan)
-    for i in range(inscribed.shape[0]):
-        if np.isfinite(inscribed[i]):
-            out[i] = 0.5 * math.erfc(inscribed[i] / np.sqrt(2.0 * (sigma * sigma + variance[i])))
-    return out, np.nanmedian(out)
-
-
-def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float) -> Levels:
-    """The levels that means show in which each neighbour has a ``share`` (K,), ``usual`` where it is not known.
-
-    A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
-    (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
-    """
-    cell, slope, black = _unbled(levels.cell, levels.slope, levels.black, color, share, usual)
-    return levels._replace(cell=cell, slope=slope, black=black)
-
-
-@compiled
-def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped-def]
-    cell, slope, black = cell.copy(), slope.copy(), black.copy()
-    total, own = np.zeros(3), np.empty(cell.shape[0])
-    usual = min(usual, MAX_SHARE)
-    for ink in range(BLACK):
-        for channel in range(3):
-            count = 0
-            for i in range(cell.shape[0]):
-                if color[i] == ink:
-                    own[count] = cell[i, channel]
-                    count += 1
-            if count > 0:
-                total[channel] += np.median(own[:count]) / (1.0 - 6.0 * usual)
-    for i in range(cell.shape[0]):
-        bleeding = min(max(share[i] if np.isfinite(share[i]) else usual, -MAX_SHARE), MAX_SHARE)
-        for channel in range(3):
-            cell[i, channel] = (cell[i, channel] + bleeding * total[channel]) / (1.0 - 3.0 * bleeding)
-            slope[i, channel, 0] /= 1.0 - 3.0 * bleeding
-            slope[i, channel, 1] /= 1.0 - 3.0 * bleeding
-    for channel in range(3):
-        black[channel, 0] -= usual * total[channel]
-    return cell, slope, black
-
-
-def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float) -> Levels:
-    """The levels that the cells' middles would have shown, had the blur not been ``drawn`` but ``sigma``, px."""
-    inks = levels.cell, levels.slope, levels.black
-    differ, cell, slope, black = _rebled(*inks, mesh.cell_color, xy, mesh.cells, drawn, sigma)
-    return levels._replace(cell=cell, slope=slope, black=black) if differ else levels
-
-
-@compiled
-def _rebled(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
-    """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
-    inscribed, variance = _discs(xy, cells, 0.0)
-    before, usual = _bled(inscribed, variance, drawn)
-    after, more = _bled(inscribed, variance, sigma)
-    if max(usual, more) < LITTLE:
-        return False, cell, slope, black
-    left = 1.0 - 6.0 * min(usual, MAX_SHARE)
-    return (True, *_unbled(cell, slope, black, color, (after - before) / left, (more - usual) / left))
 
 
 @compiled

@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .bleeding import bled, unbled
 from .drawing import MIN_SIGMA_PX
 from .engine import compiled
 from .fit import Across, Fit, Seen
 from .image import estimate_noise
-from .levels import Levels, bled, cell_means, smoothed, unbled
+from .levels import Levels, cell_means, smoothed
 from .profiles import profile_blur, unmixing
 from .sight import Sight
 from .stepping import MIN_NOISE

@@ -17,10 +17,11 @@ from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, compo
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout, refine
+from extractor.bleeding import bled, rebled, unbled
 from extractor.drawing import Draughtsman
 from extractor.drawn import Drawing, chosen
 from extractor.information import covariances
-from extractor.levels import Levels, bled, rebled, unbled
+from extractor.levels import Levels
 from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
 from extractor.presets import STEPS
 from extractor.settling import beside, still_moving, touching, unsettled
