@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, inlined
-from .lanes import LANES, factor, place, solve
+from .lanes import LANES, add_product, factor, place, solve
 
 TERMS, SIDES = 6, 3  # 1, x, y, x^2, xy, y^2 in units of the local edge; right sides: x, y and the leverage
 PLANE = 3  # the terms of a linear map
@@ -89,47 +89,12 @@ def _take(laid, rows, lanes):  # type: ignore[no-untyped-def]
 
 @compiled
 def _add(rows, lanes):  # type: ignore[no-untyped-def]
-    """Add a neighbour of every lane to the normal equations.
-
-    Written out: so the machine adds several lanes at once, which it does only in a loop that holds no other.
-    """
-    for lane in range(lanes):
-        one, x, y = rows[lane], rows[LANES + lane], rows[2 * LANES + lane]
-        xx, xy, yy = rows[3 * LANES + lane], rows[4 * LANES + lane], rows[5 * LANES + lane]
-        u, v = rows[PLACE_X * LANES + lane], rows[PLACE_Y * LANES + lane]
-        rows[NORMAL * LANES + lane] += one * one
-        rows[(NORMAL + 1) * LANES + lane] += x * one
-        rows[(NORMAL + 2) * LANES + lane] += x * x
-        rows[(NORMAL + 3) * LANES + lane] += y * one
-        rows[(NORMAL + 4) * LANES + lane] += y * x
-        rows[(NORMAL + 5) * LANES + lane] += y * y
-        rows[(NORMAL + 6) * LANES + lane] += xx * one
-        rows[(NORMAL + 7) * LANES + lane] += xx * x
-        rows[(NORMAL + 8) * LANES + lane] += xx * y
-        rows[(NORMAL + 9) * LANES + lane] += xx * xx
-        rows[(NORMAL + 10) * LANES + lane] += xy * one
-        rows[(NORMAL + 11) * LANES + lane] += xy * x
-        rows[(NORMAL + 12) * LANES + lane] += xy * y
-        rows[(NORMAL + 13) * LANES + lane] += xy * xx
-        rows[(NORMAL + 14) * LANES + lane] += xy * xy
-        rows[(NORMAL + 15) * LANES + lane] += yy * one
-        rows[(NORMAL + 16) * LANES + lane] += yy * x
-        rows[(NORMAL + 17) * LANES + lane] += yy * y
-        rows[(NORMAL + 18) * LANES + lane] += yy * xx
-        rows[(NORMAL + 19) * LANES + lane] += yy * xy
-        rows[(NORMAL + 20) * LANES + lane] += yy * yy
-        rows[SIDE * LANES + lane] += one * u
-        rows[(SIDE + 1) * LANES + lane] += x * u
-        rows[(SIDE + 2) * LANES + lane] += y * u
-        rows[(SIDE + 3) * LANES + lane] += xx * u
-        rows[(SIDE + 4) * LANES + lane] += xy * u
-        rows[(SIDE + 5) * LANES + lane] += yy * u
-        rows[(SIDE + 6) * LANES + lane] += one * v
-        rows[(SIDE + 7) * LANES + lane] += x * v
-        rows[(SIDE + 8) * LANES + lane] += y * v
-        rows[(SIDE + 9) * LANES + lane] += xx * v
-        rows[(SIDE + 10) * LANES + lane] += xy * v
-        rows[(SIDE + 11) * LANES + lane] += yy * v
+    """Add a neighbour of every lane to the normal equations."""
+    for a in range(TERMS):
+        for b in range(a + 1):
+            add_product(rows, NORMAL + place(a, b), a, b, lanes)
+        add_product(rows, SIDE + a, a, PLACE_X, lanes)
+        add_product(rows, SIDE + TERMS + a, a, PLACE_Y, lanes)
 
 
 @compiled

@@ -12,7 +12,7 @@ from benchmarks.stress_suite.reading import extractor_of, wrong_in
 from extractor.amid import amid, outlined
 from extractor.cells import Cells
 from extractor.numbering import Numbering
-from extractor.seeds import find_seeds
+from extractor.seeds import SAFE_AREA_PX, find_seeds
 from extractor.tables import lattice_of
 
 
@@ -48,6 +48,16 @@ def test_what_is_not_whole_is_read_at_full_scale() -> None:
     image[round(y) - 9 : round(y) + 10, round(x) - 9 : round(x) + 10] = 20
     markers = extractor.extract(image)
     assert "grow" in markers.stages and (markers.status > 0).sum() > 385
+
+
+def test_fragments_between_scratches_ask_for_no_finer_scale() -> None:
+    """They are small, but the cells beside them are not."""
+    shot = shot_of("scratches=5/elliptical/200")
+    markers = extractor_of("elliptical", 11).extract(shot.image)
+    small = markers.stages["seeds"].area_px < SAFE_AREA_PX
+    assert small.mean() > 0.12
+    assert markers.stages["segment"].label.shape == (240, 320)
+    assert (markers.status > 0).mean() > 0.95 and not wrong_in(shot, markers)[0].any()
 
 
 def test_noise_is_not_tried() -> None:
