@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from benchmarks.stress_suite.frames import plain
+from benchmarks.stress_suite.reading import extractor_of
 from cmpdesign.scene.standard import standard_layout
 from cmpdesign.writers.layout_file import layout_to_json
-from extractor import parse_layout
+from extractor import Status, parse_layout
 from extractor.regained import ELSEWHERE, _alone, _gridlines_around
+from extractor.sure import lost_ones
 from extractor.topology import Topology, topology_of
+
+Array = NDArray[Any]
 
 
 @cache
@@ -41,3 +48,20 @@ def test_some_gridlines_alone_are_a_mesh_of_their_own() -> None:
         kept = np.isin(own.spokes[m], which)
         np.testing.assert_array_equal(around[k] >= 0, kept)
         np.testing.assert_array_equal(which[around[k][kept]], own.spokes[m][kept])
+
+
+def test_what_was_lost_is_put_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Markers of a clean image, taken from it: between what profiles and triangles say, and as sure as it claims."""
+    shot, chosen = plain("honeycomb", 0).shoot(), [20, 21, 130, 200, 250]
+
+    def taken(xy: Array, cov: Array, *others: Any) -> tuple[Array, bool]:
+        xy[chosen], cov[chosen] = np.nan, np.nan
+        return lost_ones(xy, cov, *others)  # type: ignore[no-any-return]
+
+    monkeypatch.setattr("extractor.refine.lost_ones", taken)
+    markers = extractor_of("honeycomb", 11).extract(shot.image)
+    assert (markers.status[chosen] == Status.MEASURED).all()
+    error = np.linalg.norm(markers.xy_px - shot.truths[0].marker_xy_px, axis=1)[chosen]
+    sigma = np.sqrt(np.trace(markers.cov_px2, axis1=1, axis2=2))[chosen]
+    assert (error < 3 * sigma).all() and (sigma < 0.6).all()
+    assert error.max() < 0.2
