@@ -47,6 +47,7 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
 WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move
 MAX_STEPS = 10
+BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
 JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
@@ -61,18 +62,34 @@ class Draughtsman:
 
     def board(self, shape: tuple[int, ...]) -> Board:
         """With the pattern over black as it was last drawn in an image of this shape."""
-        kept: Board | None = getattr(self._kept, "board", None)
-        if kept is None or kept.picture.shape != shape:
-            kept = self._kept.board = room_for(shape, self._mesh)
-        return kept
+        boards: dict[tuple[int, ...], Board] | None = getattr(self._kept, "boards", None)
+        if boards is None:
+            boards = self._kept.boards = {}
+        if shape not in boards:
+            while len(boards) >= BOARDS:
+                del boards[next(iter(boards))]
+            boards[shape] = room_for(shape, self._mesh)
+        return boards[shape]
 
-    def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float) -> Fit:
-        """The fit after as many steps as it takes, or as a preset allows; ``edge_px`` is a short edge in the view."""
+    def step(self, view: Sight, fit: Fit, edge_px: float) -> tuple[Fit, float]:
+        """The fit after one step from everything, and its effort; ``edge_px`` is a short edge in the view."""
+        wide = self._wide(fit, edge_px)
+        fit, drawing = self._first(view, self._free(fit, wide))
+        return _farther(fit, drawing) if wide else fit, effort(drawing.edge_px)
+
+    def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float, spent: float = 0.0) -> Fit:
+        """The fit after as many steps as it takes, or as a preset allows.
+
+        Args:
+            edge_px: a short edge in the view.
+            spent: the effort of a step that has already been taken.
+        """
+        begun = spent > 0.0
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
         size, least, tries = drawing.edge_px, len(fit.xy), 0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
-        spent = effort(size)
+        spent += effort(size)
         for step in range(MAX_STEPS - 1):
             fit = _farther(fit, drawing) if wide else fit
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
@@ -84,7 +101,7 @@ class Draughtsman:
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
             tries = tries + 1 if moving >= least and not other else 0
-            if not (everything or moving) or tries == patience or (step > 0 and spent > allowed):
+            if not (everything or moving) or tries == patience or ((begun or step > 0) and spent > allowed):
                 break
             least = min(least, len(fit.xy) if other else moving)
             fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)

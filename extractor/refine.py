@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import around
-from .drawing import SMALL_BLUR, Draughtsman
+from .drawing import MIN_SIGMA_PX, SMALL_BLUR, Draughtsman
+from .drawn import usual_length
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .information import Information
@@ -33,6 +34,8 @@ SHORT = 30  # one in so many gridlines may be smaller than that at a reduced sca
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
+# Usual gridlines in a view that serves for a first step, and the blur there.
+COARSE_EDGE_PX, COARSE_BLUR_PX = 4.5, 0.45
 # Where the drawing leaves more than so many times the noise, it explains nothing so well that it may move a marker far.
 STRANGE = 3.0
 
@@ -67,11 +70,11 @@ class Refiner:
         fit, sides, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, usual)
         if scale > view.scale:
-            fit, sides = coarser(fit, sides, view, sights.at(scale))
+            fit, sides = rescaled(fit, view, sights.at(scale)), widened(sides, view.scale / scale)
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             fit, sides, places = self._begin(sights.at(scale), places, xy)
-        return self._finish(sights.at(scale), fit, sides, places, edge)
+        return self._finish(sights.at(scale), fit, sides, places, edge, sights)
 
     def _scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
@@ -102,8 +105,17 @@ class Refiner:
         fit, places = collected(view, mesh, fit, trusted, places)
         return fit, sides, places
 
-    def _finish(self, view: Sight, fit: Fit, sides: Across, places: Places, edge_px: float) -> Refined:
-        """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge."""
+    def _finish(
+        self,
+        view: Sight,
+        fit: Fit,
+        sides: Across,
+        places: Places,
+        edge_px: float,
+        sights: Sights | None = None,
+    ) -> Refined:
+        """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge. With
+        ``sights``, a first step may be taken in a coarser view."""
         mesh, steps, places, edge_px = self._mesh, self._steps, _in(view, places), edge_px / view.scale
         start = placed(mesh, fit)
         if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
@@ -115,8 +127,18 @@ class Refiner:
             xy[strays], cov[strays] = np.nan, np.nan
             doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
             return self._refined(view, fit, xy, cov, ~doubted, places)
-        fit = self._draughtsman.steps(view, start, steps, edge_px)
+        start, spent = self._nearer(sights, view, start, edge_px) if sights else (start, 0.0)
+        fit = self._draughtsman.steps(view, start, steps, edge_px, spent)
         return self._result(view, fit, sides, places)
+
+    def _nearer(self, sights: Sights, view: Sight, fit: Fit, edge_px: float) -> tuple[Fit, float]:
+        """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
+        that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
+        if fit.sigma < 2 * COARSE_BLUR_PX or usual_length(lines_of(self._mesh, fit)) < 2 * COARSE_EDGE_PX:
+            return fit, 0.0
+        coarse = sights.at(2 * view.scale)
+        stepped, spent = self._draughtsman.step(coarse, rescaled(fit, view, coarse), edge_px / 2)
+        return placed(self._mesh, rescaled(stepped, coarse, view)), spent
 
     def _result(self, view: Sight, fit: Fit, sides: Across, places: Places) -> Refined:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
@@ -157,26 +179,30 @@ class Refiner:
         return xy, cov
 
 
-def coarser(fit: Fit, sides: Across, finer: Sight, view: Sight) -> tuple[Fit, Across]:
-    """What a round of profiles left, in a view of a larger scale: what is so blurred needs no second round there."""
-    ratio = finer.scale / view.scale
+def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
+    """A fit of one view in another one of another scale."""
+    ratio = old.scale / view.scale
     # a pixel's own variance is a twelfth of its area
-    blur2 = (finer.scale * fit.sigma) ** 2 + (view.scale**2 - finer.scale**2) / 12.0
-    room = sides.room.copy()
-    room[:, 0] *= ratio
-    fit = fit._replace(
-        xy=view.reduced(finer.full(fit.xy)),
-        measured=view.reduced(finer.full(fit.measured)),
-        guiding=view.reduced(finer.full(fit.guiding)),
+    blur2 = (old.scale * fit.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
+    return fit._replace(
+        xy=view.reduced(old.full(fit.xy)),
+        measured=view.reduced(old.full(fit.measured)),
+        guiding=view.reduced(old.full(fit.guiding)),
         maps=ratio * fit.maps,
-        sigma=float(np.sqrt(blur2)) / view.scale,
+        sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
         noise=max(ratio * fit.noise, MIN_NOISE),
         grain=max(ratio * fit.grain, MIN_NOISE),
         levels=fit.levels._replace(slope=fit.levels.slope / ratio),
         bend=ratio * fit.bend,
         information=Information(fit.information.diagonal / ratio**2, fit.information.beside / ratio**2),
     )
-    return fit, sides._replace(room=room)
+
+
+def widened(sides: Across, ratio: float) -> Across:
+    """What changes across the gridlines in a view in which these are so many times as long."""
+    room = sides.room.copy()
+    room[:, 0] *= ratio
+    return sides._replace(room=room)
 
 
 @compiled
