@@ -17,7 +17,7 @@ MIN_CROWDED_PX = 12
 MIN_SOLIDITY = 8.0
 NO_CROWD = 1 << 62
 SAFE_AREA_PX = 20  # a cell with edges of 7 px
-MAX_SMALL = 0.145  # of the domains
+MAX_SMALL = 1 / 6  # of the domains
 MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 
