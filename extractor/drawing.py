@@ -87,10 +87,8 @@ class Draughtsman:
         begun = spent > 0.0
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
-        patience, settling = steps.patience, steps.settling
-        if wide:
-            patience, settling = max(patience, WIDE_PATIENCE), 1.0
-        size, least, tries = drawing.edge_px, len(fit.xy) / settling, 0
+        size, least, tries = drawing.edge_px, len(fit.xy), 0
+        patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = steps.many if drawing.sigma < SMALL_BLUR * edge_px else 1.0
         spent += effort(size)
         for step in range(MAX_STEPS - 1):
@@ -99,14 +97,14 @@ class Draughtsman:
             about = fit.measured, drawing.xy, fit.strides
             anew, moving = still_moving(*about, near, steps.enough, steps.few, many, self._mesh.edges)
             other = _looks_other(fit, drawing, steps.enough)
-            everything = other or moving > MAX_AGAIN * len(anew)
+            everything = other or np.count_nonzero(anew) > MAX_AGAIN * len(anew)
             spent += effort(size, None if everything else moving / len(anew))
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
-            tries = tries + 1 if moving >= settling * least and not other else 0
+            tries = tries + 1 if moving >= least and not other else 0
             if not (everything or moving) or tries == patience or ((begun or step > 0) and spent > allowed):
                 break
-            least = least if other else min(least, moving)
+            least = min(least, len(fit.xy) if other else moving)
             fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)
             fit, drawing = self._first(view, fit) if everything else self._again(view, fit, drawing, anew)
         else:

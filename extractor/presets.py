@@ -24,8 +24,7 @@ class Steps(NamedTuple):
         enough: no more steps once no marker moves by more than so many of its standard deviations
         near: and by more than this share of the blur,
         few: but for this share of the markers;
-        patience: or once no fewer move, after so many more, than the share
-        settling: of those before: what moves them is nothing that a drawing could explain.
+        patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
         many: with the markers that move, those beside them are drawn anew, unless these are more than that.
     """
 
@@ -38,12 +37,11 @@ class Steps(NamedTuple):
     near: float
     few: float
     patience: int
-    settling: float
     many: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.5, 0.6),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0),
+    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.6),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0),
 }

@@ -34,8 +34,8 @@ SHORT = 30  # one in so many gridlines may be smaller than that at a reduced sca
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
-# Usual gridlines in a view that serves for a first step, and the blur there.
-COARSE_EDGE_PX, COARSE_BLUR_PX = 4.5, 0.45
+# A first step may be taken where usual gridlines have so many pixels, and the blur so much of what the preset asks for.
+COARSE_EDGE_PX, COARSE_BLUR = 4.5, 0.9
 # Where the drawing leaves more than so many times the noise, it explains nothing so well that it may move a marker far.
 STRANGE = 3.0
 
@@ -134,7 +134,8 @@ class Refiner:
     def _nearer(self, sights: Sights, view: Sight, fit: Fit, edge_px: float) -> tuple[Fit, float]:
         """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
         that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
-        if fit.sigma < 2 * COARSE_BLUR_PX or usual_length(lines_of(self._mesh, fit)) < 2 * COARSE_EDGE_PX:
+        blurred = fit.sigma >= 2 * COARSE_BLUR * self._steps.finest
+        if not blurred or usual_length(lines_of(self._mesh, fit)) < 2 * COARSE_EDGE_PX:
             return fit, 0.0
         coarse = sights.at(2 * view.scale)
         stepped, spent = self._draughtsman.step(coarse, rescaled(fit, view, coarse), edge_px / 2)

@@ -22,8 +22,8 @@ def effort(size_px: float, share: float | None = None) -> float:
 @compiled
 def still_moving(measured, drawn, strides, near, enough, few, many, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them; and how many these are. None where no more than ``few`` (a share of all) move, and not those
-    beside them where these are more than ``many``."""
+    those beside them, unless these are more than ``many`` (a share of all); and how many move or are beside these. None
+    where no more than ``few`` move."""
     count = drawn.shape[0]
     moving, found = np.zeros(count, np.bool_), 0
     for m in range(count):
@@ -34,9 +34,8 @@ def still_moving(measured, drawn, strides, near, enough, few, many, edges):  # t
         return np.zeros(count, np.bool_), 0
     out = moving.copy()
     beside(moving, edges, out)
-    if np.sum(out) > many * count:
-        return moving, found
-    return out, np.sum(out)
+    touched = np.sum(out)
+    return moving if touched > many * count else out, touched
 
 
 @compiled

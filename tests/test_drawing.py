@@ -115,6 +115,30 @@ def test_no_image_takes_more_than_its_preset_allows(preset: str, monkeypatch: py
         assert len(taken) <= max(most, 2)
 
 
+def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer markers are drawn anew, in fewer steps, and the error hardly grows."""
+    taken: list[int] = []
+    plain = Draughtsman._again
+
+    def counted(self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_]) -> Any:
+        taken.append(int(anew.sum()))
+        return plain(self, view, fit, before, anew)
+
+    def error(many: float) -> float:
+        taken.clear()
+        monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(many=many))
+        found = Extractor(extractor("round").layout).extract(seen.image)
+        return float(np.sqrt(np.nanmean((found.xy_px - seen.truth.marker_xy_px) ** 2)))
+
+    monkeypatch.setattr(Draughtsman, "_again", counted)
+    seen = shown("round", surface=composed(Press(4.0, 0.6)))
+    whole = error(1.0)
+    beside = list(taken)
+    alone = error(0.0)
+    assert 0 < taken[0] < 0.5 * beside[0] and len(taken) <= len(beside)
+    assert alone < 1.2 * whole
+
+
 @given(
     share=st.floats(0.0, 3.0),
     angle=st.floats(0.0, 6.3),
@@ -144,12 +168,15 @@ def test_moving_markers_bring_their_neighbours() -> None:
     drawn = np.zeros((4, 2))
     measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 1.0, edges)
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, 1.0, edges)
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, edges)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.4, edges)
+    np.testing.assert_array_equal(anew, [True, False, False, False])  # two of four are many
+    assert count == 2
+    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, 1.0, edges)
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from test_drawing import extractor, shown
 
-from extractor import refine
+from cmpdesign.scene import Camera
+from extractor import Status, refine
 from extractor.drawing import Draughtsman
 from extractor.fit import Fit
 from extractor.sight import Sights
@@ -25,16 +26,20 @@ def test_a_reduced_image_holds_means(scale: int) -> None:
 
 def test_a_coarser_view_starts_where_the_finer_one_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     passed: list[Any] = []
-    plain = refine.coarser
+    rescaled, widened = refine.rescaled, refine.widened
 
     def kept(*given: Any) -> Any:
-        found = plain(*given)
-        passed.append((given, found))
-        return found
+        passed.append((given, rescaled(*given)))
+        return passed[-1][1]
 
-    monkeypatch.setattr(refine, "coarser", kept)
+    def kept_wide(*given: Any) -> Any:
+        passed.append((given, widened(*given)))
+        return passed[-1][1]
+
+    monkeypatch.setattr(refine, "rescaled", kept)
+    monkeypatch.setattr(refine, "widened", kept_wide)
     extractor("honeycomb").extract(shown("honeycomb", blur=2.0).image)
-    (fit, sides, finer, view), (now, beside) = passed[0]
+    ((fit, finer, view), now), ((sides, _), beside) = passed
     assert view.scale > finer.scale
     np.testing.assert_allclose(view.full(now.measured), finer.full(fit.measured))
     np.testing.assert_allclose(view.scale * now.maps, finer.scale * fit.maps)
@@ -44,6 +49,58 @@ def test_a_coarser_view_starts_where_the_finer_one_ended(monkeypatch: pytest.Mon
         view.scale * now.sigma == pytest.approx(2.0, abs=0.4)
         and now.sigma * view.scale > fit.sigma * finer.scale
     )
+
+
+def test_a_fit_comes_back_from_another_view(monkeypatch: pytest.MonkeyPatch) -> None:
+    passed: list[Any] = []
+    plain = Draughtsman._first
+
+    def first(self: Draughtsman, view: Any, fit: Fit) -> Any:
+        passed.append((view, fit))
+        return plain(self, view, fit)
+
+    monkeypatch.setattr(Draughtsman, "_first", first)
+    seen = shown("honeycomb", blur=2.0)
+    extractor("honeycomb").extract(seen.image)
+    view, fit = passed[0]
+    finer = Sights(seen.image).at(1)
+    back = refine.rescaled(refine.rescaled(fit, view, finer), finer, view)
+    for one, other in zip(fit, back, strict=True):
+        if isinstance(one, np.ndarray):
+            np.testing.assert_allclose(one, other, rtol=1e-12)
+    assert back.sigma == pytest.approx(fit.sigma) and back.noise == pytest.approx(fit.noise)
+    np.testing.assert_allclose(back.levels.slope, fit.levels.slope)
+    np.testing.assert_allclose(back.information.diagonal, fit.information.diagonal)
+
+
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
+def test_where_few_gridlines_are_short_the_first_step_is_coarse(
+    pattern: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a steep view, full pixels are drawn once; what comes of it is no worse than what comes of two such steps."""
+    scales: list[int] = []
+    plain = Draughtsman._first
+
+    def first(self: Draughtsman, view: Any, fit: Fit) -> Any:
+        scales.append(view.scale)
+        return plain(self, view, fit)
+
+    def error(seen: Any) -> float:
+        scales.clear()
+        found = extractor(pattern).extract(seen.image)
+        assert (found.status == Status.MEASURED).mean() > 0.9
+        off = np.linalg.norm(found.xy_px - seen.truth.marker_xy_px, axis=1)
+        return float(np.sqrt(np.nanmean(off**2)))
+
+    monkeypatch.setattr(Draughtsman, "_first", first)
+    steep = shown(pattern, camera=Camera(pitch_px=20.0, rotation_deg=7.3, tilt_deg=65, tilt_axis_deg=20))
+    coarse = error(steep)
+    assert scales == [2, 1]
+    monkeypatch.setattr(refine, "COARSE_EDGE_PX", np.inf)
+    assert coarse < 1.25 * error(steep)
+    assert scales == [1, 1]
+    error(shown(pattern))
+    assert 1 not in scales  # in a plain frame all gridlines are long enough for half the pixels
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
