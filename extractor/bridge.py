@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
-from .engine import compiled, inlined
+from .engine import compiled, lent
 from .gradients import seen_as
 from .near import bucketed, nearest
 from .parts import connected
@@ -87,7 +87,7 @@ def _largest_near(center, block, sizes, white):  # type: ignore[no-untyped-def]
     return best
 
 
-@inlined
+@lent
 def _slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-untyped-def]
     """Write the image step per layout step around cell i by the cells that touch it; False where they are in a row."""
     xx, xy, yy, count = 0.0, 0.0, 0.0, 0
@@ -184,16 +184,17 @@ def _join_alone(center, corner, area, cell, alone, held, slope, sloped, plan, st
         held[j] = own < MAX_ALONE and np.sqrt(square[0]) < REACH * edge_of(area[here[index[0]]])
 
 
-@inlined
+@lent
 def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
     """How far, in cells, cell j is from where its number puts it, by the slopes there and at those ``here`` near it;
     the median over these. A cell without a slope has that of its triangle, or else of the others, and keeps it."""
     if not sloped[j]:
         like = slope[here[near[0]]]
         if turn_like(center, corner, j, plan.arms_mm, cell[j], step, like, slope[j]) < 0:
-            slope[j] = like
+            slope[j, 0, 0], slope[j, 0, 1] = like[0, 0], like[0, 1]
+            slope[j, 1, 0], slope[j, 1, 1] = like[1, 0], like[1, 1]
         sloped[j] = True
-    apart = np.empty(PAIRS)
+    one, two, three = 0.0, 0.0, 0.0
     for k in range(PAIRS):
         i = here[near[k]]
         a, b = 0.5 * (slope[i, 0, 0] + slope[j, 0, 0]), 0.5 * (slope[i, 0, 1] + slope[j, 0, 1])
@@ -202,11 +203,11 @@ def _jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # ty
         x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
         dx = (d * x - b * y) / determinant - plan.center_mm[cell[j], 0] + plan.center_mm[cell[i], 0]
         dy = (a * y - c * x) / determinant - plan.center_mm[cell[j], 1] + plan.center_mm[cell[i], 1]
-        apart[k] = np.hypot(dx, dy) / plan.size_mm[cell[j]]
-    return _middle(apart[0], apart[1], apart[2])
+        one, two, three = two, three, np.hypot(dx, dy) / plan.size_mm[cell[j]]
+    return _middle(one, two, three)
 
 
-@compiled
+@lent
 def _middle(a, b, c):  # type: ignore[no-untyped-def]
     """The median of three numbers (``PAIRS``); NaN if any is none."""
     if np.isnan(a) or np.isnan(b) or np.isnan(c):

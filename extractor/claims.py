@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled, inlined
+from .engine import compiled, lent
 from .mapped import REACH, WITNESSES, mapped, room_for_map
 from .near import nearest
 from .touch import edge_of
@@ -69,7 +69,7 @@ def forget(center, loose, fresh, cell, free, claims):  # type: ignore[no-untyped
             claims.takers[claims.place[n]] += 1
 
 
-@inlined
+@lent
 def _any_within(center, i, fresh, reach2):  # type: ignore[no-untyped-def]
     """Whether one of the fresh cells lies within reach of cell i."""
     for j in fresh:
@@ -119,7 +119,7 @@ def claim(center, area, ink, loose, known, xy, grid, cell, free, plan, claims): 
         horizon = min(limit, FARTHER * beyond)
 
 
-@inlined
+@lent
 def _may_rival(center, area, ink, i, j):  # type: ignore[no-untyped-def]
     """Whether two cells of one ink are so near to each other that both might be taken for one of the layout."""
     if ink[i] != ink[j]:
@@ -141,7 +141,7 @@ def _limit(claims):  # type: ignore[no-untyped-def]
     return max(NEAR, FARTHER * least), beyond
 
 
-@compiled
+@lent
 def _ask(center, ink, loose, n, known, xy, grid, cell, places, plan, claims, room):  # type: ignore[no-untyped-def]
     """Write which place a loose cell claims."""
     i, near, square = loose[n], claims.near, claims.square
@@ -154,7 +154,7 @@ def _ask(center, ink, loose, n, known, xy, grid, cell, places, plan, claims, roo
         claims.takers[place] += 1
 
 
-@inlined
+@lent
 def _nearest_of(places, x, y, limit, ink, plan):  # type: ignore[no-untyped-def]
     """Which of the layout's places holds this ink within the limit of (x, y), or -1."""
     best, least = -1, limit * limit

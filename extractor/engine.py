@@ -52,6 +52,11 @@ def lent(function: Function) -> Function:
     return _compiled(function, False, forceinline=True, _nrt=False)
 
 
+def lent_call(function: Function) -> Function:
+    """The same for what is too long to be put in place wherever it is called."""
+    return _compiled(function, False, _nrt=False)
+
+
 def lent_vectorized(function: Function) -> Function:
     """The same for loops whose sums may be taken in any order."""
     return _compiled(function, ANY_ORDER, forceinline=True, _nrt=False)

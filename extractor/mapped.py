@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, inlined, vectorized
+from .engine import compiled, lent, lent_call, lent_vectorized
 
 WITNESSES = 20  # numbered cells through which a map is laid
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
@@ -27,7 +27,7 @@ def room_for_map():  # type: ignore[no-untyped-def]
     return *of_witnesses, np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCTS)
 
 
-@compiled
+@lent_call
 def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no-untyped-def]
     """Where cell i lies in the layout by its witnesses (the nearest first), NaN where that is doubtful, and the size of
     a cell there, mm.
@@ -48,8 +48,9 @@ def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no
         x, y, u = (center[j, 0] - center[i, 0]) * unit, (center[j, 1] - center[i, 1]) * unit, cell[j]
         _lay(rows[k], x, y, plan.center_mm[u, 0] - middle_x, plan.center_mm[u, 1] - middle_y)
         rows[k, CLOSENESS] = 1.0 / (0.3 + square[k] * unit**2)
-    rows[count:, CLOSENESS] = 0.0
-    terms, variance, leverage = _robust(count, (EXACT * size) ** 2, room)
+    for k in range(count, WITNESSES):
+        rows[k, CLOSENESS] = 0.0
+    terms, (variance, leverage) = room[4], _robust(count, (EXACT * size) ** 2, room)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) * unit
     sure = (
         np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
@@ -59,7 +60,7 @@ def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no
     return middle_x + terms[0, 0], middle_y + terms[1, 0], size
 
 
-@inlined
+@lent
 def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
     """Write the products of a witness's terms with each other and with its place (u, v)."""
     row[0], row[1], row[2], row[3], row[4], row[5] = 1.0, x, y, x * x, x * y, y * y
@@ -70,27 +71,27 @@ def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
         row[PLACE_X + a], row[PLACE_Y + a] = row[a] * u, row[a] * v
 
 
-@compiled
+@lent
 def _robust(count, exact2, room):  # type: ignore[no-untyped-def]
-    """(2, 6) the map's terms by robust least squares, the variance about it, and the leverage at the origin; infinite
-    where the witnesses lie in a row."""
+    """Write the map's terms by robust least squares, x and y, into the room's right sides; the variance about it, and
+    the leverage at the origin, infinite where the witnesses lie in a row."""
     rows, weight, squares, normal, right, sums = room
     for k in range(WITNESSES):
         weight[k] = rows[k, CLOSENESS]
     variance, leverage = np.inf, np.inf
     for number in range(ROBUST_ROUNDS):
-        sides = right if number == ROBUST_ROUNDS - 1 else right[:2]
+        sides = 3 if number == ROBUST_ROUNDS - 1 else 2
         _sums(rows, weight, sums)
-        if not _solved(sums, normal, sides):
-            return right[:2], np.inf, np.inf
+        if not _solved(sums, normal, right, sides):
+            return np.inf, np.inf
         leverage = right[2, 0] * sums[0] / count
         _misfits(rows, right, count, squares)
         usual = 2.0 * _median(squares, count) + exact2
         variance = _weighed(rows, squares, usual, count, weight)
-    return right[:2], variance, leverage
+    return variance, leverage
 
 
-@vectorized
+@lent_vectorized
 def _sums(rows, weight, out):  # type: ignore[no-untyped-def]
     """Write the weighted sums of the witnesses' products, four witnesses at once."""
     for m in range(PRODUCTS):
@@ -101,8 +102,8 @@ def _sums(rows, weight, out):  # type: ignore[no-untyped-def]
             out[m] += a * rows[k, m] + b * rows[k + 1, m] + c * rows[k + 2, m] + d * rows[k + 3, m]
 
 
-@compiled
-def _solved(sums, normal, right):  # type: ignore[no-untyped-def]
+@lent
+def _solved(sums, normal, right, sides):  # type: ignore[no-untyped-def]
     """Write the solutions for the two coordinates, and if asked for the leverage; False where there is none to trust.
 
     Elimination without roots, and one quotient a term: each waits for the one before.
@@ -114,7 +115,7 @@ def _solved(sums, normal, right):  # type: ignore[no-untyped-def]
         normal[a, a] += RIDGE if a >= 3 else 0.0
         largest = max(largest, normal[a, a])
         right[0, a], right[1, a] = sums[PLACE_X + a], sums[PLACE_Y + a]
-        if right.shape[0] > 2:
+        if sides > 2:
             right[2, a] = 1.0 if a == 0 else 0.0
     for j in range(TERMS):
         if not normal[j, j] > MIN_PIVOT * largest:
@@ -124,18 +125,18 @@ def _solved(sums, normal, right):  # type: ignore[no-untyped-def]
             factor = normal[i, j] * inverse
             for k in range(j + 1, i + 1):
                 normal[i, k] -= factor * normal[k, j]
-            for side in range(right.shape[0]):
+            for side in range(sides):
                 right[side, i] -= factor * right[side, j]
         normal[j, j] = inverse
     for j in range(TERMS - 1, -1, -1):
-        for side in range(right.shape[0]):
+        for side in range(sides):
             right[side, j] *= normal[j, j]
             for i in range(j):
                 right[side, i] -= normal[j, i] * right[side, j]
     return True
 
 
-@vectorized
+@lent_vectorized
 def _misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
     """Write the squared distances between where the map puts the witnesses and where they belong."""
     for k in range(count):
@@ -146,11 +147,12 @@ def _misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
         out[k] = u * u + v * v
 
 
-@compiled
+@lent
 def _median(values, count):  # type: ignore[no-untyped-def]
     """The median of the first values, none below 0, by how many are smaller than each: that takes no branches. The
     others of ``WITNESSES`` become infinite."""
-    values[count:] = np.inf
+    for k in range(count, WITNESSES):
+        values[k] = np.inf
     low, high = 0.0, 0.0
     for i in range(count):
         own, smaller = values[i], 0
@@ -161,7 +163,7 @@ def _median(values, count):  # type: ignore[no-untyped-def]
     return 0.5 * (low + high)
 
 
-@vectorized
+@lent_vectorized
 def _weighed(rows, squares, usual, count, weight):  # type: ignore[no-untyped-def]
     """Write the witnesses' weights, by how near they are and how well they fit; the variance about the map."""
     total, about = 0.0, 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, inlined
+from .engine import compiled, inlined, lent, lent_call
 
 BUCKET = 2.0  # points to a bucket
 
@@ -48,7 +48,7 @@ def count_around(grid, x, y):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled
+@lent_call
 def nearest(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
     """Write the points nearest to (x, y), the nearest first, into ``index`` and their squared distances into
     ``square``, as many as these hold; how many there are."""
@@ -90,7 +90,7 @@ def nearest(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
     return found
 
 
-@compiled
+@lent
 def _take(xy, order, begin, end, x, y, index, square, found):  # type: ignore[no-untyped-def]
     """Put those of the ordered points that are nearer than the last into their places; how many there are now."""
     wanted = index.shape[0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, inlined
+from .engine import compiled, lent
 from .near import bucketed, nearest
 
 SHARED = 0.3  # of the shorter edge, between the corners of two triangles at one marker
@@ -23,13 +23,13 @@ OWN = np.array([1, 2, 2, 0, 0, 1])
 THEIRS = np.array([0, 0, 1, 1, 2, 2])
 
 
-@compiled
+@lent
 def edge_of(area):  # type: ignore[no-untyped-def]
     """The edge of an equilateral triangle."""
     return np.sqrt(area * 4.0 / np.sqrt(3.0))
 
 
-@inlined
+@lent
 def own_map(center, corner, i, arms, u, turn, step):  # type: ignore[no-untyped-def]
     """The image step per layout step, row by row, that carries the arms of the layout's cell u onto cell i's triangle,
     counted from ``turn``."""
@@ -69,7 +69,7 @@ def touch(fresh, center, corner, area, whole, cell, seen_as, plan, step, out):  
                 out[i, k], out[j, k + 3] = j, i
 
 
-@inlined
+@lent
 def _touch(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-untyped-def]
     """Whether cells i and j, if they are the layout's u and its neighbour v along k, touch as these do."""
     edge = edge_of(min(area[i], area[j]))
@@ -89,7 +89,7 @@ def _touch(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-
     return False
 
 
-@inlined
+@lent
 def _leads(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-untyped-def]
     """Whether cell i's triangle, counted from its turn, carries the way from u to v in the layout near cell j."""
     a, b, c, d = own_map(center, corner, i, plan.arms_mm, u, turn, step)
@@ -102,7 +102,7 @@ def _leads(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-unt
     return aside_x * aside_x + aside_y * aside_y < MAX_ASIDE**2 * (x * x + y * y)
 
 
-@inlined
+@lent
 def turn_like(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no-untyped-def]
     """From which corner the triangle of cell i, the layout's u, is counted for its map, written to ``out``, to be like
     the wanted one; -1 where none is, or it has none."""
@@ -176,7 +176,7 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, slope, fres
     return queue[first:end]
 
 
-@inlined
+@lent
 def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
     """Whether a place of the layout beside u is free."""
     for k in range(6):
@@ -186,7 +186,7 @@ def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
     return False
 
 
-@inlined
+@lent
 def _turn_beside(center, corner, area, i, j, u, v, k, turn, plan, step):  # type: ignore[no-untyped-def]
     """From which corner cell j's triangle is counted if it is v, the neighbour along k of u, which is cell i counted
     from ``turn``; -1 where it does not touch as v does."""
