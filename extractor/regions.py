@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .color import HUES
-from .engine import compiled, vectorized
+from .engine import compiled, lent_vectorized
 from .seeds import MOMENTS, Seeds
 from .segmentation import Segmentation
 
@@ -34,11 +34,11 @@ class Regions:
     domain_px: NDArray[np.int64]
 
 
-@vectorized
-def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
-    """Write the moments of pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+@lent_vectorized
+def _add_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
+    """Write the moments of the first pixels about (x0, y0); whole numbers all, so that their order does not matter."""
     m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(x_of.shape[0]):
+    for i in range(np.uint64(count)):
         x, y = float(x_of[i] - x0), float(y_of[i] - y0)
         xx, xy, yy = x * x, x * y, y * y
         m1 += x
@@ -50,8 +50,8 @@ def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
         m7 += xx * y
         m8 += x * yy
         m9 += yy * y
-    out[0], out[1], out[2], out[3], out[4] = x_of.shape[0], m1, m2, m3, m4
-    out[5], out[6], out[7], out[8], out[9] = m5, m6, m7, m8, m9
+    for k, value in enumerate((float(count), m1, m2, m3, m4, m5, m6, m7, m8, m9)):
+        moments[region, k] = value
 
 
 @compiled
@@ -64,7 +64,7 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     down = np.empty(limit_px + 2, np.int32)  # and y
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
-    half = HUES // 2
+    half, one, two = HUES // 2, np.uint64(1), np.uint64(2)
     for region in range(seed_xy.shape[0]):
         sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
         first = sy * width + sx
@@ -85,31 +85,34 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                     ny = y + (1 if side == 2 else -1 if side == 3 else 0)
                     if nx < 0 or ny < 0 or nx == width or ny == height:
                         continue
-                    to = ny * width + nx
+                    to = np.uint64(ny * width + nx)
                     if owners[to] != 0 or end > limit_px or (labels[to] != ink and labels[to] != 0):
                         continue
-                    h, s, v = float(colors[3 * to]), float(colors[3 * to + 1]), float(colors[3 * to + 2])
+                    at = np.uint64(3) * to
+                    h, s, v = float(colors[at]), float(colors[at + one]), float(colors[at + two])
                     # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
                     dh = h - mean_h
                     dh += HUES if dh < -half else -HUES if dh >= half else 0.0
                     ds, dv = s - mean_s, v - mean_v
                     scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
-                    if dh * dh + ds * ds + dv * dv >= limit2 * scale:
-                        continue
-                    owners[to] = region + 1
+                    near = dh * dh + ds * ds + dv * dv < limit2 * scale
+                    # written over where it is not near: in noise, that branch can not be guessed
                     across[end], down[end] = nx, ny
-                    end += 1
+                    owners[to] = region + 1 if near else 0
+                    end += near
                     away = h - h0
-                    sum_h += away + (HUES if away < -half else -HUES if away >= half else 0.0)
-                    sum_s += s
-                    sum_v += v
+                    away += HUES if away < -half else -HUES if away >= half else 0.0
+                    sum_h += away if near else 0.0
+                    sum_s += s if near else 0.0
+                    sum_v += v if near else 0.0
             begin = wave_end
-            mean_h = (h0 + sum_h / end) % HUES
+            mean_h = h0 + sum_h / end
+            mean_h += HUES if mean_h < 0.0 else -HUES if mean_h >= HUES else 0.0
             mean_s = sum_s / end
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
-        _add_moments(across[:end], down[:end], sx, sy, moments[region])
+        _add_moments(across, down, end, sx, sy, moments, region)
     return owner, moments
 
 
