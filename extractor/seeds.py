@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, lent
 from .segmentation import Segmentation
 
 MIN_DOMAIN_PX = 4
@@ -70,7 +70,7 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled
+@lent
 def _root(parent, i):  # type: ignore[no-untyped-def]
     """The first run of the domain that run i belongs to; the path to it is halved on the way."""
     while parent[i] != i:
@@ -112,12 +112,16 @@ def _runs(label):  # type: ignore[no-untyped-def]
         y, start, end, ink = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
         while runs[above, 0] < y - 1 or (runs[above, 0] == y - 1 and runs[above, 2] < start):
             above += 1
-        other = above
+        other, own = above, i
         while runs[other, 0] == y - 1 and runs[other, 1] <= end:
             if runs[other, 3] == ink:
-                a, b = _root(parent, i), _root(parent, other)
-                parent[max(a, b)] = min(a, b)
+                if own == i:
+                    own = parent[other]
+                elif own != parent[other]:
+                    a, b = _root(parent, own), _root(parent, other)
+                    parent[max(a, b)] = min(a, b)
             other += 1
+        parent[i] = own
     return runs[:count], parent
 
 
@@ -128,12 +132,11 @@ def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
     domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
     count = 0
     for i in range(runs.shape[0]):
-        if parent[i] == i:
-            domain[i] = count
-            count += 1
-        else:
-            domain[i] = domain[parent[i]]
-        area[domain[i]] += runs[i, 2] - runs[i, 1] + 1
+        first, d = parent[i] == i, domain[parent[i]]
+        d = count if first else d  # of both, so that no branch is to be guessed
+        domain[i] = d
+        count += first
+        area[d] += runs[i, 2] - runs[i, 1] + 1
     area = area[:count]
     crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
     runs, domain, area = _kept(runs, domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
