@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .delaunay import delaunay
-from .engine import compiled
+from .engine import compiled, lent
 
 MAX_FLIP_ROUNDS = 12
 # A triangle of three neighbouring centers is as large as a cell; one that spans a gap is at least twice that.
@@ -41,13 +41,13 @@ class Mesh:
     turn: NDArray[np.int8]
 
 
-@compiled
+@lent
 def _place_of(rows, i, value):  # type: ignore[no-untyped-def]
     """The place of a value among the three of row i."""
     return 0 if rows[i, 0] == value else 1 if rows[i, 1] == value else 2
 
 
-@compiled
+@lent
 def _cross(xy, a, b, c):  # type: ignore[no-untyped-def]
     """Twice the signed area of a, b, c; positive clockwise with y down."""
     x, y = xy[a, 0], xy[a, 1]
@@ -90,7 +90,7 @@ def _flip(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
             break
 
 
-@compiled
+@lent
 def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
     """True when two cells have a corner in common, or when one of them has no triangle to tell."""
     if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled, inlined, lent, lent_call
+from .engine import compiled, lent, lent_call
 
 BUCKET = 2.0  # points to a bucket
 
@@ -34,18 +34,6 @@ def bucketed(xy):  # type: ignore[no-untyped-def]
         order[filled[bucket[i]]] = i
         filled[bucket[i]] += 1
     return low_x, low_y, step, columns, begin, order
-
-
-@inlined
-def count_around(grid, x, y):  # type: ignore[no-untyped-def]
-    """How many points lie in the bucket of (x, y), which lies in the grid, and in those around it."""
-    low_x, low_y, step, columns, begin, _ = grid
-    rows = (begin.shape[0] - 1) // columns
-    column, row, count = int((x - low_x) / step), int((y - low_y) / step), 0
-    left, right = max(column - 1, 0), min(column + 1, columns - 1)
-    for line in range(max(row - 1, 0), min(row + 1, rows - 1) + 1):
-        count += begin[line * columns + right + 1] - begin[line * columns + left]
-    return count
 
 
 @lent_call

@@ -59,6 +59,17 @@ class Numbering:
     origin: Origin = Origin.WHITE
 
 
+class _Walk(NamedTuple):
+    """A part of the mesh walked through: (N, 2) int32 the axial coordinates of the cells, ``UNKNOWN`` for those not
+    walked to, the number of those that were and of those left out, the turn of its markers, and which part it is."""
+
+    at: NDArray[np.int32]
+    cells: int
+    conflicts: int
+    front: int
+    part: int
+
+
 class _Candidate(NamedTuple):
     """A numbering with what speaks for it: cells inside the layout, those less what speaks against it, how white the
     white cell is, which part of the mesh it is, and whether that touches the white cell."""
@@ -128,7 +139,7 @@ def _walk(start, faces, neighbours, turn, front, blocked, reach):  # type: ignor
 @compiled
 def _walk_around(center, faces, neighbours, turn, part, front, reach):  # type: ignore[no-untyped-def]
     """Walk a part from its middle; cells that are contradicted are left out and it is walked again. The coordinates,
-    ``UNKNOWN`` where that has no end, and how many cells were left out."""
+    ``UNKNOWN`` where that has no end, of how many cells they are, and how many cells were left out."""
     blocked = np.zeros(center.shape[0], np.bool_)
     for _ in range(MAX_ROUNDS):
         start = innermost(center, faces, part, blocked)
@@ -136,9 +147,9 @@ def _walk_around(center, faces, neighbours, turn, part, front, reach):  # type: 
             break
         at, bad = _walk(start, faces, neighbours, turn, front, blocked, reach)
         if not bad.any():
-            return at, np.count_nonzero(blocked)
+            return at, np.count_nonzero(at[:, 0] != UNKNOWN), np.count_nonzero(blocked)
         blocked |= bad
-    return np.full((center.shape[0], 2), UNKNOWN, np.int32), np.count_nonzero(blocked)
+    return np.full((center.shape[0], 2), UNKNOWN, np.int32), 0, np.count_nonzero(blocked)
 
 
 def reach_of(lattice: Lattice) -> int:
@@ -146,14 +157,17 @@ def reach_of(lattice: Lattice) -> int:
     return 2 * lattice.layers + 2
 
 
-def walk_part(
-    cells: Cells, mesh: Mesh, part: NDArray[np.intp], front: int, reach: int
-) -> tuple[NDArray[np.int32], int]:
-    """Walk a part of the mesh from its middle; cells that are contradicted are left out and it is walked again."""
-    walked: tuple[NDArray[np.int32], int] = _walk_around(
-        cells.center_px, mesh.faces, mesh.neighbours, mesh.turn, part, front, reach
-    )
-    return walked
+def _walks(cells: Cells, mesh: Mesh, front: int, least: float, reach: int) -> list[_Walk]:
+    """Every large part of the mesh, walked from its middle, the largest first."""
+    walks = []
+    for number_of, part in enumerate(largest_parts(mesh, MAX_PARTS)):
+        if len(part) < MIN_FACES and len(part) + 2 < least:  # so many faces have two cells more at most
+            break
+        at, walked, conflicts = _walk_around(
+            cells.center_px, mesh.faces, mesh.neighbours, mesh.turn, part, front, reach
+        )
+        walks.append(_Walk(at, walked, conflicts, front, front * (number_of + 1)))
+    return walks
 
 
 def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice) -> Numbering | None:
@@ -163,24 +177,25 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     fewest outside is the reference, unless two do so equally well. Where parts disagree, the whiter cell is, unless
     one is as white as the other. What is not settled so is ambiguous.
     """
-    found: list[_Candidate] = []
-    no_white: list[tuple[NDArray[np.int32], int, int]] = []
     least, reach = _least_cells(cells, mesh, lattice), reach_of(lattice)
-    for front in fronts(image, cells, mesh):
-        for number_of, part in enumerate(largest_parts(mesh, MAX_PARTS)):
-            if len(part) < MIN_FACES and len(part) + 2 < least:  # so many faces have two cells more at most
-                break
-            at, conflicts = walk_part(cells, mesh, part, front, reach)
-            ways = ways_from_white(image, cells, lattice, at)
-            own = [_candidate(way, front, conflicts, front * (number_of + 1)) for way in ways]
-            found += own
-            if not any(one.inside >= least for one in own):
-                no_white.append((at, front, conflicts))
+    walks = [
+        walk for front in fronts(image, cells, mesh) for walk in _walks(cells, mesh, front, least, reach)
+    ]
+    found: list[_Candidate] = []
+    no_white: list[_Walk] = []
+    # a white cell explains no more cells than were walked to: where these are too few in every part, none tells
+    telling = any(walk.cells >= least for walk in walks)
+    for walk in walks:
+        ways = ways_from_white(image, cells, lattice, walk.at) if telling else []
+        own = [_candidate(way, walk) for way in ways]
+        found += own
+        if not any(one.inside >= least for one in own):
+            no_white.append(walk)
     best = _settled(found, least, 0.5 * cells.edge_px)
-    for walked in no_white:
+    for walk in no_white:
         # with more cells than the white cell's part has, the outline tells more
-        if best is None or np.count_nonzero(walked[0][:, 0] != UNKNOWN) > best.inside:
-            best = _with_outline(cells, lattice, *walked) or best
+        if best is None or walk.cells > best.inside:
+            best = _with_outline(cells, lattice, walk) or best
     return best.numbering if best else None
 
 
@@ -220,22 +235,20 @@ def _least_cells(cells: Cells, mesh: Mesh, lattice: Lattice) -> float:
     return max(of_layout, min(MIN_SHARE * meshed, SURE_CELLS))
 
 
-def _candidate(way: Way, front: int, conflicts: int, part: int) -> _Candidate:
-    score = way.inside - 3 * way.outside - conflicts
-    numbering = Numbering(way.cell, front < 0, way.white_px, conflicts)
-    return _Candidate(way.inside, score, way.white, part, way.touching, numbering)
+def _candidate(way: Way, walk: _Walk) -> _Candidate:
+    score = way.inside - 3 * way.outside - walk.conflicts
+    numbering = Numbering(way.cell, walk.front < 0, way.white_px, walk.conflicts)
+    return _Candidate(way.inside, score, way.white, walk.part, way.touching, numbering)
 
 
-def _with_outline(
-    cells: Cells, lattice: Lattice, at: NDArray[np.int32], front: int, conflicts: int
-) -> _Candidate | None:
+def _with_outline(cells: Cells, lattice: Lattice, walk: _Walk) -> _Candidate | None:
     """The way that the outline leaves, if it leaves only one."""
-    known = np.flatnonzero(at[:, 0] != UNKNOWN)
-    settled = settle(at[known], lattice)
+    known = np.flatnonzero(walk.at[:, 0] != UNKNOWN)
+    settled = settle(walk.at[known], lattice)
     if settled is None:
         return None
-    cell = np.full(len(at), -1, np.int32)
+    cell = np.full(len(walk.at), -1, np.int32)
     cell[known] = settled
     inside, middle = int((settled >= 0).sum()), cells.center_px[known].mean(axis=0)
-    numbering = Numbering(cell, front < 0, middle, conflicts, origin=Origin.OUTLINE)
+    numbering = Numbering(cell, walk.front < 0, middle, walk.conflicts, origin=Origin.OUTLINE)
     return _Candidate(inside, inside, 0.0, 0, False, numbering)

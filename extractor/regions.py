@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .color import HUES
-from .engine import compiled, vectorized
+from .engine import compiled, lent_vectorized
 from .seeds import MOMENTS, Seeds
 from .segmentation import Segmentation
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
+FRAME = -1  # the owner of what lies around the image
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +35,11 @@ class Regions:
     domain_px: NDArray[np.int64]
 
 
-@vectorized
-def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
-    """Write the moments of pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+@lent_vectorized
+def _add_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
+    """Write the moments of the first pixels about (x0, y0); whole numbers all, so that their order does not matter."""
     m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(x_of.shape[0]):
+    for i in range(np.uint64(count)):
         x, y = float(x_of[i] - x0), float(y_of[i] - y0)
         xx, xy, yy = x * x, x * y, y * y
         m1 += x
@@ -50,28 +51,33 @@ def _add_moments(x_of, y_of, x0, y0, out):  # type: ignore[no-untyped-def]
         m7 += xx * y
         m8 += x * yy
         m9 += yy * y
-    out[0], out[1], out[2], out[3], out[4] = x_of.shape[0], m1, m2, m3, m4
-    out[5], out[6], out[7], out[8], out[9] = m5, m6, m7, m8, m9
+    for k, value in enumerate((float(count), m1, m2, m3, m4, m5, m6, m7, m8, m9)):
+        moments[region, k] = value
 
 
 @compiled
 def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[no-untyped-def]
-    """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it."""
+    """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it.
+
+    Returns the owners in a frame one pixel wide that nothing grows into, and the moments.
+    """
     height, width = label.shape
-    owner = np.zeros((height, width), np.int32)
+    wide = width + 2
+    owner = np.full((height + 2, wide), FRAME, np.int32)
+    owner[1:-1, 1:-1] = 0
     owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
-    across = np.empty(limit_px + 2, np.int32)  # a queue of pixels: their x
-    down = np.empty(limit_px + 2, np.int32)  # and y
+    queue = np.empty(limit_px + 2, np.int32)  # of pixels
+    framed = np.empty(limit_px + 2, np.int32)  # the same in the frame
     moments = np.zeros((seed_xy.shape[0], MOMENTS))
     limit2 = threshold * threshold
-    half = HUES // 2
+    half, one, two = HUES // 2, np.uint64(1), np.uint64(2)
     for region in range(seed_xy.shape[0]):
         sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
-        first = sy * width + sx
-        if owners[first] != 0:
+        first, start = sy * width + sx, (sy + 1) * wide + sx + 1
+        if owners[start] != 0:
             continue
-        across[0], down[0] = sx, sy
-        owners[first] = region + 1
+        queue[0], framed[0] = first, start
+        owners[start] = region + 1
         h0 = float(colors[3 * first])
         sum_h, sum_s, sum_v = 0.0, float(colors[3 * first + 1]), float(colors[3 * first + 2])
         mean_h, mean_s, mean_v = h0, sum_s, sum_v
@@ -79,38 +85,51 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
         while begin < end and end <= limit_px:
             wave_end = end
             for i in range(begin, wave_end):
-                x, y = across[i], down[i]
                 for side in range(4):
-                    nx = x + (1 if side == 0 else -1 if side == 1 else 0)
-                    ny = y + (1 if side == 2 else -1 if side == 3 else 0)
-                    if nx < 0 or ny < 0 or nx == width or ny == height:
+                    step = 1 if side == 0 else -1 if side == 1 else wide if side == 2 else -wide
+                    to = np.uint64(framed[i] + step)
+                    if owners[to] != 0:
                         continue
-                    to = ny * width + nx
-                    if owners[to] != 0 or end > limit_px or (labels[to] != ink and labels[to] != 0):
+                    step = 1 if side == 0 else -1 if side == 1 else width if side == 2 else -width
+                    pixel = np.uint64(queue[i] + step)
+                    if end > limit_px or (labels[pixel] != ink and labels[pixel] != 0):
                         continue
-                    h, s, v = float(colors[3 * to]), float(colors[3 * to + 1]), float(colors[3 * to + 2])
+                    at = np.uint64(3) * pixel
+                    h, s, v = float(colors[at]), float(colors[at + one]), float(colors[at + two])
                     # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
                     dh = h - mean_h
                     dh += HUES if dh < -half else -HUES if dh >= half else 0.0
                     ds, dv = s - mean_s, v - mean_v
                     scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
-                    if dh * dh + ds * ds + dv * dv >= limit2 * scale:
-                        continue
-                    owners[to] = region + 1
-                    across[end], down[end] = nx, ny
-                    end += 1
+                    near = dh * dh + ds * ds + dv * dv < limit2 * scale
+                    # written over where it is not near: in noise, that branch can not be guessed
+                    queue[end], framed[end] = pixel, to
+                    owners[to] = region + 1 if near else 0
+                    end += near
                     away = h - h0
-                    sum_h += away + (HUES if away < -half else -HUES if away >= half else 0.0)
-                    sum_s += s
-                    sum_v += v
+                    away += HUES if away < -half else -HUES if away >= half else 0.0
+                    sum_h += away if near else 0.0
+                    sum_s += s if near else 0.0
+                    sum_v += v if near else 0.0
             begin = wave_end
-            mean_h = (h0 + sum_h / end) % HUES
+            mean_h = h0 + sum_h / end
+            mean_h += HUES if mean_h < 0.0 else -HUES if mean_h >= HUES else 0.0
             mean_s = sum_s / end
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
-        _add_moments(across[:end], down[:end], sx, sy, moments[region])
+        _unframe(queue, framed, end, width)
+        _add_moments(queue, framed, end, sx, sy, moments, region)
     return owner, moments
+
+
+@lent_vectorized
+def _unframe(queue, framed, count, width):  # type: ignore[no-untyped-def]
+    """Write each pixel's x over its number, and its y over the one in the frame: the two differ by the frame's pixels
+    before it."""
+    for i in range(np.uint64(count)):
+        y = (framed[i] - queue[i] - width - 3) >> 1
+        queue[i], framed[i] = queue[i] - y * width, y
 
 
 def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
@@ -123,4 +142,5 @@ def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
     owner, moments = _grow(
         segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
     )
+    owner = owner[1:-1, 1:-1]
     return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, lent
 from .segmentation import Segmentation
 
 MIN_DOMAIN_PX = 4
@@ -23,25 +24,38 @@ MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Stage 3: one seed per domain.
+    """Stage 3: one seed per domain, which is looked for when it is first asked for.
 
     Attributes:
-        xy: (N, 2) int32, the pixel to grow from.
-        center: (N, 2) float64, the domain's geometric center.
-        ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) int64, the domain's area.
         runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
         domain: (R,) int32, the domain that a run belongs to.
         crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
     """
 
-    xy: NDArray[np.int32]
-    center: NDArray[np.float64]
-    ink: NDArray[np.uint8]
     area_px: NDArray[np.int64]
     runs: NDArray[np.int32]
     domain: NDArray[np.int32]
     crowded: bool = False
+
+    @property
+    def xy(self) -> NDArray[np.int32]:
+        """(N, 2) the pixel to grow from."""
+        return self._found[0]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """(N, 2) the domain's geometric center."""
+        return self._found[1]
+
+    @property
+    def ink(self) -> NDArray[np.uint8]:
+        """(N,) 1 red, 2 green, 3 blue."""
+        return self._found[2]
+
+    @cached_property
+    def _found(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]:
+        return _seeds(self.runs, self.domain, self.area_px)  # type: ignore[no-any-return]
 
 
 @compiled
@@ -56,7 +70,7 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled
+@lent
 def _root(parent, i):  # type: ignore[no-untyped-def]
     """The first run of the domain that run i belongs to; the path to it is halved on the way."""
     while parent[i] != i:
@@ -98,12 +112,16 @@ def _runs(label):  # type: ignore[no-untyped-def]
         y, start, end, ink = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
         while runs[above, 0] < y - 1 or (runs[above, 0] == y - 1 and runs[above, 2] < start):
             above += 1
-        other = above
+        other, own = above, i
         while runs[other, 0] == y - 1 and runs[other, 1] <= end:
             if runs[other, 3] == ink:
-                a, b = _root(parent, i), _root(parent, other)
-                parent[max(a, b)] = min(a, b)
+                if own == i:
+                    own = parent[other]
+                elif own != parent[other]:
+                    a, b = _root(parent, own), _root(parent, other)
+                    parent[max(a, b)] = min(a, b)
             other += 1
+        parent[i] = own
     return runs[:count], parent
 
 
@@ -114,12 +132,11 @@ def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
     domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
     count = 0
     for i in range(runs.shape[0]):
-        if parent[i] == i:
-            domain[i] = count
-            count += 1
-        else:
-            domain[i] = domain[parent[i]]
-        area[domain[i]] += runs[i, 2] - runs[i, 1] + 1
+        first, d = parent[i] == i, domain[parent[i]]
+        d = count if first else d  # of both, so that no branch is to be guessed
+        domain[i] = d
+        count += first
+        area[d] += runs[i, 2] - runs[i, 1] + 1
     area = area[:count]
     crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
     runs, domain, area = _kept(runs, domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
@@ -176,7 +193,7 @@ def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
 
 @compiled
 def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, that center, its ink and its area."""
+    """Per domain: the pixel of it nearest to its geometric center, that center and its ink."""
     count = area.shape[0]
     ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
     for i in range(runs.shape[0]):
@@ -198,7 +215,7 @@ def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    return xy, center, ink, area
+    return xy, center, ink
 
 
 def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
@@ -211,34 +228,35 @@ def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
             many times more than any pattern.
     """
     runs, parent = _runs(segmentation.label)
-    runs, domain, area, crowded = _domains(runs, parent, crowd)
-    xy, center, ink, area_px = _seeds(runs, domain, area)
-    return Seeds(xy, center, ink, area_px, runs, domain, crowded)
+    runs, domain, area_px, crowded = _domains(runs, parent, crowd)
+    return Seeds(area_px, runs, domain, crowded)
 
 
 @compiled
 def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
-    """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown."""
+    """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown: a run's at once, from its middle
+    and its length; in halves, quarters and eighths of whole numbers, which are exact."""
     out = np.zeros((seed_xy.shape[0], MOMENTS))
     for i in range(runs.shape[0]):
         d = domain[i]
-        row, y = out[d], float(runs[i, 0] - seed_xy[d, 1])
-        for k in range(runs[i, 1], runs[i, 2] + 1):
-            x = float(k - seed_xy[d, 0])
-            xx, xy, yy = x * x, x * y, y * y
-            row[0] += 1.0
-            row[1] += x
-            row[2] += y
-            row[3] += xx
-            row[4] += xy
-            row[5] += yy
-            row[6] += xx * x
-            row[7] += xx * y
-            row[8] += x * yy
-            row[9] += yy * y
+        y, length = float(runs[i, 0] - seed_xy[d, 1]), float(runs[i, 2] - runs[i, 1] + 1)
+        middle = 0.5 * float(runs[i, 1] + runs[i, 2]) - float(seed_xy[d, 0])
+        spread = length * (length * length - 1.0) / 12.0  # the sum of the squares about the middle
+        x = length * middle
+        xx = x * middle + spread
+        out[d, 0] += length
+        out[d, 1] += x
+        out[d, 2] += length * y
+        out[d, 3] += xx
+        out[d, 4] += x * y
+        out[d, 5] += length * y * y
+        out[d, 6] += middle * (x * middle + 3.0 * spread)
+        out[d, 7] += xx * y
+        out[d, 8] += x * y * y
+        out[d, 9] += length * y * y * y
     return out
 
 
 def large_enough(seeds: Seeds) -> bool:
     """Whether at most a few of the domains are too small to be recognised safely."""
-    return len(seeds.ink) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
+    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
