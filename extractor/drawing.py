@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .bending import hidden_misfit
 from .bleeding import rebled
-from .drawn import Board, Drawing, drawn, drawn_again, room_for, usual_length
+from .drawn import Board, Drawing, drawn, drawn_again, room_for
 from .engine import compiled
 from .fit import Fit
 from .levels import level_change
@@ -22,8 +22,8 @@ from .offsets import Reading, foot_of
 from .presets import Steps
 from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_deviation
 from .sight import Frame, Sight
-from .step import Judged, lines_of, listened, moved_on, placed, roughened, solution
-from .stepping import middles, trust, votes, widening
+from .step import Judged, listened, moved_on, placed, roughened, solution
+from .stepping import middles, trust, usual_edge, votes, widening
 from .synthesis import edge_contrasts
 from .topology import Topology
 
@@ -116,7 +116,7 @@ class Draughtsman:
         """Whether a usual edge is blurred into the next; ``edge_px`` is a short one."""
         if fit.sigma < WIDE_BLUR * edge_px:
             return False
-        return bool(fit.sigma > WIDE_BLUR * usual_length(lines_of(self._mesh, fit)))
+        return bool(fit.sigma > WIDE_BLUR * usual_edge(fit.xy, self._mesh.edges))
 
     def _free(self, fit: Fit, wide: bool) -> Fit:
         """The fit with how freely its gridlines may bend: not at all where the blur is ``wide``. There they would

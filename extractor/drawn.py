@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from .bending import bending_ones
 from .engine import compiled
 from .fit import Fit
-from .gridlines import KNOWN, LENGTH, gridlines
+from .gridlines import gridlines
 from .levels import Levels, black_at, cell_means, smoothed
 from .painting import Strokes, draw_cells, erase_cells, room_for_strokes
 from .settling import touching
 from .sight import Sight
-from .stepping import box_of, middles
+from .stepping import box_of, middles, usual_edge
 from .synthesis import clear, edge_contrasts, read_gridlines
 from .topology import Topology
 
@@ -119,7 +119,7 @@ def _drawn(image, board, about, how, inside):  # type: ignore[no-untyped-def]
     below, loose = black_at(black, middles(lines), *frame), bending_ones(rough, bend, edges)
     sums = read_gridlines(image, picture, lines, contrasts, below, sigma, box, loose, residual)
     bettered = _bettered(image, picture, xy, cells, cell, frame, *inside)
-    return (lines, contrasts, below, sums), usual_length(lines), bettered
+    return (lines, contrasts, below, sums), usual_edge(xy, edges), bettered
 
 
 @compiled
@@ -149,13 +149,6 @@ def _drawn_again(image, board, about, how, anew, before):  # type: ignore[no-unt
     sums = read_gridlines(image, picture, own, contrasts, below, sigma, box, loose, residual)
     contrasts, below = replaced(old_contrasts, some, contrasts), replaced(old_black, some, below)
     return xy, lines, replaced(old_bend, some, bend), contrasts, below, replaced(old_sums, some, sums)
-
-
-@compiled
-def usual_length(lines):  # type: ignore[no-untyped-def]
-    """The median length of the known gridlines (E, 8), px; 1 without any."""
-    known = lines[lines[:, KNOWN] > 0.0, LENGTH]
-    return np.median(known) if known.shape[0] > 0 else 1.0
 
 
 @compiled

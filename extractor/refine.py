@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .bending import around
 from .drawing import MIN_SIGMA_PX, SMALL_BLUR, Draughtsman
-from .drawn import usual_length
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .information import Information
@@ -24,7 +23,7 @@ from .regained import regain
 from .rounds import profiled
 from .sight import Sight, Sights
 from .step import completed, lines_of, placed, roughened
-from .stepping import MIN_NOISE, SHORTEST, short_edges
+from .stepping import MIN_NOISE, SHORTEST, short_edges, usual_edge
 from .straying import astray, collected
 from .sure import doubt, lost_ones, sure_ones
 from .topology import Topology
@@ -135,7 +134,7 @@ class Refiner:
         """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
         that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
         blurred = fit.sigma >= 2 * COARSE_BLUR * self._steps.finest
-        if not blurred or usual_length(lines_of(self._mesh, fit)) < 2 * COARSE_EDGE_PX:
+        if not blurred or usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
             return fit, 0.0
         coarse = sights.at(2 * view.scale)
         stepped, spent = self._draughtsman.step(coarse, rescaled(fit, view, coarse), edge_px / 2)

@@ -146,6 +146,12 @@ def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def usual_edge(xy, edges):  # type: ignore[no-untyped-def]
+    """The median length of the gridlines, px; 1 without any."""
+    return max(short_edges(xy, edges, 2, 2)[1], 1.0)
+
+
+@compiled
 def widening(sums, use, before, now, sigma):  # type: ignore[no-untyped-def]
     """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``."""
     curvature, pull = 0.0, 0.0
