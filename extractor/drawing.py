@@ -24,6 +24,7 @@ from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_d
 from .sight import Frame, Sight
 from .step import Judged, listened, moved_on, placed, roughened, solution
 from .stepping import middles, trust, usual_edge, votes, widening
+from .swelling import swelling_of, unswollen
 from .synthesis import edge_contrasts
 from .topology import Topology
 
@@ -145,19 +146,20 @@ class Draughtsman:
         tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
         inks = bettered.cell, bettered.slope
         read, wider, noise, *step = _step(seen, changes, inks, now, tables, tuple(frame))
-        use, loose, foot = read
-        reading = Reading(drawing.lines, drawing.contrasts, foot, NO_ROOM, use, drawing.sigma, noise, True)
+        use, loose, foot, swelling, aside = read
+        how = NO_ROOM, use, aside, drawing.sigma, noise, True
+        reading = Reading(drawing.lines, drawing.contrasts, foot, *how)
         sigma = _widened(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNMIXED * drawing.edge_px:
             bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, sigma)
         about = {"loose": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
-        return moved_on(fit, step, **about)
+        return moved_on(fit, step, swelling=swelling, **about)
 
 
 @compiled
 def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-def]
-    """Use, looseness and foot of what was ``seen``; by how much it says that the blur is larger; its noise; and the
-    solution.
+    """Use, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside for it; by how
+    much it says that the blur is larger; its noise; and the solution.
 
     Args:
         seen: lines, contrasts, black, sums and blur of a drawing.
@@ -171,6 +173,8 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     sums = read.copy()
     cell_change, black_change = changes
     to_a, to_b, off = votes(sums, contrasts, edge_cells, cell_change, black_change, middles(lines), *frame)
+    swelling = swelling_of(sums, to_a, to_b, contrasts, edge_cells, sigma)
+    aside = unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling)
     said = bend, rough, before, lines, edges, noise
     loose, kept = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
     use, found = trust(sums, to_a, to_b, hidden_misfit(loose, contrasts, sigma), values, least, unjudged)
@@ -178,8 +182,8 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     where = xy, beyond, edges, spokes, sigma, noise, True
     step = solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
     current = edge_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
-    wider = widening(sums, use, contrasts, current, sigma)
-    return ((use, loose, foot_of(contrasts, black, off)), wider, noise) + step
+    wider = widening(sums, aside, use, contrasts, current, sigma)
+    return ((use, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
 
 
 def _widened(sigma: float, edge_px: float, wider: float) -> float:

@@ -31,6 +31,7 @@ class Reading(NamedTuple):
             the levels were corrected by.
         room: (E, 4), as ``unmixing`` gives it; used where nothing was drawn.
         use: (E,) how far the gridline is trusted.
+        aside: (E,) px, how far towards (-uy, ux) it is seen as the cells are swollen.
         sigma: the blur, px.
         noise: grey levels.
         drawn: the pattern was drawn.
@@ -41,6 +42,7 @@ class Reading(NamedTuple):
     foot: NDArray[np.float64]
     room: NDArray[np.float64]
     use: NDArray[np.float64]
+    aside: NDArray[np.float64]
     sigma: float
     noise: float
     drawn: bool
@@ -95,8 +97,9 @@ def _sum_at(votes, count, place):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, drawn, count):  # type: ignore[no-untyped-def]
-    """(E, m, 2): how far each gridline lies off towards (-uy, ux) around its virtual markers, px, and the variance.
+def read_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, noise, drawn, count):  # type: ignore[no-untyped-def]
+    """(E, m, 2): how far each gridline lies off towards (-uy, ux) around its virtual markers, beyond what it is seen
+    ``aside`` (E,), px, and the variance.
 
     NaN where the gridline has no contrast, is not trusted, leaves the image, or where another one is too near for what
     was not drawn.
@@ -159,7 +162,7 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, sigma, noise, 
                 near, far = (j + 0.5) / places, (count - j - 0.5) / places
                 if length * min(near * room[e, 1], far * room[e, 2]) < CLEAR_SIGMA * sigma:
                     continue
-            out[e, j, OFFSET] = sigma * sums[j, 0] / sums[j, 1]
+            out[e, j, OFFSET] = sigma * sums[j, 0] / sums[j, 1] - aside[e]
             out[e, j, VARIANCE] = noise**2 * sigma**2 / (strength * sums[j, 1])
     return out
 

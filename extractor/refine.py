@@ -7,6 +7,8 @@ nearly all that can be had.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ from .step import completed, lines_of, placed, roughened
 from .stepping import MIN_NOISE, SHORTEST, short_edges, usual_edge
 from .straying import astray, collected
 from .sure import doubt, lost_ones, sure_ones
+from .swelling import shrunk
 from .topology import Topology
 
 SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: the scale for it is looked at first
@@ -116,6 +119,8 @@ class Refiner:
         """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge. With
         ``sights``, a first step may be taken in a coarser view."""
         mesh, steps, places, edge_px = self._mesh, self._steps, _in(view, places), edge_px / view.scale
+        if fit.swelling != 0.0:
+            places = replace(places, xy_px=shrunk(places.xy_px, mesh.cells, fit.swelling))
         start = placed(mesh, fit)
         if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
             start = roughened(mesh, start)
@@ -144,7 +149,7 @@ class Refiner:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
         strange = fit.noise > STRANGE * fit.grain
-        lost, some = lost_ones(xy, cov, places.xy_px, places.edge_px, strange)
+        lost, some = lost_ones(xy, cov, places.xy_px, places.edge_px, strange, fit.swelling)
         if some:
             regain(view, self._mesh, fit, sides, places, lost, xy, cov)
         return self._refined(view, fit, xy, cov, ~lost, places)
@@ -190,6 +195,7 @@ def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
         guiding=view.reduced(old.full(fit.guiding)),
         maps=ratio * fit.maps,
         sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
+        swelling=ratio * fit.swelling,
         noise=max(ratio * fit.noise, MIN_NOISE),
         grain=max(ratio * fit.grain, MIN_NOISE),
         levels=fit.levels._replace(slope=fit.levels.slope / ratio),

@@ -23,6 +23,7 @@ from .sight import Sight
 from .step import PRIOR_PX, listened, placed
 from .stepping import PRIOR_BEYOND_PX, trust, trusted_markers
 from .sure import doubt, sure_ones
+from .swelling import unswollen
 from .synthesis import A, B
 from .topology import Topology
 
@@ -44,16 +45,17 @@ def regain(
     where these are not sure, or far from the ``places`` (in the view)."""
     assert fit.reading is not None
     before, fit = fit.reading.use, placed(mesh, fit, lost)
-    pattern = fit.xy, fit.beyond, fit.maps, fit.rough, fit.bend, before, fit.sigma, fit.noise
+    look = fit.sigma, fit.noise, fit.swelling
+    pattern = fit.xy, fit.beyond, fit.maps, fit.rough, fit.bend, before, look
     start = places.xy_px, places.edge_px, places.whole
-    tables = mesh.edges, mesh.spokes, mesh.along
+    tables = mesh.edges, mesh.spokes, mesh.along, mesh.edge_cells
     _regain(view.image, pattern, tuple(across), start, tables, lost, xy, cov)
 
 
 @compiled
 def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: ignore[no-untyped-def]
-    at, beyond, _, _, _, _, sigma, noise = pattern
-    edges, spokes, _ = tables
+    at, beyond, _, _, _, _, (sigma, noise, _) = pattern
+    edges, spokes, _, _ = tables
     which, count = _gridlines_around(lost, edges)
     lines, sums, to_a, to_b, use, loose = _read(image, pattern, across, tables, which)
     which, use, loose = which[:count], use[:count], loose[:count]
@@ -96,14 +98,15 @@ def _gridlines_around(lost, edges):  # type: ignore[no-untyped-def]
 def _read(image, pattern, across, tables, which):  # type: ignore[no-untyped-def]
     """Of the gridlines ``which`` (n,): how they run, what was read across them, their votes, how far they look as they
     should, and how freely they bend."""
-    at, _, maps, rough, bend, before, sigma, noise = pattern
-    edges, _, along = tables
+    at, _, maps, rough, bend, before, (sigma, noise, swelling) = pattern
+    edges, _, along, edge_cells = tables
     values, least, unjudged = JUDGED_BY_SAMPLES
     ends, bend, room = _rows(edges, which), _rows(bend, which), _rows(across[2], which)
     lines = gridlines(at, maps, bend, ends, _rows(along, which))
     weights, bending = _rows(across[1], which), bending_ones(rough, bend, ends)
     sums = read_profiles(image, lines, weights, room, sigma, bending, STATIONS)
     to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which))
+    unswollen(sums, to_a, to_b, _rows(across[0], which), _rows(edge_cells, which), swelling)
     said = bend, rough, before[which], lines, ends, noise
     loose, _ = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
     use, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)

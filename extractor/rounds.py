@@ -19,6 +19,7 @@ from .sight import Sight
 from .step import Judged, listened, moved_on, solution
 from .stepping import trust
 from .straying import doubted_ones
+from .swelling import swelling_of, unswollen
 from .synthesis import AA, A, B
 from .topology import Topology
 
@@ -44,28 +45,33 @@ def profiled(
     """
     before = np.ones(len(lines)) if fit.reading is None else fit.reading.use
     now = fit.xy, fit.beyond, fit.rough, fit.bend, before, fit.sigma, fit.noise
-    tables = mesh.edges, mesh.spokes
-    trusted, use, loose, *step = _profiled(view.image, lines, tuple(across), now, tables, stations, judged)
+    tables = mesh.edges, mesh.spokes, mesh.edge_cells
+    read, *step = _profiled(view.image, lines, tuple(across), now, tables, stations, judged)
+    trusted, use, loose, swelling, aside = read
     foot = across.weights[:, 3].copy()
-    reading = Reading(lines, across.contrasts, foot, across.room, use, fit.sigma, fit.noise, False)
-    return moved_on(fit, step, loose=loose, reading=reading), trusted
+    reading = Reading(lines, across.contrasts, foot, across.room, use, aside, fit.sigma, fit.noise, False)
+    return moved_on(fit, step, loose=loose, swelling=swelling, reading=reading), trusted
 
 
 @compiled
 def _profiled(image, lines, across, now, tables, most, judged):  # type: ignore[no-untyped-def]
-    """(E,) how far gridlines look as they should, how far they are used, and how freely they bend; and the solution."""
+    """(E,) how far gridlines look as they should, how far they are used, and how freely they bend; by how much cells
+    are swollen, and (E,) gridlines aside for it; and the solution."""
     contrasts, weights, room = across
     xy, beyond, rough, bend, before, sigma, noise = now
-    edges, spokes = tables
+    edges, spokes, edge_cells = tables
     values, least, unjudged = JUDGED_BY_SAMPLES
     sums = read_profiles(image, lines, weights, room, sigma, bending_ones(rough, bend, edges), most)
     to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
+    swelling = swelling_of(sums, to_a, to_b, contrasts, edge_cells, sigma)
+    aside = unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling)
     bending = bend, rough, before, lines, edges, noise
     loose, kept = listened(sums, to_a, to_b, off, *bending, values, least, unjudged)
     trusted, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
     use = trusted if judged else _lenient(trusted, sums, edges, spokes)
     where = xy, beyond, edges, spokes, sigma, noise, False
-    return (trusted, use, loose) + solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
+    read = trusted, use, loose, swelling, aside
+    return (read,) + solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
 
 
 @compiled

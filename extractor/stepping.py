@@ -152,8 +152,11 @@ def usual_edge(xy, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def widening(sums, use, before, now, sigma):  # type: ignore[no-untyped-def]
-    """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``."""
+def widening(sums, aside, use, before, now, sigma):  # type: ignore[no-untyped-def]
+    """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``.
+
+    What lies ``aside`` (E,), px, of where it is drawn looks more blurred, by half the square of that over the blur.
+    """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
         if use[e] == 0.0:
@@ -165,6 +168,7 @@ def widening(sums, use, before, now, sigma):  # type: ignore[no-untyped-def]
         weight = use[e] * sums[e, BLUR_CURVATURE]
         curvature += weight
         pull += use[e] * sums[e, BLUR] + CONTRAST_TO_BLUR * sigma * weight * change / strength
+        pull -= weight * 0.5 * aside[e] ** 2 / sigma
     return pull / curvature if curvature > 0.0 else 0.0
 
 
