@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled, inlined
+from .engine import compiled, lent
 from .fit import Refined
 from .neighbourhood import MIN_QUADRATIC, predicted, strays
 from .placing import AGREED, Places
@@ -85,11 +85,12 @@ def _drop(xy, cov, seen, rings, marker_mm, present, rim, size):  # type: ignore[
     return edge, False
 
 
-@inlined
+@lent
 def _shortest(xy, m, ring, edge):  # type: ignore[no-untyped-def]
     """The edge at marker m, or the way to the nearest of its known neighbours, if that is shorter: a share of a longer
     edge may reach half-way to another marker."""
-    for n in ring[m]:
+    for k in range(ring.shape[1]):
+        n = ring[m, k]
         if n >= 0:
             apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
             if apart < edge:
@@ -104,7 +105,7 @@ def _sound(xy, near, slide, rings, inner_rings, present, size):  # type: ignore[
     weights, table = rings
     inner_weights, inner = inner_rings
     for m in range(xy.shape[0]):
-        x, y = xy[m]
+        x, y = xy[m, 0], xy[m, 1]
         if np.isnan(x):
             if present[m]:
                 return False
@@ -240,7 +241,7 @@ def _drop_slid(xy, cov, slid, start, edge, agreed, table, inner, marker_mm):  # 
             xy[m], cov[m] = np.nan, np.nan
 
 
-@inlined
+@lent
 def _slides(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
     """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
     spread = cov[m, 0, 0] + cov[m, 1, 1]

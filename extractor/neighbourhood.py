@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled, inlined
+from .engine import compiled, lent
 from .lanes import LANES
 from .lattice import layer_of, marker_id
 from .ring_maps import BENT, LEFT, PIVOT, PLANE, SIDE, SOUND, TERMS, lay_neighbours, room_for_maps, solve_maps
@@ -69,11 +69,11 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     return weights
 
 
-@inlined
+@lent
 def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
     """Whether a known marker lies farther than the limit from where its neighbours put it, or these are not all known,
     or too few."""
-    x, y = xy_px[m]
+    x, y = xy_px[m, 0], xy_px[m, 1]
     for k in range(table.shape[1]):
         if table[m, k] >= 0:
             x -= weights[m, k] * xy_px[table[m, k], 0]
