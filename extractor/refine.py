@@ -72,7 +72,7 @@ class Refiner:
         fit, sides, places = self._begin(view, places, places.xy_px)
         scale = self._scale(view.scale * fit.sigma, usual)
         if scale > view.scale:
-            fit, sides = rescaled(fit, view, sights.at(scale)), widened(sides, view.scale / scale)
+            fit, sides = rescaled(fit, view, sights.at(scale)), magnified(sides, view.scale / scale)
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
             fit, sides, places = self._begin(sights.at(scale), places, xy)
@@ -204,7 +204,7 @@ def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
     )
 
 
-def widened(sides: Across, ratio: float) -> Across:
+def magnified(sides: Across, ratio: float) -> Across:
     """What changes across the gridlines in a view in which these are so many times as long."""
     room = sides.room.copy()
     room[:, 0] *= ratio

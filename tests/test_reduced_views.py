@@ -26,18 +26,18 @@ def test_a_reduced_image_holds_means(scale: int) -> None:
 
 def test_a_coarser_view_starts_where_the_finer_one_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     passed: list[Any] = []
-    rescaled, widened = refine.rescaled, refine.widened
+    rescaled, magnified = refine.rescaled, refine.magnified
 
     def kept(*given: Any) -> Any:
         passed.append((given, rescaled(*given)))
         return passed[-1][1]
 
     def kept_wide(*given: Any) -> Any:
-        passed.append((given, widened(*given)))
+        passed.append((given, magnified(*given)))
         return passed[-1][1]
 
     monkeypatch.setattr(refine, "rescaled", kept)
-    monkeypatch.setattr(refine, "widened", kept_wide)
+    monkeypatch.setattr(refine, "magnified", kept_wide)
     extractor("honeycomb").extract(shown("honeycomb", blur=2.0).image)
     ((fit, finer, view), now), ((sides, _), beside) = passed
     assert view.scale > finer.scale
