@@ -25,7 +25,8 @@ class Steps(NamedTuple):
         near: and by more than this share of the blur,
         few: but for this share of the markers;
         patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
-        many: with the markers that move, those beside them are drawn anew, unless these are more than that.
+        many: with the markers that move, those beside them are drawn anew, unless these are more than that, and those
+            that move no more than half of it.
     """
 
     profiles: tuple[int, int]

@@ -22,8 +22,8 @@ def effort(size_px: float, share: float | None = None) -> float:
 @compiled
 def still_moving(measured, drawn, strides, near, enough, few, many, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them, unless these are more than ``many`` (a share of all); and how many move or are beside these. None
-    where no more than ``few`` move."""
+    those beside them, unless these are more than ``many`` (a share of all), and those that move no more than half of
+    that; and how many move or are beside these. None where no more than ``few`` move."""
     count = drawn.shape[0]
     moving, found = np.zeros(count, np.bool_), 0
     for m in range(count):
@@ -35,7 +35,7 @@ def still_moving(measured, drawn, strides, near, enough, few, many, edges):  # t
     out = moving.copy()
     beside(moving, edges, out)
     touched = np.sum(out)
-    return moving if touched > many * count else out, touched
+    return moving if 2 * found <= many * count < touched else out, touched
 
 
 @compiled

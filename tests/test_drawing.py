@@ -134,7 +134,7 @@ def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatc
     seen = shown("round", surface=composed(Press(4.0, 0.6)))
     whole = error(1.0)
     beside = list(taken)
-    alone = error(0.0)
+    alone = error(0.2)
     assert 0 < taken[0] < 0.5 * beside[0] and len(taken) <= len(beside)
     assert alone < 1.2 * whole
 
@@ -173,9 +173,14 @@ def test_moving_markers_bring_their_neighbours() -> None:
     assert count == 2
     anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, 1.0, edges)
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.4, edges)
-    np.testing.assert_array_equal(anew, [True, False, False, False])  # two of four are many
-    assert count == 2
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.5, edges)
+    np.testing.assert_array_equal(anew, [True, True, False, False])
+    between = np.array([[0, 1], [0, 2], [0, 3]], np.int32)
+    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.5, between)
+    np.testing.assert_array_equal(anew, [True, False, False, False])  # with those beside it, all are
+    assert count == 4
+    anew, _ = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.4, between)
+    assert anew.all()  # too many move by themselves
     anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, 1.0, edges)
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
