@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, lent, lent_call, lent_vectorized
+from .medians import median_of
 
 WITNESSES = 20  # numbered cells through which a map is laid
 REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
@@ -86,7 +87,7 @@ def _robust(count, exact2, room):  # type: ignore[no-untyped-def]
             return np.inf, np.inf
         leverage = right[2, 0] * sums[0] / count
         _misfits(rows, right, count, squares)
-        usual = 2.0 * _median(squares, count) + exact2
+        usual = 2.0 * median_of(squares, count) + exact2
         variance = _weighed(rows, squares, usual, count, weight)
     return variance, leverage
 
@@ -145,22 +146,6 @@ def _misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
             u += rows[k, a] * right[0, a]
             v += rows[k, a] * right[1, a]
         out[k] = u * u + v * v
-
-
-@lent
-def _median(values, count):  # type: ignore[no-untyped-def]
-    """The median of the first values, none below 0, by how many are smaller than each: that takes no branches. The
-    others of ``WITNESSES`` become infinite."""
-    for k in range(count, WITNESSES):
-        values[k] = np.inf
-    low, high = 0.0, 0.0
-    for i in range(count):
-        own, smaller = values[i], 0
-        for j in range(WITNESSES):
-            smaller += values[j] < own
-        low = max(low, own) if smaller <= (count - 1) // 2 else low
-        high = max(high, own) if smaller <= count // 2 else high
-    return 0.5 * (low + high)
 
 
 @lent_vectorized

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import third_difference
-from .engine import compiled, inlined
+from .engine import compiled
 from .fit import Fit
 from .gridlines import FIRST_RING, continued
+from .medians import median_of
 from .placing import MAX_APART, Places
 from .sight import Sight
 from .topology import Topology
@@ -217,7 +218,7 @@ def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  #
         for axis in range(2):
             for k in range(known):
                 column[k] = said[k, axis]
-            move[m, axis] = _median(column, known)
+            move[m, axis] = median_of(column, known)
         square = move[m, 0] ** 2 + move[m, 1] ** 2
         far[m] = np.sqrt(square)
         like = 0
@@ -235,17 +236,4 @@ def _usual(far, near):  # type: ignore[no-untyped-def]
         if n >= 0 and np.isfinite(far[n]):
             kept[count] = far[n]
             count += 1
-    return _median(kept, count) if count > 0 else np.inf
-
-
-@inlined
-def _median(column, count):  # type: ignore[no-untyped-def]
-    """The median of the first few numbers, by how many are smaller than each: that takes no branches."""
-    low, high = -np.inf, -np.inf
-    for i in range(count):
-        own, smaller = column[i], 0
-        for j in range(count):
-            smaller += column[j] < own
-        low = max(low, own) if smaller <= (count - 1) // 2 else low
-        high = max(high, own) if smaller <= count // 2 else high
-    return 0.5 * (low + high)
+    return median_of(kept, count) if count > 0 else np.inf

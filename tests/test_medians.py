@@ -1,0 +1,17 @@
+"""The median by ranks is the median."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from extractor.medians import median_of
+
+
+@settings(deadline=None)  # the first call may compile
+@given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=24), st.integers(0, 3))
+def test_it_is_numpys(values: list[float], beyond: int) -> None:
+    """Equal numbers among them, and whatever stands behind them."""
+    own = np.array([*values, values[0], *[np.nan] * beyond])
+    assert median_of(own, len(values) + 1) == np.median(own[: len(values) + 1])
