@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from extractor.lanes import LANES
 from extractor.lattice import axial
-from extractor.mapped import WITNESSES, _median
 from extractor.neighbourhood import MIN_LINEAR, MIN_QUADRATIC, neighbour_table, predicted
 
 LAYERS = 5
@@ -66,12 +65,3 @@ def test_a_prediction_is_least_squares(
         assert place[m] == pytest.approx(terms[0], abs=1e-6)
         assert variance[m] == pytest.approx(left, abs=1e-6)
         assert leverage[m] == pytest.approx(np.linalg.inv(rows.T @ rows)[0, 0], rel=1e-6)
-
-
-@pytest.mark.parametrize("count", range(1, WITNESSES + 1))
-def test_a_median_counts_what_is_smaller(count: int) -> None:
-    rng = np.random.default_rng(count)
-    for values in (rng.random(count), rng.integers(0, 3, count).astype(np.float64)):
-        room = np.full(WITNESSES, np.nan)
-        room[:count] = values
-        assert _median(room, count) == np.median(values)
