@@ -3,7 +3,8 @@
     python -m benchmarks.stress [--quick] [--table] [--json FILE] [--plot FILE]
     python -m benchmarks.stress --only "blur=3/round" --save DIR     some cases: their images and overlays
 
-Times are of the processor, one core, the best of some runs; their ratio is to the plain frame's, read right before.
+Times are of the processor, one core, the best of some runs. Each run follows one of the plain frame: the ratio to it
+is the median of these.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from benchmarks.stress_suite.kinds import Case
 from benchmarks.stress_suite.reading import Result, notable_lines, overlay, read, warm_up
 from benchmarks.stress_suite.report import failures, one_line, plot, rows_of, summary, table, write_json
 
+RUNS, FEW_RUNS = 5, 2  # of an image, and of one of many alike
+
 
 def _job(job: tuple[Case, int]) -> Result:
     return read(*job)[0]
@@ -30,8 +33,11 @@ def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
     """Results as they come, the large images first."""
     last = [case for case in chosen if BY_NAME[case.kind].group != "view"]
     first = [case for case in chosen if BY_NAME[case.kind].group == "view"]
-    # Conditions of many images need no repeated timing.
-    jobs = [(case, 1 if BY_NAME[case.kind].group == "nothing" else runs) for case in [*first[::-1], *last]]
+    # Conditions of many images need fewer runs of each.
+    jobs = [
+        (case, min(runs, FEW_RUNS) if BY_NAME[case.kind].group == "nothing" else runs)
+        for case in [*first[::-1], *last]
+    ]
     with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
         yield from pool.imap_unordered(_job, jobs)
 
@@ -90,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error(f"no case is named {asked.only!r}; the kinds are {', '.join(BY_NAME)}")
         results = one_by_one(chosen, asked.save)
     else:
-        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else 2)
+        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else RUNS)
     rows = rows_of(results, KINDS)
     if asked.table or not asked.quick:
         print(table(rows))

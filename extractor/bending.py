@@ -78,9 +78,9 @@ def _sort_lanes(column):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near):  # type: ignore[no-untyped-def]
-    """(M,) px^2: how rough the markers are around each, from the squared third differences along the gridlines at it
-    and at its neighbours, less what their noise and the layout itself explain.
+def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # type: ignore[no-untyped-def]
+    """(M,) px^2: how rough the markers are around each of ``which`` (M,) bool, from the squared third differences along
+    the gridlines at it and at its neighbours, less what their noise and the layout itself explain; 0 elsewhere.
 
     Their median: one marker that dirt has moved does not make its gridlines free to follow it.
     """
@@ -105,7 +105,7 @@ def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near):  # type: i
             if n >= 0:
                 count += known[n]
                 over += above[n]
-        if 2.0 * over > count:
+        if which[m] and 2.0 * over > count:
             _lay_around(m, own, near, column[filled:])
             marker[filled], odd[filled] = m, count % 2.0 == 1.0
             filled += 1

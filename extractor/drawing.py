@@ -1,8 +1,8 @@
 """A step by synthesis: the pattern is drawn, and read against the image; again only around markers that still move.
 
 One step is nearly all that can be had. Where a marker stepped far, its gridlines were not where they were read, and
-what they said holds no longer: these cells are taken out of the drawing, drawn anew, and their gridlines are read once
-more. All other votes stay valid, for where they were read.
+what they said holds no longer: a step is taken around it, between all others, whose votes stay valid for where they
+were read.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
+from .around import stepped_around
 from .bending import hidden_misfit
 from .bleeding import rebled
-from .drawn import Board, Drawing, drawn, drawn_again, room_for
+from .drawn import Board, Drawing, drawn, room_for
 from .engine import compiled
 from .fit import Fit
 from .levels import level_change
@@ -22,7 +23,7 @@ from .offsets import Reading, foot_of
 from .presets import Steps
 from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_deviation
 from .sight import Frame, Sight
-from .step import Judged, listened, moved_on, placed, roughened, solution
+from .step import JUDGED_BY_PIXELS, listened, moved_on, placed, roughened, solution
 from .stepping import middles, trust, usual_edge, votes, widening
 from .swelling import swelling_of, unswollen
 from .synthesis import edge_contrasts
@@ -46,11 +47,16 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move
+WIDE_PATIENCE = (
+    2  # more steps there at least, after which no fewer markers move; or after one around some markers,
+)
+FEWER = 0.7  # no fewer than so many times as before
+NEARLY = (
+    0.5  # of the blur: a marker that guides nothing is not drawn anew in damage where it would move by less
+)
 MAX_STEPS = 10
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
-JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
 NO_ROOM = np.empty((0, 4))
 
 
@@ -88,30 +94,35 @@ class Draughtsman:
         begun = spent > 0.0
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
-        size, least, tries = drawing.edge_px, len(fit.xy), 0
+        size, least, tries, whole = drawing.edge_px, len(fit.xy), 0, True
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = steps.many if drawing.sigma < SMALL_BLUR * edge_px else 1.0
         spent += effort(size)
         for step in range(MAX_STEPS - 1):
-            fit = _farther(fit, drawing) if wide else fit
+            there = _farther(fit, drawing) if wide else fit
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
-            about = fit.measured, drawing.xy, fit.strides
-            anew, moving = still_moving(*about, near, steps.enough, steps.few, many, self._mesh.edges)
+            about = there.measured, fit.guiding, drawing.xy, fit.strides, near, steps.enough, steps.few
+            anew, moving = still_moving(*about, many, steps.most, self._mesh.edges)
             other = _looks_other(fit, drawing, steps.enough)
-            everything = other or np.count_nonzero(anew) > MAX_AGAIN * len(anew)
-            spent += effort(size, None if everything else moving / len(anew))
+            count = np.count_nonzero(anew)
+            everything = bool(other or count > MAX_AGAIN * len(anew))
+            spent += effort(size, None if everything else count / len(anew))
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
-            tries = tries + 1 if moving >= least and not other else 0
+            stuck = moving >= (least if whole else FEWER * least)
+            tries = tries + 1 if stuck and not other else 0
             if not (everything or moving) or tries == patience or ((begun or step > 0) and spent > allowed):
                 break
-            least = min(least, len(fit.xy) if other else moving)
-            fit = self._free(placed(self._mesh, fit, None if everything else anew), wide)
-            fit, drawing = self._first(view, fit) if everything else self._again(view, fit, drawing, anew)
+            least, whole = min(least, len(fit.xy) if other else moving), everything
+            if everything:
+                fit, drawing = self._first(view, self._free(placed(self._mesh, there), wide))
+            else:
+                fit = fit._replace(guiding=there.guiding)
+                fit, drawing = self._again(view, fit, drawing, anew, wide, count < moving)
         else:
-            fit = _farther(fit, drawing) if wide else fit
+            there = _farther(fit, drawing) if wide else fit
         slow = SLOW * (drawing.sigma / size) ** 2 if wide else 0.0
-        return fit._replace(unsettled=unsettled(fit.measured - drawing.xy, drawing.sigma, slow))
+        return there._replace(unsettled=unsettled(there.measured - drawing.xy, drawing.sigma, slow))
 
     def _wide(self, fit: Fit, edge_px: float) -> bool:
         """Whether a usual edge is blurred into the next; ``edge_px`` is a short one."""
@@ -131,10 +142,14 @@ class Draughtsman:
         drawing = drawn(view, self._mesh, fit, self.board(view.image.shape))
         return self._stepped(view.frame, fit, drawing), drawing
 
-    def _again(self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_]) -> tuple[Fit, Drawing]:
-        """A step from what was read, once more where gridlines end at markers that are ``anew`` (M,) bool."""
-        drawing = drawn_again(view, self._mesh, fit, drawing, anew, self.board(view.image.shape))
-        return self._stepped(view.frame, fit._replace(xy=drawing.xy, bend=drawing.bend), drawing), drawing
+    def _again(
+        self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_], wide: bool, some: bool
+    ) -> tuple[Fit, Drawing]:
+        """A step around the markers that are ``anew`` (M,) bool, from what else was read; these are ``some`` of those
+        that move and are beside them."""
+        nearly_px = NEARLY * drawing.sigma if some else 0.0
+        board = self.board(view.image.shape)
+        return stepped_around(view, self._mesh, fit, drawing, anew, board, wide, nearly_px)
 
     def _stepped(self, frame: Frame, fit: Fit, drawing: Drawing) -> Fit:
         """The fit after the step that what was read asks for."""
@@ -146,20 +161,20 @@ class Draughtsman:
         tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
         inks = bettered.cell, bettered.slope
         read, wider, noise, *step = _step(seen, changes, inks, now, tables, tuple(frame))
-        use, loose, foot, swelling, aside = read
+        use, misfit, loose, foot, swelling, aside = read
         how = NO_ROOM, use, aside, drawing.sigma, noise, True
         reading = Reading(drawing.lines, drawing.contrasts, foot, *how)
         sigma = _widened(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNMIXED * drawing.edge_px:
             bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, sigma)
         about = {"loose": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
-        return moved_on(fit, step, swelling=swelling, **about)
+        return moved_on(fit, step, misfit=misfit, swelling=swelling, **about)
 
 
 @compiled
 def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-def]
-    """Use, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside for it; by how
-    much it says that the blur is larger; its noise; and the solution.
+    """Use, misfit, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside for it;
+    by how much it says that the blur is larger; its noise; and the solution.
 
     Args:
         seen: lines, contrasts, black, sums and blur of a drawing.
@@ -177,13 +192,15 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     aside = unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling)
     said = bend, rough, before, lines, edges, noise
     loose, kept = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
-    use, found = trust(sums, to_a, to_b, hidden_misfit(loose, contrasts, sigma), values, least, unjudged)
+    use, misfit, found = trust(
+        sums, to_a, to_b, hidden_misfit(loose, contrasts, sigma), values, least, unjudged
+    )
     noise = found if np.isfinite(found) else noise
     where = xy, beyond, edges, spokes, sigma, noise, True
     step = solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
     current = edge_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
     wider = widening(sums, aside, use, contrasts, current, sigma)
-    return ((use, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
+    return ((use, misfit, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
 
 
 def _widened(sigma: float, edge_px: float, wider: float) -> float:
@@ -196,7 +213,8 @@ def _farther(fit: Fit, drawing: Drawing) -> Fit:
     """The fit after a step that goes as far as it would have gone, did gridlines not overlap."""
     hidden = min(OVERLAP * (drawing.sigma / drawing.edge_px) ** 2, MOST_OVERLAP)
     more = hidden / (1.0 - hidden) * (fit.measured - drawing.xy)
-    return fit._replace(measured=fit.measured + more, guiding=fit.guiding + more)
+    measured = fit.measured + more
+    return fit._replace(measured=measured, guiding=np.where(np.isnan(fit.guiding), np.nan, measured))
 
 
 def _settles_slowly(fit: Fit, edge_px: float) -> bool:

@@ -76,40 +76,31 @@ def drawn(view: Sight, mesh: Topology, fit: Fit, board: Board) -> Drawing:
     image, sigma = view.image, fit.sigma
     box = box_of(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
     inside = mesh.black, mesh.cell_color, fit.noise
-    how = _how(view, fit.levels, sigma, box)
-    read, edge_px, bettered = _drawn(image, tuple(board), _about(mesh, fit), how, inside)
+    pattern = fit.xy, fit.maps, fit.bend, fit.rough
+    look = look_of(view, fit.levels, sigma, box)
+    read, edge_px, bettered = _drawn(image, tuple(board), pattern, sides_of(mesh), look, inside)
     lines, contrasts, black, sums = read
     where = fit.xy, lines, fit.bend
     return Drawing(*where, contrasts, black, sums, fit.levels, Levels(*bettered), box, sigma, edge_px)
 
 
-def drawn_again(
-    view: Sight, mesh: Topology, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_], board: Board
-) -> Drawing:
-    """The drawing with the markers that are ``anew`` (M,) bool, and all gridlines and cells that they belong to, as the
-    fit says; with the levels and the blur that it has."""
-    how = _how(view, drawing.levels, drawing.sigma, drawing.box)
-    before = tuple(drawing[:6])
-    xy, lines, bend, *read = _drawn_again(view.image, tuple(board), _about(mesh, fit), how, anew, before)
-    contrasts, black, sums = read
-    return drawing._replace(xy=xy, lines=lines, bend=bend, contrasts=contrasts, black=black, sums=sums)
+def sides_of(mesh: Topology) -> tuple[NDArray[Any], ...]:
+    """Which cells, gridlines and markers belong together, as compiled functions take it."""
+    return mesh.cells, mesh.cell_edges, mesh.edges, mesh.edge_cells, mesh.along
 
 
-def _about(mesh: Topology, fit: Fit) -> tuple[Any, ...]:
-    now = fit.xy, fit.maps, fit.bend, fit.rough
-    return now, (mesh.cells, mesh.cell_edges, mesh.edges, mesh.edge_cells, mesh.along)
-
-
-def _how(view: Sight, levels: Levels, sigma: float, box: NDArray[np.int64]) -> tuple[Any, ...]:
+def look_of(view: Sight, levels: Levels, sigma: float, box: NDArray[np.int64]) -> tuple[Any, ...]:
+    """How the pattern looks, likewise: levels, black, the frame of these, blur and box."""
     return (levels.cell, levels.slope), levels.black, tuple(view.frame), sigma, box
 
 
 @compiled
-def _drawn(image, board, about, how, inside):  # type: ignore[no-untyped-def]
+def _drawn(image, board, pattern, sides, look, inside):  # type: ignore[no-untyped-def]
     """Lines, contrasts, black and sums of a ``Drawing``; a usual edge's length; and the bettered levels."""
     picture, strokes, residual = board
-    (xy, maps, bend, rough), (cells, cell_edges, edges, edge_cells, along) = about
-    (cell, slope), black, frame, sigma, box = how
+    xy, maps, bend, rough = pattern
+    cells, cell_edges, edges, edge_cells, along = sides
+    (cell, slope), black, frame, sigma, box = look
     lines = gridlines(xy, maps, bend, edges, along)
     contrasts = edge_contrasts(lines, xy, cells, edge_cells, cell, slope)
     clear(picture, box)
@@ -132,11 +123,13 @@ def _bettered(image, picture, xy, cells, cell, frame, black_cells, color, noise)
 
 
 @compiled
-def _drawn_again(image, board, about, how, anew, before):  # type: ignore[no-untyped-def]
-    """The first six of a ``Drawing``."""
+def redrawn(image, board, pattern, sides, look, anew, before):  # type: ignore[no-untyped-def]
+    """The first six of a ``Drawing``, as they were ``before`` but for the markers that are ``anew`` (M,) bool, and all
+    gridlines and cells that they belong to; these as the ``pattern`` says."""
     picture, strokes, residual = board
-    (xy, maps, bend, rough), (cells, cell_edges, edges, edge_cells, along) = about
-    (cell, slope), black, frame, sigma, box = how
+    xy, maps, bend, rough = pattern
+    cells, cell_edges, edges, edge_cells, along = sides
+    (cell, slope), black, frame, sigma, box = look
     old_xy, old_lines, old_bend, old_contrasts, old_black, old_sums = before
     some, which = np.flatnonzero(touching(anew, edges)), touching(anew, cells)
     xy, bend, ends = chosen(anew, xy, old_xy), bend[some], edges[some]

@@ -78,7 +78,8 @@ def gradient(to_a, to_b, weight, variance, lines, edges, count):  # type: ignore
 
 
 @compiled
-def _multiply(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-def]
+def multiply(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-def]
+    """Write the matrix's product with a vector (M, 2)."""
     for m in range(diagonal.shape[0]):
         x, y = vector[m, 0], vector[m, 1]
         out[m, 0] = diagonal[m, 0] * x + diagonal[m, 1] * y
@@ -124,7 +125,7 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
         for m in range(count):
             search[m, 0] = descent[m, 0] + blend * search[m, 0]
             search[m, 1] = descent[m, 1] + blend * search[m, 1]
-        _multiply(diagonal, beside, edges, search, product)
+        multiply(diagonal, beside, edges, search, product)
         curvature = 0.0
         for m in range(count):
             curvature += search[m, 0] * product[m, 0] + search[m, 1] * product[m, 1]

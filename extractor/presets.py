@@ -25,8 +25,8 @@ class Steps(NamedTuple):
         near: and by more than this share of the blur,
         few: but for this share of the markers;
         patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
-        many: with the markers that move, those beside them are drawn anew, unless these are more than that, and those
-            that move no more than half of it.
+        many: with the markers that move, those beside them are drawn anew, unless these are more than that, but fewer
+        most: move; then only so many that move the farthest.
     """
 
     profiles: tuple[int, int]
@@ -39,10 +39,11 @@ class Steps(NamedTuple):
     few: float
     patience: int
     many: float
+    most: float
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.6),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0),
+    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.3, 0.08),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0),
 }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .bending import bending_ones
 from .engine import compiled
+from .excerpt import alone, gridlines_at, rows_of
 from .fit import Across, Fit
 from .gridlines import KNOWN, gridlines
 from .information import assemble, gradient, solve
@@ -59,18 +60,18 @@ def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: igno
     which, count = _gridlines_around(lost, edges)
     lines, sums, to_a, to_b, use, loose = _read(image, pattern, across, tables, which)
     which, use, loose = which[:count], use[:count], loose[:count]
-    markers, ends, turned = _alone(which, edges, spokes)
+    markers, ends, turned = alone(which, edges, spokes)
     asked = lost[markers] & trusted_markers(use, turned)
     if not np.any(asked):
         return
     believed, variance = use * lines[:count, KNOWN], noise**2
     prior = np.where(beyond[markers], PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
     diagonal, joined = np.empty((len(markers), 3)), np.empty((count, 4))
-    geometry = lines[:count], _rows(across[0], which), ends, turned, sigma, variance, prior
+    geometry = lines[:count], rows_of(across[0], which), ends, turned, sigma, variance, prior
     assemble(sums[:count], believed, False, *geometry, diagonal, joined)
     right = gradient(to_a[:count], to_b[:count], believed, variance, lines[:count], ends, len(markers))
-    measured = _rows(at, markers) + solve(diagonal, joined, ends, right)
-    near = _rows(start[0], markers), start[1][markers], start[2][markers]
+    measured = rows_of(at, markers) + solve(diagonal, joined, ends, right)
+    near = rows_of(start[0], markers), start[1][markers], start[2][markers]
     own, wide = sure_ones(measured, diagonal, joined, loose, ends, turned, *near, asked)
     doubt(own, wide, asked, *near)
     for k in np.flatnonzero(asked):
@@ -82,16 +83,9 @@ def _gridlines_around(lost, edges):  # type: ignore[no-untyped-def]
     """The gridlines at the lost markers and at those beside them, then some of the others; and how many come first."""
     near = lost.copy()
     beside(lost, edges, near)
-    own, others, count, more = np.empty(len(edges), np.int64), np.empty(len(edges), np.int64), 0, 0
-    for e in range(len(edges)):
-        if near[edges[e, 0]] or near[edges[e, 1]]:
-            own[count] = e
-            count += 1
-        elif e % ELSEWHERE == 0:
-            others[more] = e
-            more += 1
-    own[count : count + more] = others[:more]
-    return own[: count + more], count
+    own, others = gridlines_at(near, edges), np.arange(0, len(edges), ELSEWHERE)
+    elsewhere = ~(near[edges[others, 0]] | near[edges[others, 1]])
+    return np.concatenate((own, others[elsewhere])), len(own)
 
 
 @compiled
@@ -101,45 +95,13 @@ def _read(image, pattern, across, tables, which):  # type: ignore[no-untyped-def
     at, _, maps, rough, bend, before, (sigma, noise, swelling) = pattern
     edges, _, along, edge_cells = tables
     values, least, unjudged = JUDGED_BY_SAMPLES
-    ends, bend, room = _rows(edges, which), _rows(bend, which), _rows(across[2], which)
-    lines = gridlines(at, maps, bend, ends, _rows(along, which))
-    weights, bending = _rows(across[1], which), bending_ones(rough, bend, ends)
+    ends, bend, room = rows_of(edges, which), rows_of(bend, which), rows_of(across[2], which)
+    lines = gridlines(at, maps, bend, ends, rows_of(along, which))
+    weights, bending = rows_of(across[1], which), bending_ones(rough, bend, ends)
     sums = read_profiles(image, lines, weights, room, sigma, bending, STATIONS)
     to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which))
-    unswollen(sums, to_a, to_b, _rows(across[0], which), _rows(edge_cells, which), swelling)
+    unswollen(sums, to_a, to_b, rows_of(across[0], which), rows_of(edge_cells, which), swelling)
     said = bend, rough, before[which], lines, ends, noise
     loose, _ = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
-    use, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
+    use, _, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
     return lines, sums, to_a, to_b, use, loose
-
-
-@compiled
-def _alone(which, edges, spokes):  # type: ignore[no-untyped-def]
-    """The markers at the ends of the gridlines ``which`` (n,), as if there were no others: their numbers (m,), these
-    gridlines' ends among them, and the gridlines around each among these, -1 for those that are not."""
-    number, place = np.full(len(spokes), -1, np.int32), np.full(len(edges), -1, np.int32)
-    markers, ends, count = np.empty(len(spokes), np.int64), np.empty((len(which), 2), np.int32), 0
-    for k in range(len(which)):
-        place[which[k]] = k
-        for side in range(2):
-            m = edges[which[k], side]
-            if number[m] < 0:
-                number[m], markers[count] = count, m
-                count += 1
-            ends[k, side] = number[m]
-    around = np.full((count, spokes.shape[1]), -1, np.int32)
-    for k in range(count):
-        for i in range(spokes.shape[1]):
-            e = spokes[markers[k], i]
-            around[k, i] = place[e] if e >= 0 else -1
-    return markers[:count], ends, around
-
-
-@compiled
-def _rows(table, which):  # type: ignore[no-untyped-def]
-    """Some rows of a table of two dimensions."""
-    out = np.empty((len(which), table.shape[1]), table.dtype)
-    for i in range(len(which)):
-        for k in range(table.shape[1]):
-            out[i, k] = table[which[i], k]
-    return out

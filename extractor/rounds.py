@@ -67,7 +67,7 @@ def _profiled(image, lines, across, now, tables, most, judged):  # type: ignore[
     aside = unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling)
     bending = bend, rough, before, lines, edges, noise
     loose, kept = listened(sums, to_a, to_b, off, *bending, values, least, unjudged)
-    trusted, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
+    trusted, _, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
     use = trusted if judged else _lenient(trusted, sums, edges, spokes)
     where = xy, beyond, edges, spokes, sigma, noise, False
     read = trusted, use, loose, swelling, aside

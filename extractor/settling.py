@@ -16,26 +16,31 @@ OF_MEDIAN = 1.44  # a mean of squares against their median
 def effort(size_px: float, share: float | None = None) -> float:
     """What a step costs, 1 for everything with edges of ``USUAL_EDGE_PX``: from everything, or around a share of it."""
     pixels = min((size_px / USUAL_EDGE_PX) ** 2, 4.0)
-    return 0.45 + 0.55 * pixels if share is None else 0.35 + 0.6 * share * pixels
+    return 0.45 + 0.55 * pixels if share is None else 0.25 + 0.6 * share * pixels
 
 
 @compiled
-def still_moving(measured, drawn, strides, near, enough, few, many, edges):  # type: ignore[no-untyped-def]
+def still_moving(measured, guiding, drawn, strides, near, enough, few, many, most, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them, unless these are more than ``many`` (a share of all), and those that move no more than half of
-    that; and how many move or are beside these. None where no more than ``few`` move."""
+    those beside them; where these are more than ``many`` (a share of all), but fewer move, only those that move the
+    farthest, at most the share ``most``, and those of them all that guide nothing: these lie where others put them. And
+    how many move or are beside them. None where no more than ``few`` move."""
     count = drawn.shape[0]
-    moving, found = np.zeros(count, np.bool_), 0
+    far, found = np.zeros(count), 0
     for m in range(count):
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
-        moving[m] = dx * dx + dy * dy > near * near and strides[m] > enough
-        found += moving[m]
+        if dx * dx + dy * dy > near * near and strides[m] > enough:
+            far[m] = dx * dx + dy * dy
+            found += 1
     if found <= few * count:
         return np.zeros(count, np.bool_), 0
-    out = moving.copy()
-    beside(moving, edges, out)
+    out = far > 0.0
+    beside(far > 0.0, edges, out)
     touched = np.sum(out)
-    return moving if 2 * found <= many * count < touched else out, touched
+    if found <= many * count < touched:
+        rest = max(count - int(most * count), 1)
+        out &= (far > np.partition(far, rest - 1)[rest - 1]) | np.isnan(guiding[:, 0])
+    return out, touched
 
 
 @compiled

@@ -32,6 +32,9 @@ class Judged(NamedTuple):
     unjudged: float
 
 
+JUDGED_BY_PIXELS = Judged(3, 8, 0.0)
+
+
 def completed(
     mesh: Topology, xy: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
@@ -48,8 +51,8 @@ def _completed(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _completed_around(xy, which, maps, near, offset, stencil):  # type: ignore[no-untyped-def]
-    """The same with new maps at the markers ``which`` (M,) bool, and beside them."""
+def completed_around(xy, which, maps, near, offset, stencil):  # type: ignore[no-untyped-def]
+    """What ``completed`` gives, with new maps at the markers ``which`` (M,) bool, and beside them."""
     asked = which.copy()
     for m in np.flatnonzero(which):
         for k in range(FIRST_RING):
@@ -71,13 +74,13 @@ def placed(mesh: Topology, fit: Fit, which: NDArray[np.bool_] | None = None) -> 
         xy, beyond, maps = completed(mesh, fit.guiding)
     else:
         about = fit.maps, mesh.near, mesh.offset, mesh.stencil
-        xy, beyond, maps = _completed_around(fit.guiding, which, *about)
+        xy, beyond, maps = completed_around(fit.guiding, which, *about)
     return fit._replace(xy=xy, beyond=beyond, maps=maps)
 
 
 def roughened(mesh: Topology, fit: Fit) -> Fit:
     """The fit with how rough its markers are."""
-    about = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near
+    about = mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.near, np.ones(len(mesh.spokes), np.bool_)
     return fit._replace(rough=roughness(fit.guiding, fit.maps, fit.information.diagonal, *about))
 
 
@@ -93,7 +96,7 @@ def listened(sums, to_a, to_b, off, bend, rough, use, lines, edges, noise, value
     loose, variance = np.zeros(len(sums)), 1.0
     if np.any(rough) or np.any(bend):
         # what the drawing misses everywhere is no bending either
-        usual = trust(sums, to_a, to_b, np.zeros(len(sums)), values, least, unjudged)[1]
+        usual = trust(sums, to_a, to_b, np.zeros(len(sums)), values, least, unjudged)[2]
         variance = max(noise, usual) ** 2 if np.isfinite(usual) else noise**2
         loose = freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance)
     return loose, eliminate(sums, to_a, to_b, off, bend, loose, variance)

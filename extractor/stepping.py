@@ -74,35 +74,62 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
 
 
 @compiled
-def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved, and the noise (NaN where
-    nothing was read).
-
-    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
-    misfit of less than its ``pardon`` (E,) is always forgiven.
-    """
-    count = sums.shape[0]
-    misfit, use = np.full(count, np.nan), np.zeros(count)
-    for e in range(count):
+def misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
+    """(E,) the mean squared residual of gridlines once they are moved, a place; NaN where there are no more than
+    ``least`` places, each of which adds so many ``values``."""
+    out = np.full(sums.shape[0], np.nan)
+    for e in range(sums.shape[0]):
         if sums[e, PIXELS] <= least:
-            use[e] = unjudged if sums[e, AA] > 0.0 else 0.0
             continue
         aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
         determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
         explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
-        misfit[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
-    judged = misfit[np.isfinite(misfit)]
-    if judged.shape[0] == 0:
-        return use, np.nan
-    usual = max(np.median(judged), MIN_NOISE**2)
-    for e in range(count):
+        out[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
+    return out
+
+
+@compiled
+def weighed(sums, misfit, usual, pardon, values, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines whose ``misfit`` (E,) is not more than the ``usual`` one may be by chance, or their
+    ``pardon`` (E,); ``unjudged`` for what was read but has none."""
+    use = np.zeros(sums.shape[0])
+    for e in range(sums.shape[0]):
         if np.isfinite(misfit[e]):
             limit = max(usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2))), pardon[e])
             use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+        else:
+            use[e] = unjudged if sums[e, AA] > 0.0 else 0.0
+    return use
+
+
+@compiled
+def usual_misfit(misfit):  # type: ignore[no-untyped-def]
+    """The median of those that were judged; NaN where none was."""
+    judged = misfit[np.isfinite(misfit)]
+    return max(np.median(judged), MIN_NOISE**2) if judged.shape[0] > 0 else np.nan
+
+
+@compiled
+def noise_of(misfit, use):  # type: ignore[no-untyped-def]
+    """The noise by the gridlines' misfit (E,), of which they are in ``use`` (E,) that look as the pattern does; NaN
+    where none was judged."""
     sound = misfit[use == 1.0]
-    if 0 < sound.shape[0] < MOSTLY_SOUND * judged.shape[0]:  # what is dirty is no noise
-        usual = max(np.median(sound), MIN_NOISE**2)
-    return use, np.sqrt(usual)
+    if 0 < sound.shape[0] < MOSTLY_SOUND * np.count_nonzero(np.isfinite(misfit)):  # what is dirty is no noise
+        return np.sqrt(max(np.median(sound), MIN_NOISE**2))
+    return np.sqrt(usual_misfit(misfit))
+
+
+@compiled
+def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; (E,) their misfit; and the noise
+    (NaN where nothing was read).
+
+    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
+    misfit of less than its ``pardon`` (E,) is always forgiven.
+    """
+    misfit = misfits(sums, to_a, to_b, values, least)
+    use = weighed(sums, misfit, usual_misfit(misfit), pardon, values, unjudged)
+    return use, misfit, noise_of(misfit, use)
 
 
 @compiled

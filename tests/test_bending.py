@@ -39,12 +39,16 @@ def mesh(pattern: str = "honeycomb") -> Topology:
     return topology_of(parse_layout(layout_to_json(layout(pattern))))
 
 
-def rough_at(xy: Array, pattern: str = "honeycomb", information: float = 1e4) -> Array:
+def rough_at(
+    xy: Array, pattern: str = "honeycomb", information: float = 1e4, which: Array | None = None
+) -> Array:
     """How rough markers at ``xy`` are, each known to a hundredth of a pixel."""
     own = mesh(pattern)
     maps = local_maps(xy, own.near, own.offset, own.stencil)
     diagonal = np.tile([information, 0.0, information], (len(xy), 1))
-    return np.asarray(roughness(xy, maps, diagonal, own.edges, own.ahead, own.third, own.spokes, own.near))
+    which = np.ones(len(xy), np.bool_) if which is None else which
+    about = own.edges, own.ahead, own.third, own.spokes, own.near
+    return np.asarray(roughness(xy, maps, diagonal, *about, which))
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
@@ -62,6 +66,8 @@ def test_a_kink_is_rough_and_one_moved_marker_is_not() -> None:
     kinked[:, 1] += 0.2 * np.maximum(xy[:, 0] - 3, 0)
     near, far = np.abs(xy[:, 0] - 3) < 12, np.abs(xy[:, 0] - 3) > 60
     assert (rough_at(kinked)[near] > 1).all() and rough_at(kinked)[far].max() == 0.0
+    some = np.random.default_rng(1).random(len(xy)) < 0.4
+    np.testing.assert_array_equal(rough_at(kinked, which=some), np.where(some, rough_at(kinked), 0.0))
     dirty = xy.copy()
     dirty[0] += [4.0, -2.0]
     assert rough_at(dirty).max() == 0.0

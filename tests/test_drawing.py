@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -24,7 +24,7 @@ from extractor.information import covariances
 from extractor.levels import Levels
 from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
 from extractor.presets import STEPS
-from extractor.settling import beside, still_moving, touching, unsettled
+from extractor.settling import beside, still_moving, unsettled
 from extractor.step import placed
 from extractor.topology import topology_of
 
@@ -55,8 +55,10 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
     """Cells taken out and drawn elsewhere leave no trace, and gridlines that did not move keep what was read."""
     plain, parts = Draughtsman._again, []
 
-    def checked(self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_]) -> Any:
-        fit, drawing = plain(self, view, fit, before, anew)
+    def checked(
+        self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_], *how: bool
+    ) -> Any:
+        fit, drawing = plain(self, view, fit, before, anew, *how)
         mesh, levels = self._mesh, drawing.levels
         fresh = np.zeros(view.image.shape, np.float32)
         every, sides = np.ones(len(mesh.cells), np.bool_), (mesh.cells, mesh.cell_edges, mesh.edges)
@@ -65,7 +67,7 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
         x0, y0, x1, y1 = drawing.box
         picture = self.board(view.image.shape).picture[y0:y1, x0:x1]
         np.testing.assert_allclose(picture, fresh[y0:y1, x0:x1], atol=2e-3)  # grey levels
-        kept = ~touching(anew, mesh.edges)
+        kept = ~anew[mesh.edges].any(axis=1)
         np.testing.assert_array_equal(drawing.sums[kept], before.sums[kept])
         np.testing.assert_array_equal(drawing.lines[kept], before.lines[kept])
         np.testing.assert_array_equal(drawing.xy[~anew], before.xy[~anew])
@@ -120,21 +122,23 @@ def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatc
     taken: list[int] = []
     plain = Draughtsman._again
 
-    def counted(self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_]) -> Any:
+    def counted(
+        self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_], *how: bool
+    ) -> Any:
         taken.append(int(anew.sum()))
-        return plain(self, view, fit, before, anew)
+        return plain(self, view, fit, before, anew, *how)
 
-    def error(many: float) -> float:
+    def error(many: float, most: float) -> float:
         taken.clear()
-        monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(many=many))
+        monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(many=many, most=most))
         found = Extractor(extractor("round").layout).extract(seen.image)
         return float(np.sqrt(np.nanmean((found.xy_px - seen.truth.marker_xy_px) ** 2)))
 
     monkeypatch.setattr(Draughtsman, "_again", counted)
     seen = shown("round", surface=composed(Press(4.0, 0.6)))
-    whole = error(1.0)
+    whole = error(1.0, 1.0)
     beside = list(taken)
-    alone = error(0.2)
+    alone = error(0.2, 0.1)
     assert 0 < taken[0] < 0.5 * beside[0] and len(taken) <= len(beside)
     assert alone < 1.2 * whole
 
@@ -168,25 +172,51 @@ def test_moving_markers_bring_their_neighbours() -> None:
     drawn = np.zeros((4, 2))
     measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 1.0, edges)
+    moving = measured, measured, drawn, strides
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, edges)
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.25, 1.0, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, edges)
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.5, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, edges)
     np.testing.assert_array_equal(anew, [True, True, False, False])
     between = np.array([[0, 1], [0, 2], [0, 3]], np.int32)
-    anew, count = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.5, between)
-    np.testing.assert_array_equal(anew, [True, False, False, False])  # with those beside it, all are
-    assert count == 4
-    anew, _ = still_moving(measured, drawn, strides, 0.1, 5.0, 0.0, 0.4, between)
-    assert anew.all()  # too many move by themselves
-    anew, count = still_moving(measured, drawn, strides, 0.3, 5.0, 0.0, 1.0, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, between)
+    np.testing.assert_array_equal(
+        anew, [True, False, False, True]
+    )  # with those beside it, all are; the last guides
+    assert count == 4  # nothing
+    anew, count = still_moving(*moving, 0.3, 5.0, 0.0, 1.0, 1.0, edges)
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)
     np.testing.assert_array_equal(out, [False, False, True, False])
     np.testing.assert_array_equal(chosen(out, np.ones((4, 2)), np.zeros((4, 2)))[:, 0], [0, 0, 1, 0])
+
+
+@given(
+    far=st.lists(st.floats(0.0, 1.0), min_size=12, max_size=40, unique=True),
+    most=st.floats(0.05, 0.95),
+    many=st.floats(0.0, 1.0),
+)
+def test_where_many_move_the_farthest_are_drawn_anew(far: list[float], most: float, many: float) -> None:
+    """Each marker has one beside it that does not move: with these, they are twice as many."""
+    half, near = len(far), 0.2
+    edges = np.stack([np.arange(half), half + np.arange(half)], axis=1).astype(np.int32)
+    measured = np.concatenate([far, np.zeros(half)])[:, None] * np.array([0.6, 0.8])
+    away = np.linalg.norm(measured, axis=1)
+    assume(np.abs(away - near).min() > 1e-9 and np.diff(np.sort(away[:half])).min() > 1e-9)
+    about = measured, measured, np.zeros((2 * half, 2)), np.full(2 * half, 9.0), near, 5.0, 0.0
+    anew, touched = still_moving(*about, many, most, edges)
+    moving = np.count_nonzero(away > near)
+    assert touched == 2 * moving
+    if moving <= many * 2 * half < touched:
+        assert np.count_nonzero(anew) == min(moving, int(most * 2 * half))
+        assert away[anew].min(initial=1.0) > away[~anew & (away > 0)].max(initial=0.0)
+        assert (away[anew] > near).all()
+    else:
+        np.testing.assert_array_equal(anew[:half], away[:half] > near)
+        np.testing.assert_array_equal(anew[half:], anew[:half])
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.03])
@@ -251,7 +281,7 @@ def test_maps_are_laid_anew_around_some_markers_only(monkeypatch: pytest.MonkeyP
     which[[5, 20]] = True
     near, whole = placed(mesh, fit, which), placed(mesh, fit)
     np.testing.assert_array_equal(near.beyond, whole.beyond)
-    ends = np.unique(mesh.edges[touching(which, mesh.edges)])
+    ends = np.unique(mesh.edges[which[mesh.edges].any(axis=1)])
     np.testing.assert_array_equal(near.maps[ends], whole.maps[ends])
     others = np.setdiff1d(np.flatnonzero(np.isfinite(moved[:, 0])), ends)
     np.testing.assert_array_equal(near.maps[others], fit.maps[others])

@@ -14,7 +14,8 @@ from benchmarks.stress_suite.reading import extractor_of
 from cmpdesign.scene.standard import standard_layout
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
-from extractor.regained import ELSEWHERE, _alone, _gridlines_around
+from extractor.excerpt import alone, rows_of, with_rows
+from extractor.regained import ELSEWHERE, _gridlines_around
 from extractor.sure import lost_ones
 from extractor.topology import Topology, topology_of
 
@@ -41,13 +42,17 @@ def test_gridlines_around_come_first_and_few_others(lost: list[int]) -> None:
 def test_some_gridlines_alone_are_a_mesh_of_their_own() -> None:
     own = mesh()
     which = np.array([3, 7, 8, 40, 41, 100])
-    markers, ends, around = _alone(which, own.edges, own.spokes)
+    markers, ends, around = alone(which, own.edges, own.spokes)
     np.testing.assert_array_equal(markers[ends], own.edges[which])
     assert len(set(markers.tolist())) == len(markers) == len(around)
     for k, m in enumerate(markers):
         kept = np.isin(own.spokes[m], which)
         np.testing.assert_array_equal(around[k] >= 0, kept)
         np.testing.assert_array_equal(which[around[k][kept]], own.spokes[m][kept])
+    table = np.random.default_rng(0).normal(size=(len(own.edges), 3))
+    np.testing.assert_array_equal(rows_of(table, which), table[which])
+    other = with_rows(table, which, np.zeros((len(which), 3)))
+    assert (other[which] == 0).all() and (np.delete(other, which, 0) == np.delete(table, which, 0)).all()
 
 
 def test_what_was_lost_is_put_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

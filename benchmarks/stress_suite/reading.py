@@ -28,7 +28,7 @@ class Result:
     """One image read.
 
     Attributes:
-        ms: processor time of the best run. ratio: to the plain frame's; NaN for other sizes of image.
+        ms: processor time of the best run. ratio: to the plain frame's, the runs' median; NaN for other sizes of image.
         reason: the extractor's; an exception's text where it raised one.
     """
 
@@ -50,14 +50,11 @@ def plain_image(pattern: str) -> Image:
     return plain(pattern, 0).shoot().image
 
 
-def timed(extractor: Extractor, image: Image, runs: int) -> tuple[Markers, float]:
-    """The markers, and the best run's ms of processor time."""
-    best = math.inf
-    for _ in range(runs):
-        started = time.process_time()
-        markers = extractor.extract(image)
-        best = min(best, 1e3 * (time.process_time() - started))
-    return markers, best
+def timed(extractor: Extractor, image: Image) -> tuple[Markers, float]:
+    """The markers, and ms of processor time."""
+    started = time.process_time()
+    markers = extractor.extract(image)
+    return markers, 1e3 * (time.process_time() - started)
 
 
 def layers_of(shot: Shot) -> int:
@@ -69,23 +66,28 @@ def read(case: Case, runs: int, *, timing: bool = True) -> tuple[Result, Shot, M
     """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on.
 
     Args:
-        runs: of which the best one's time counts.
-        timing: also read the plain frame, to state the ratio.
+        runs: how often it is read.
+        timing: also read the plain frame, right before each run, to state the ratio.
     """
     kind = BY_NAME[case.kind]
     shot = frame_of(case, kind).shoot()
     pixels = shot.image.shape[0] * shot.image.shape[1]
+    comparable = timing and shot.image.shape[:2] == STANDARD_SIZE[::-1]
+    taken, ratios = [], []
     try:
         extractor = extractor_of(case.pattern, layers_of(shot))
-        plain_ms = math.nan
-        if timing and shot.image.shape[:2] == STANDARD_SIZE[::-1]:
-            plain_ms = timed(extractor_of(case.pattern, 11), plain_image(case.pattern), runs)[1]
-        markers, ms = timed(extractor, shot.image, 1 if pixels > LARGE_PX else runs)
+        for _ in range(1 if pixels > LARGE_PX else runs):
+            beside = math.nan
+            if comparable:
+                beside = timed(extractor_of(case.pattern, 11), plain_image(case.pattern))[1]
+            markers, ms = timed(extractor, shot.image)
+            taken.append(ms)
+            ratios.append(ms / beside)
     except Exception as error:
         return Result(case, NOTHING, math.nan, math.nan, repr(error), True), shot, None
     figures = score(markers, shot, promised=kind.promised)
     reason = str(markers.reason) if markers.reason else ""
-    return Result(case, figures, ms, ms / plain_ms, reason, False), shot, markers
+    return Result(case, figures, min(taken), float(np.median(ratios)), reason, False), shot, markers
 
 
 def warm_up() -> None:

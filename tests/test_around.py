@@ -1,0 +1,130 @@
+"""A step around some markers: there it is a step from everything, elsewhere it is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from benchmarks.stress_suite.conditions import matching
+from benchmarks.stress_suite.reading import read
+from cmpdesign.scene import Blob, Camera, Damage, Optics, Press, composed, render
+from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
+from cmpdesign.writers.layout_file import layout_to_json
+from extractor import Extractor, parse_layout
+from extractor.drawing import Draughtsman
+from extractor.drawn import Drawing
+from extractor.fit import Fit
+from extractor.settling import beside
+from extractor.step import roughened
+from extractor.topology import Topology
+
+SIZE = (300, 260)
+
+
+class Step(NamedTuple):
+    """A step around the markers ``anew``, those beside them ``free``, too: before, after, and from everything."""
+
+    mesh: Topology
+    anew: Any
+    free: Any
+    before: Fit
+    read: Drawing
+    after: Fit
+    drawn: Drawing
+    whole: Fit
+
+
+@cache
+def steps(name: str) -> list[Step]:
+    """All that ``accurate`` takes in an image."""
+    plain, taken = Draughtsman._again, []
+
+    def noted(
+        self: Draughtsman, view: Any, fit: Fit, read: Drawing, anew: Any, wide: bool, *how: bool
+    ) -> Any:
+        after, drawn = plain(self, view, fit, read, anew, wide, *how)
+        start = fit._replace(xy=after.xy, beyond=after.beyond, maps=after.maps, bend=drawn.bend)
+        start = start._replace(rough=np.zeros(len(anew))) if wide else roughened(self._mesh, start)
+        free = anew.copy()
+        beside(anew, self._mesh.edges, free)
+        whole = self._stepped(view.frame, start, drawn)
+        taken.append(Step(self._mesh, anew, free, fit, read, after, drawn, whole))
+        return after, drawn
+
+    blobs = tuple(Blob(at, 0.5, BLACK_RGB) for at in ((-2.0, 1.5), (0.3, -2.4)))
+    dirt, press = {"damage": Damage(blobs=blobs)}, {"surface": composed(Press(4.0, 0.6))}
+    pattern, blur, pitch_px, changes = {
+        "pressed": ("round", 1.0, 20.0, press),
+        "dirty": ("honeycomb", 1.0, 20.0, dirt),
+        "cut": ("honeycomb", 1.0, 40.0, press),
+        "wide": ("elliptical", 2.0, 20.0, dirt),
+    }[name]
+    camera, optics = Camera(pitch_px=pitch_px, rotation_deg=7.3), Optics(blur)
+    scene = replace(standard_scene(standard_layout(pattern, 5)), camera=camera, optics=optics, **changes)
+    extractor = Extractor(parse_layout(layout_to_json(standard_layout(pattern, 5))), "accurate")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Draughtsman, "_again", noted)
+        extractor.extract(render(scene, size=SIZE).image)
+    assert taken
+    return taken
+
+
+@pytest.mark.parametrize("name", ["pressed", "dirty", "cut", "wide"])
+def test_a_step_around_markers_is_one_from_everything(name: str) -> None:
+    """Where it solves: what beyond that would have moved hardly shows (px)."""
+    for step in steps(name):
+        known = np.isfinite(step.whole.measured[:, 0])
+        np.testing.assert_array_equal(np.isfinite(step.after.measured[:, 0]), known)
+        apart = np.linalg.norm(step.after.measured - step.whole.measured, axis=1)
+        assert apart[known & step.anew].max() < 0.003
+        assert apart[known & step.free].max() < 0.015
+    first = steps(name)[0]
+    moved = np.linalg.norm(first.after.measured - first.before.measured, axis=1)
+    assert np.nanmax(moved) > 0.1 or name == "pressed"
+
+
+@pytest.mark.parametrize("name", ["pressed", "dirty", "cut", "wide"])
+def test_nothing_else_moves(name: str) -> None:
+    for step in steps(name):
+        before, after, beyond = step.before, step.after, ~step.free
+        for of_markers in ("measured", "guiding", "strides"):
+            was, now = getattr(before, of_markers), getattr(after, of_markers)
+            np.testing.assert_array_equal(now[beyond], was[beyond])
+        np.testing.assert_array_equal(after.information.diagonal[beyond], before.information.diagonal[beyond])
+        others = ~step.free[step.mesh.edges].any(axis=1)
+        assert before.reading is not None and after.reading is not None
+        for was, now in (
+            (before.bend, after.bend),
+            (before.loose, after.loose),
+            (before.information.beside, after.information.beside),
+            (before.reading.use, after.reading.use),
+            (before.reading.foot, after.reading.foot),
+        ):
+            np.testing.assert_array_equal(now[others], was[others])
+        assert (after.sigma, after.swelling) == (before.sigma, before.swelling)
+        assert after.noise == pytest.approx(step.whole.noise, rel=0.03)
+        np.testing.assert_array_equal(after.levels.cell, before.levels.cell)
+
+
+def test_what_lies_where_others_put_it_is_drawn_where_these_are_now() -> None:
+    """A corner beyond the image's border, which was placed inside by few cells: few markers are drawn anew, but it is,
+    and so leaves the image."""
+    case = matching("overflowing=40/elliptical")[0]
+    result = read(case, runs=1, timing=False)[0]
+    assert result.score.measured > 150 and result.score.outside == 0 and result.score.wrong == 0
+
+
+def test_what_hardly_shows_is_not_guiding_afterwards() -> None:
+    """A marker that guides nothing before a step around it guides nothing after it, and others are where they are
+    measured."""
+    for name in ("dirty", "cut"):
+        for step in steps(name):
+            weak = np.isnan(step.before.guiding[:, 0])
+            np.testing.assert_array_equal(np.isnan(step.after.guiding[:, 0]), weak)
+            sure = step.free & ~weak
+            np.testing.assert_array_equal(step.after.guiding[sure], step.after.measured[sure])
+    assert any(np.isnan(step.before.guiding).any() for step in steps("cut"))
