@@ -47,13 +47,9 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = (
-    2  # more steps there at least, after which no fewer markers move; or after one around some markers,
-)
-FEWER = 0.7  # no fewer than so many times as before
-NEARLY = (
-    0.5  # of the blur: a marker that guides nothing is not drawn anew in damage where it would move by less
-)
+WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move
+FEWER = 0.7  # of as many may move after a step around those that move the farthest
+NEARLY = 0.5  # of the blur: by less no marker is drawn anew there that lies where others put it
 MAX_STEPS = 10
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
@@ -94,7 +90,7 @@ class Draughtsman:
         begun = spent > 0.0
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
-        size, least, tries, whole = drawing.edge_px, len(fit.xy), 0, True
+        size, least, tries, some = drawing.edge_px, len(fit.xy), 0, False
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = steps.many if drawing.sigma < SMALL_BLUR * edge_px else 1.0
         spent += effort(size)
@@ -102,23 +98,25 @@ class Draughtsman:
             there = _farther(fit, drawing) if wide else fit
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = there.measured, fit.guiding, drawing.xy, fit.strides, near, steps.enough, steps.few
-            anew, moving = still_moving(*about, many, steps.most, self._mesh.edges)
+            assert fit.reading is not None
+            tables = fit.reading.use, self._mesh.spokes, self._mesh.edges
+            anew, moving = still_moving(*about, many, steps.most, *tables)
             other = _looks_other(fit, drawing, steps.enough)
             count = np.count_nonzero(anew)
             everything = bool(other or count > MAX_AGAIN * len(anew))
             spent += effort(size, None if everything else count / len(anew))
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
-            stuck = moving >= (least if whole else FEWER * least)
+            stuck = moving >= (FEWER * least if some else least)
             tries = tries + 1 if stuck and not other else 0
             if not (everything or moving) or tries == patience or ((begun or step > 0) and spent > allowed):
                 break
-            least, whole = min(least, len(fit.xy) if other else moving), everything
+            least, some = min(least, len(fit.xy) if other else moving), count < moving and not everything
             if everything:
                 fit, drawing = self._first(view, self._free(placed(self._mesh, there), wide))
             else:
                 fit = fit._replace(guiding=there.guiding)
-                fit, drawing = self._again(view, fit, drawing, anew, wide, count < moving)
+                fit, drawing = self._again(view, fit, drawing, anew, wide, some)
         else:
             there = _farther(fit, drawing) if wide else fit
         slow = SLOW * (drawing.sigma / size) ** 2 if wide else 0.0

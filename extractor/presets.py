@@ -25,8 +25,9 @@ class Steps(NamedTuple):
         near: and by more than this share of the blur,
         few: but for this share of the markers;
         patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
-        many: with the markers that move, those beside them are drawn anew, unless these are more than that, but fewer
-        most: move; then only so many that move the farthest.
+        many: with the markers that move, those beside them are drawn anew, unless these are more than twice this share,
+            but fewer than that move; once they are more than this in dirt, only
+        most: so many that move the farthest.
     """
 
     profiles: tuple[int, int]

@@ -10,6 +10,7 @@ USUAL_EDGE_PX = 10.0
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 # Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
 SLOW = 20.0
+DIRTY = 0.72  # mean trust in the gridlines at markers that move, below which it is dirt that moves them
 OF_MEDIAN = 1.44  # a mean of squares against their median
 
 
@@ -20,11 +21,15 @@ def effort(size_px: float, share: float | None = None) -> float:
 
 
 @compiled
-def still_moving(measured, guiding, drawn, strides, near, enough, few, many, most, edges):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers that are more than ``near`` px and ``enough`` deviations from where they are drawn, and
-    those beside them; where these are more than ``many`` (a share of all), but fewer move, only those that move the
-    farthest, at most the share ``most``, and those of them all that guide nothing: these lie where others put them. And
-    how many move or are beside them. None where no more than ``few`` move."""
+def still_moving(measured, guiding, drawn, strides, near, enough, few, many, most, use, spokes, edges):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers to draw anew, and how many move or are beside those that do; none where no more than
+    ``few`` (a share of all) move.
+
+    Those move that are more than ``near`` px and ``enough`` deviations from where they are drawn. With them go those
+    beside them, unless these are more than twice ``many``, but no more than that move. Where it is dirt that moves
+    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``, and of
+    those beside them all that guide nothing: these lie where others put them.
+    """
     count = drawn.shape[0]
     far, found = np.zeros(count), 0
     for m in range(count):
@@ -34,13 +39,29 @@ def still_moving(measured, guiding, drawn, strides, near, enough, few, many, mos
             found += 1
     if found <= few * count:
         return np.zeros(count, np.bool_), 0
-    out = far > 0.0
-    beside(far > 0.0, edges, out)
+    moving = far > 0.0
+    out = moving.copy()
+    beside(moving, edges, out)
     touched = np.sum(out)
-    if found <= many * count < touched:
+    if found > many * count or touched <= many * count:
+        return out, touched
+    if _believed(use, spokes, moving) < DIRTY:
         rest = max(count - int(most * count), 1)
         out &= (far > np.partition(far, rest - 1)[rest - 1]) | np.isnan(guiding[:, 0])
-    return out, touched
+        return out, touched
+    return moving if touched > 2 * many * count else out, touched
+
+
+@compiled
+def _believed(use, spokes, which):  # type: ignore[no-untyped-def]
+    """The mean trust in the gridlines (E,) at ``which`` (M,) markers."""
+    total, count = 0.0, 0
+    for m in np.flatnonzero(which):
+        for e in spokes[m]:
+            if e >= 0:
+                total += use[e]
+                count += 1
+    return total / max(count, 1)
 
 
 @compiled

@@ -167,26 +167,39 @@ def test_where_blur_is_wide_a_share_of_a_usual_step_is_left_everywhere() -> None
     assert (unsettled(shift, 1.0, 3.0)[1:] == unsettled(shift, 1.0, 1.0)[1:]).all()
 
 
+def dirty_at(edges: NDArray[np.int32], trust: float = 0.5) -> tuple[Any, ...]:
+    """The last three arguments of ``still_moving``: gridlines so far trusted, the first two around each marker."""
+    spokes = np.full((edges.max() + 1, 6), -1, np.int32)
+    for m in range(len(spokes)):
+        own = np.flatnonzero((edges == m).any(axis=1))[:2]
+        spokes[m, : len(own)] = own
+    return np.full(len(edges), trust), spokes, edges
+
+
 def test_moving_markers_bring_their_neighbours() -> None:
     edges = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
     drawn = np.zeros((4, 2))
     measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
     moving = measured, measured, drawn, strides
-    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2
-    anew, count = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, edges)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     between = np.array([[0, 1], [0, 2], [0, 3]], np.int32)
-    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, between)
+    anew, count = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, *dirty_at(between))
     np.testing.assert_array_equal(
         anew, [True, False, False, True]
     )  # with those beside it, all are; the last guides
     assert count == 4  # nothing
-    anew, count = still_moving(*moving, 0.3, 5.0, 0.0, 1.0, 1.0, edges)
+    anew, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
+    assert anew.all()  # not dirt
+    anew, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
+    np.testing.assert_array_equal(anew, [True, False, False, False])
+    anew, count = still_moving(*moving, 0.3, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)
@@ -207,7 +220,7 @@ def test_where_many_move_the_farthest_are_drawn_anew(far: list[float], most: flo
     away = np.linalg.norm(measured, axis=1)
     assume(np.abs(away - near).min() > 1e-9 and np.diff(np.sort(away[:half])).min() > 1e-9)
     about = measured, measured, np.zeros((2 * half, 2)), np.full(2 * half, 9.0), near, 5.0, 0.0
-    anew, touched = still_moving(*about, many, most, edges)
+    anew, touched = still_moving(*about, many, most, *dirty_at(edges, 0.6))
     moving = np.count_nonzero(away > near)
     assert touched == 2 * moving
     if moving <= many * 2 * half < touched:
