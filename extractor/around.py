@@ -115,7 +115,8 @@ def stepped_around(
     where = {"xy": xy, "measured": measured, "guiding": guiding, "beyond": beyond, "maps": maps}
     bend, loose, joined, use, misfit, foot, aside = gridlines
     how = {"bend": bend, "loose": loose, "rough": rough, "strides": stepped, "misfit": misfit, "noise": noise}
-    reading = reading._replace(lines=lines, contrasts=contrasts, foot=foot, use=use, aside=aside)
+    about = {"foot": foot, "use": use, "aside": aside, "noise": noise}
+    reading = reading._replace(lines=lines, contrasts=contrasts, **about)
     return fit._replace(**where, **how, information=Information(diagonal, joined), reading=reading), drawing
 
 

@@ -45,7 +45,7 @@ def still_moving(measured, guiding, drawn, strides, near, enough, few, many, mos
     touched = np.sum(out)
     if found > many * count or touched <= many * count:
         return out, touched
-    if _believed(use, spokes, moving) < DIRTY:
+    if _trust_at(moving, use, spokes) < DIRTY:
         rest = max(count - int(most * count), 1)
         out &= (far > np.partition(far, rest - 1)[rest - 1]) | np.isnan(guiding[:, 0])
         return out, touched
@@ -53,7 +53,7 @@ def still_moving(measured, guiding, drawn, strides, near, enough, few, many, mos
 
 
 @compiled
-def _believed(use, spokes, which):  # type: ignore[no-untyped-def]
+def _trust_at(which, use, spokes):  # type: ignore[no-untyped-def]
     """The mean trust in the gridlines (E,) at ``which`` (M,) markers."""
     total, count = 0.0, 0
     for m in np.flatnonzero(which):

@@ -106,7 +106,7 @@ def test_nothing_else_moves(name: str) -> None:
         ):
             np.testing.assert_array_equal(now[others], was[others])
         assert (after.sigma, after.swelling) == (before.sigma, before.swelling)
-        assert after.noise == pytest.approx(step.whole.noise, rel=0.03)
+        assert after.noise == after.reading.noise == pytest.approx(step.whole.noise, rel=0.03)
         np.testing.assert_array_equal(after.levels.cell, before.levels.cell)
 
 
