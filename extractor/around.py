@@ -56,7 +56,8 @@ class Read(NamedTuple):
         lines, contrasts, sums, bend: as drawn and read, bending eliminated from the sums.
         to_a, to_b, off: the votes, and how the levels' change explains some.
         loose, kept: how freely they bend, and what their bending is.
-        use, misfit: how far they are trusted, and why. aside: px, as the cells are swollen.
+        use, misfit: how far they are trusted, and why. usual: misfit, of all gridlines. aside: px, as the cells are
+            swollen.
     """
 
     lines: NDArray[np.float64]
@@ -70,6 +71,7 @@ class Read(NamedTuple):
     kept: NDArray[np.float64]
     use: NDArray[np.float64]
     misfit: NDArray[np.float64]
+    usual: float
     aside: NDArray[np.float64]
 
 
@@ -140,7 +142,8 @@ def _around(image, board, anew, tables, look, before, markers, gridlines, said):
     where = _moved(drew[0], away, diagonal, part, measured, guiding, stepped, known)
     measured, guiding, stepped, known = where
     lines = _told(drew, away, joined, part, read, gridlines)
-    return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines, noise_of(lines[4], lines[3])
+    noise = noise_of(lines[4], lines[3], read.usual)
+    return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines, noise
 
 
 @compiled
@@ -192,7 +195,7 @@ def _read(drew, part, edge_cells, gridlines, look, said):  # type: ignore[no-unt
     misfit, pardon = misfits(sums, to_a, to_b, values, least), hidden_misfit(loose, contrasts, sigma)
     usual = usual_misfit(replaced(before, which, misfit))
     trusted = weighed(sums, misfit, usual, pardon, values, unjudged)
-    return Read(lines, contrasts, sums, to_a, to_b, off, bend, loose, kept, trusted, misfit, aside)
+    return Read(lines, contrasts, sums, to_a, to_b, off, bend, loose, kept, trusted, misfit, usual, aside)
 
 
 @compiled

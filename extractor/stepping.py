@@ -110,13 +110,13 @@ def usual_misfit(misfit):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def noise_of(misfit, use):  # type: ignore[no-untyped-def]
-    """The noise by the gridlines' misfit (E,), of which they are in ``use`` (E,) that look as the pattern does; NaN
-    where none was judged."""
+def noise_of(misfit, use, usual):  # type: ignore[no-untyped-def]
+    """The noise by the gridlines' misfit (E,), the ``usual`` one, and how far they are in ``use`` (E,); NaN where none
+    was judged."""
     sound = misfit[use == 1.0]
     if 0 < sound.shape[0] < MOSTLY_SOUND * np.count_nonzero(np.isfinite(misfit)):  # what is dirty is no noise
         return np.sqrt(max(np.median(sound), MIN_NOISE**2))
-    return np.sqrt(usual_misfit(misfit))
+    return np.sqrt(usual)
 
 
 @compiled
@@ -128,8 +128,9 @@ def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no
     misfit of less than its ``pardon`` (E,) is always forgiven.
     """
     misfit = misfits(sums, to_a, to_b, values, least)
-    use = weighed(sums, misfit, usual_misfit(misfit), pardon, values, unjudged)
-    return use, misfit, noise_of(misfit, use)
+    usual = usual_misfit(misfit)
+    use = weighed(sums, misfit, usual, pardon, values, unjudged)
+    return use, misfit, noise_of(misfit, use, usual)
 
 
 @compiled
