@@ -3,6 +3,9 @@
 Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
 do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
 sextant, read at equidistant places. What neither can tell within a tenth of an edge stays lost.
+
+A marker under dirt may be measured, but so vaguely that the rings know more of its place than it shows itself: it is
+put between the two.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arcs import by_layer
+from .drawn import chosen
 from .dropping import MILD_SUPPORT, believable, inside
 from .engine import compiled
 from .fit import Refined
@@ -20,6 +24,7 @@ from .neighbourhood import MIN_CUBIC, cubic_variance, predicted
 from .placing import Places
 from .tables import Lattice
 from .types import Status
+from .vague import blend, vague_ones
 
 MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
 IMPLIED_SIGMA = 0.02  # in edges
@@ -62,10 +67,11 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         size: width and height of the image; nothing is reported outside.
     """
     xy, cov, edge_px, sound = believable(refined, places, lattice, size)
-    if sound:
+    vague, some = vague_ones(cov, edge_px)
+    if sound and not some:
         return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
     tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
-    return Repaired(xy, cov, _fill(xy, cov, edge_px, places.xy_px, *tables, size))
+    return Repaired(xy, cov, _fill(xy, cov, vague, edge_px, places.xy_px, *tables, size))
 
 
 @compiled
@@ -83,31 +89,36 @@ def _filled(edge, table):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
-    """Write the places and covariances of the lost markers that can be told, NaN for those outside the image; (M,)
-    uint8 the status of all."""
-    lost = np.isnan(xy[:, 0])
+def _fill(xy, cov, vague, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
+    """Write the places and covariances of the lost markers that can be told, NaN for those outside the image, and put
+    the ``vague`` ones (M,) bool nearer to where others have them; (M,) uint8 the status of all."""
+    lost, edge = np.isnan(xy[:, 0]), _filled(edge, table)
     status = np.where(lost, LOST, MEASURED)
     lost &= present
-    edge, known = _filled(edge, table), xy.copy()
-    if lost.any():
-        near = predicted(known, lost, marker_mm, table)
-        nearer = predicted(known, lost, marker_mm, ring)[0]
+    tables = marker_mm, table, ring
+    clear = chosen(vague, np.full(xy.shape, np.nan), xy)
+    near, nearer = _told(clear, lost | vague, *tables)
+    for m in np.flatnonzero(lost | vague):
+        variance = _by_neighbours(m, near, nearer, edge[m])
+        if lost[m]:
+            lost[m], status[m] = not _put(m, near[0][m], variance, xy, cov, size), REPAIRED
+        elif variance >= 0.0:
+            blend(xy[m], cov[m], near[0][m], variance)
+    known = chosen(vague, xy, clear)
+    if lost.any() and vague.any():
+        near, nearer = _told(known, lost, *tables)
         for m in np.flatnonzero(lost):
             variance = _by_neighbours(m, near, nearer, edge[m])
-            xy[m], status[m] = near[0][m], REPAIRED
-            if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
-                variance, xy[m] = _by_cells(m, near, implied, edge[m], size), implied[m]
-            lost[m] = not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size))
-            _spread(cov[m], variance)
+            lost[m] = not _put(m, near[0][m], variance, xy, cov, size)
+    for m in np.flatnonzero(lost):
+        lost[m] = not _put(m, implied[m], _by_cells(m, near, implied, edge[m], size), xy, cov, size)
     if lost.any():  # what says less, and takes longer, is asked only of these
         bent = cubic_variance(known, lost & (near[3] >= MIN_CUBIC), marker_mm, table)
         along, doubt = by_layer(known, layers)
         for m in np.flatnonzero(lost):
-            variance, xy[m] = _in_whole_rings(bent[m], edge[m]), near[0][m]
-            if not (variance >= 0.0 and inside(xy[m, 0], xy[m, 1], size)):
-                variance, xy[m], status[m] = _by_layer(doubt[m], edge[m]), along[m], FITTED
-            _spread(cov[m], variance)
+            if not _put(m, near[0][m], _in_whole_rings(bent[m], edge[m]), xy, cov, size):
+                status[m] = FITTED
+                _put(m, along[m], _by_layer(doubt[m], edge[m]), xy, cov, size)
     for n in range(xy.shape[0]):
         if not (cov[n, 0, 0] >= 0.0 and inside(xy[n, 0], xy[n, 1], size)):
             xy[n], cov[n], status[n] = np.nan, np.nan, LOST
@@ -115,10 +126,17 @@ def _fill(xy, cov, edge, implied, marker_mm, table, ring, present, layers, size)
 
 
 @compiled
-def _spread(cov, variance):  # type: ignore[no-untyped-def]
-    """Write the covariance of a place that is as sure along as across."""
-    cov[0, 0], cov[1, 1] = variance, variance
-    cov[0, 1], cov[1, 0] = 0.0, 0.0
+def _told(known, wanted, marker_mm, table, ring):  # type: ignore[no-untyped-def]
+    """All that ``predicted`` says of the wanted markers by two rings, and where the inner one alone puts them."""
+    return predicted(known, wanted, marker_mm, table), predicted(known, wanted, marker_mm, ring)[0]
+
+
+@compiled
+def _put(m, place, variance, xy, cov, size):  # type: ignore[no-untyped-def]
+    """Put a marker there, as sure along as across; False where that is not known, or not in the image."""
+    xy[m, 0], xy[m, 1] = place[0], place[1]
+    cov[m, 0, 0], cov[m, 1, 1], cov[m, 0, 1], cov[m, 1, 0] = variance, variance, 0.0, 0.0
+    return variance >= 0.0 and inside(place[0], place[1], size)
 
 
 @compiled
