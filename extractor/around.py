@@ -17,7 +17,7 @@ from .engine import compiled
 from .excerpt import alone, gridlines_at, rows_of, with_rows
 from .fit import Fit
 from .gridlines import KNOWN
-from .information import Information, assemble, gradient, multiply, solve
+from .information import HELD, Information, assemble, gradient, multiply, solve
 from .offsets import foot_of
 from .settling import beside
 from .sight import Sight
@@ -25,8 +25,6 @@ from .step import JUDGED_BY_PIXELS, PRIOR_PX, completed_around
 from .stepping import PRIOR_BEYOND_PX, middles, misfits, noise_of, strides, usual_misfit, votes, weighed
 from .swelling import unswollen
 from .topology import Topology
-
-HELD = 1e12  # 1/px^2, known about a marker that is held where it is
 
 
 class Part(NamedTuple):

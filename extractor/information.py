@@ -23,6 +23,7 @@ PRECISION = 1e-3  # of the solution
 # 1 - 2.5 t^2 + 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that
 # is 1.1 (.3667 for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
 SMOOTH = 0.1
+HELD = 1e12  # 1/px^2, known about a marker that is held where it is
 
 
 class Information(NamedTuple):

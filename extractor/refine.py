@@ -27,7 +27,7 @@ from .sight import Sight, Sights
 from .step import completed, lines_of, placed, roughened
 from .stepping import MIN_NOISE, SHORTEST, short_edges, usual_edge
 from .straying import astray, collected
-from .sure import doubt, lost_ones, sure_ones
+from .sure import doubt, lost_ones, sure_ones, unsure_ones
 from .swelling import shrunk
 from .topology import Topology
 
@@ -149,9 +149,12 @@ class Refiner:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
         xy, cov = self._sure(fit, places)
         strange = fit.noise > STRANGE * fit.grain
-        lost, some = lost_ones(xy, cov, places.xy_px, places.edge_px, strange, fit.swelling)
+        start = places.xy_px, places.edge_px
+        lost, some = unsure_ones(xy, cov, fit.guiding, *start, strange, fit.swelling)
         if some:
-            regain(view, self._mesh, fit, sides, places, lost, xy, cov)
+            there = placed(self._mesh, fit, lost)
+            lost = lost_ones(xy, cov, lost, there.xy, *start)
+            regain(view, self._mesh, there, sides, places, lost, xy, cov)
         return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(

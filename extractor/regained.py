@@ -1,8 +1,7 @@
 """What synthesis has lost, as under dirt and glare, is measured by profiles: around the lost markers, and there alone.
 
-The gridlines at the lost markers and at those beside them are read, judged and solved for the markers at their ends;
-what these cost is all that the round costs. Some gridlines elsewhere show how well the pattern is explained where
-nothing is wrong.
+The gridlines at the lost markers are read, judged and solved for these, between others that are held; what these cost
+is all that the round costs. Some gridlines elsewhere show how well the pattern is explained where nothing is wrong.
 """
 
 from __future__ import annotations
@@ -15,21 +14,21 @@ from .engine import compiled
 from .excerpt import alone, gridlines_at, rows_of
 from .fit import Across, Fit
 from .gridlines import KNOWN, gridlines
-from .information import assemble, gradient, solve
+from .information import HELD, assemble, gradient, solve
 from .matched import STRENGTH, read_profiles
 from .placing import Places
 from .rounds import JUDGED_BY_SAMPLES, PARDON
-from .settling import beside
 from .sight import Sight
-from .step import PRIOR_PX, listened, placed
-from .stepping import PRIOR_BEYOND_PX, trust, trusted_markers
+from .step import PRIOR_PX, listened
+from .stepping import PRIOR_BEYOND_PX, misfits, trusted_markers, usual_misfit, weighed
 from .sure import doubt, sure_ones
 from .swelling import unswollen
 from .synthesis import A, B
 from .topology import Topology
 
 STATIONS = 16  # a gridline
-ELSEWHERE = 5  # one of so many other gridlines is read
+ELSEWHERE = 12  # one of so many other gridlines is read,
+ENOUGH = 20  # and so many of them tell what is usual; without them, all together do
 
 
 def regain(
@@ -43,11 +42,10 @@ def regain(
     cov: NDArray[np.float64],
 ) -> None:
     """Fill in markers (M, 2) and covariances (M, 2, 2) of those ``lost`` (M,) whose gridlines look as they should; NaN
-    where these are not sure, or far from the ``places`` (in the view)."""
+    where these are not sure, or far from the ``places`` (in the view). The ``fit`` is placed there."""
     assert fit.reading is not None
-    before, fit = fit.reading.use, placed(mesh, fit, lost)
     look = fit.sigma, fit.noise, fit.swelling
-    pattern = fit.xy, fit.beyond, fit.maps, fit.rough, fit.bend, before, look
+    pattern = fit.xy, fit.beyond, fit.maps, fit.rough, fit.bend, fit.reading.use, look
     start = places.xy_px, places.edge_px, places.whole
     tables = mesh.edges, mesh.spokes, mesh.along, mesh.edge_cells
     _regain(view.image, pattern, tuple(across), start, tables, lost, xy, cov)
@@ -58,7 +56,7 @@ def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: igno
     at, beyond, _, _, _, _, (sigma, noise, _) = pattern
     edges, spokes, _, _ = tables
     which, count = _gridlines_around(lost, edges)
-    lines, sums, to_a, to_b, use, loose = _read(image, pattern, across, tables, which)
+    lines, sums, to_a, to_b, use, loose = _read(image, pattern, across, tables, which, count)
     which, use, loose = which[:count], use[:count], loose[:count]
     markers, ends, turned = alone(which, edges, spokes)
     asked = lost[markers] & trusted_markers(use, turned)
@@ -66,6 +64,7 @@ def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: igno
         return
     believed, variance = use * lines[:count, KNOWN], noise**2
     prior = np.where(beyond[markers], PRIOR_BEYOND_PX**-2, PRIOR_PX**-2)
+    prior[~beyond[markers] & np.isfinite(xy[markers, 0])] = HELD
     diagonal, joined = np.empty((len(markers), 3)), np.empty((count, 4))
     geometry = lines[:count], rows_of(across[0], which), ends, turned, sigma, variance, prior
     assemble(sums[:count], believed, False, *geometry, diagonal, joined)
@@ -80,18 +79,16 @@ def _regain(image, pattern, across, start, tables, lost, xy, cov):  # type: igno
 
 @compiled
 def _gridlines_around(lost, edges):  # type: ignore[no-untyped-def]
-    """The gridlines at the lost markers and at those beside them, then some of the others; and how many come first."""
-    near = lost.copy()
-    beside(lost, edges, near)
-    own, others = gridlines_at(near, edges), np.arange(0, len(edges), ELSEWHERE)
-    elsewhere = ~(near[edges[others, 0]] | near[edges[others, 1]])
+    """The gridlines at the lost markers, then some of the others; and how many come first."""
+    own, others = gridlines_at(lost, edges), np.arange(0, len(edges), ELSEWHERE)
+    elsewhere = ~(lost[edges[others, 0]] | lost[edges[others, 1]])
     return np.concatenate((own, others[elsewhere])), len(own)
 
 
 @compiled
-def _read(image, pattern, across, tables, which):  # type: ignore[no-untyped-def]
+def _read(image, pattern, across, tables, which, count):  # type: ignore[no-untyped-def]
     """Of the gridlines ``which`` (n,): how they run, what was read across them, their votes, how far they look as they
-    should, and how freely they bend."""
+    should, and how freely they bend. All after the first ``count`` lie elsewhere."""
     at, _, maps, rough, bend, before, (sigma, noise, swelling) = pattern
     edges, _, along, edge_cells = tables
     values, least, unjudged = JUDGED_BY_SAMPLES
@@ -103,5 +100,7 @@ def _read(image, pattern, across, tables, which):  # type: ignore[no-untyped-def
     unswollen(sums, to_a, to_b, rows_of(across[0], which), rows_of(edge_cells, which), swelling)
     said = bend, rough, before[which], lines, ends, noise
     loose, _ = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
-    use, _, _ = trust(sums, to_a, to_b, PARDON**2 * room[:, STRENGTH], values, least, unjudged)
+    misfit = misfits(sums, to_a, to_b, values, least)
+    usual = usual_misfit(misfit[count:] if len(which) - count >= ENOUGH else misfit)
+    use = weighed(sums, misfit, usual, PARDON**2 * room[:, STRENGTH], values, unjudged)
     return lines, sums, to_a, to_b, use, loose

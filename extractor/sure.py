@@ -13,6 +13,7 @@ from .step import PRIOR_PX
 MAX_SHIFT = 0.25  # in units of the edges around the marker
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 MAX_STRANGE = 0.13  # likewise, that a marker may be moved by where the drawing explains nothing well
+MAX_ASTRAY = 0.05  # likewise, of a marker that the image hardly shows, from where its neighbours put it
 OF_SWELLING = 2.0  # times the swelling of the cells, that it may be moved by besides: corners swell most
 # Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
 UNEXPLAINED = 0.015
@@ -36,17 +37,31 @@ def sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, who
 
 
 @compiled
-def lost_ones(xy, cov, start, edge, strange, swelling):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers that are known to start with but not sure; and whether there are any. Where all is
-    ``strange``, those that lie far from their ``start`` are made unsure, in place; cells have a ``swelling``, px.
+def unsure_ones(xy, cov, guiding, start, edge, strange, swelling):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers that are known to start with but not sure, or that guide nothing; and whether there are
+    any. Where all is ``strange``, those that lie far from their ``start`` are made unsure, in place; cells have a
+    ``swelling``, px.
     """
     out = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
         if strange and np.sqrt(dx * dx + dy * dy) > MAX_STRANGE * edge[m] + OF_SWELLING * abs(swelling):
             xy[m], cov[m] = np.nan, np.nan
-        out[m] = np.isnan(xy[m, 0]) and np.isfinite(start[m, 0])
+        out[m] = (np.isnan(xy[m, 0]) or np.isnan(guiding[m, 0])) and np.isfinite(start[m, 0])
     return out, np.any(out)
+
+
+@compiled
+def lost_ones(xy, cov, unsure, put, start, edge):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers that are known to start with but not sure. Those ``unsure`` (M,) bool are made so, in
+    place, where they do not lie where their neighbours ``put`` them (M, 2)."""
+    out = np.zeros(xy.shape[0], np.bool_)
+    for m in np.flatnonzero(unsure):
+        dx, dy = xy[m, 0] - put[m, 0], xy[m, 1] - put[m, 1]
+        if not dx * dx + dy * dy < (MAX_ASTRAY * edge[m]) ** 2:
+            xy[m], cov[m] = np.nan, np.nan
+        out[m] = np.isnan(xy[m, 0]) and np.isfinite(start[m, 0])
+    return out
 
 
 @compiled

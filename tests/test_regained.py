@@ -16,7 +16,7 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
 from extractor.excerpt import alone, rows_of, with_rows
 from extractor.regained import ELSEWHERE, _gridlines_around
-from extractor.sure import lost_ones
+from extractor.sure import lost_ones, unsure_ones
 from extractor.topology import Topology, topology_of
 
 Array = NDArray[Any]
@@ -32,8 +32,7 @@ def test_gridlines_around_come_first_and_few_others(lost: list[int]) -> None:
     own, which = mesh(), np.zeros(len(mesh().spokes), np.bool_)
     which[lost] = True
     read, count = _gridlines_around(which, own.edges)
-    ring = set(lost) | {int(n) for e in own.edges[which[own.edges].any(axis=1)] for n in e}
-    first = [e for e, (a, b) in enumerate(own.edges) if a in ring or b in ring]
+    first = [e for e, (a, b) in enumerate(own.edges) if a in lost or b in lost]
     assert read[:count].tolist() == first
     others = [e for e in range(0, len(own.edges), ELSEWHERE) if e not in set(first)]
     assert read[count:].tolist() == others
@@ -61,12 +60,26 @@ def test_what_was_lost_is_put_where_it_is(monkeypatch: pytest.MonkeyPatch) -> No
 
     def taken(xy: Array, cov: Array, *others: Any) -> tuple[Array, bool]:
         xy[chosen], cov[chosen] = np.nan, np.nan
-        return lost_ones(xy, cov, *others)  # type: ignore[no-any-return]
+        return unsure_ones(xy, cov, *others)  # type: ignore[no-any-return]
 
-    monkeypatch.setattr("extractor.refine.lost_ones", taken)
+    monkeypatch.setattr("extractor.refine.unsure_ones", taken)
     markers = extractor_of("honeycomb", 11).extract(shot.image)
     assert (markers.status[chosen] == Status.MEASURED).all()
     error = np.linalg.norm(markers.xy_px - shot.truths[0].marker_xy_px, axis=1)[chosen]
     sigma = np.sqrt(np.trace(markers.cov_px2, axis1=1, axis2=2))[chosen]
     assert (error < 3 * sigma).all() and (sigma < 0.6).all()
     assert error.max() < 0.2
+
+
+def test_what_hardly_shows_is_sure_only_where_others_put_it() -> None:
+    """Of four markers the first guides others; the next two do not, and one of these lies far from where it must."""
+    start = np.zeros((4, 2))
+    xy, cov = np.array([[3.0, 0.0], [0.3, 0.0], [3.0, 0.0], [np.nan, np.nan]]), np.ones((4, 2, 2))
+    guiding, edge = np.where([[True], [False], [False], [True]], xy, np.nan), np.full(4, 10.0)
+    unsure, some = unsure_ones(xy, cov, guiding, start, edge, False, 0.0)
+    assert some and unsure.tolist() == [False, True, True, True]
+    lost = lost_ones(xy, cov, unsure, np.zeros((4, 2)), start, edge)
+    assert lost.tolist() == [False, False, True, True]
+    assert np.isnan(xy[2:]).all() and np.isnan(cov[2:]).all() and np.isfinite(xy[:2]).all()
+    lost = lost_ones(xy, cov, unsure, np.full((4, 2), np.nan), start, edge)  # nor where nobody knows
+    assert lost.tolist() == [False, True, True, True]
