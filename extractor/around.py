@@ -81,13 +81,10 @@ def stepped_around(
     anew: NDArray[np.bool_],
     board: Board,
     wide: bool,
-    nearly_px: float,
 ) -> tuple[Fit, Drawing]:
     """The fit and the drawing after a step around the markers that are ``anew`` (M,) bool.
 
-    Args:
-        wide: no gridline may bend, as the blur is wide.
-        nearly_px: a marker that guides nothing stays where it is drawn unless it would move by more.
+    ``wide``: no gridline may bend, as the blur is wide.
     """
     levels, bettered, reading = drawing.levels, drawing.bettered, fit.reading
     assert reading is not None
@@ -104,7 +101,7 @@ def stepped_around(
         reading.aside,
     )
     changes = bettered.cell - levels.cell, bettered.black - levels.black
-    said = fit.noise, fit.swelling, wide, changes, nearly_px
+    said = fit.noise, fit.swelling, wide, changes
     given = view.image, tuple(board), anew, tables, look, tuple(drawing[:6])
     drew, markers, gridlines, noise = _around(*given, markers, gridlines, said)
     xy, lines, drawn_bend, contrasts, black, sums = drew
@@ -125,9 +122,8 @@ def _around(image, board, anew, tables, look, before, markers, gridlines, said):
     """The first six of a ``Drawing``; of the fit what belongs to markers, what belongs to gridlines, and the noise."""
     sides, (spokes, near, offset, stencil, ahead, third) = tables
     measured, guiding, maps, rough, stepped, known = markers
-    edges, bend, wide, nearly = sides[2], gridlines[0], said[2], said[4]
+    edges, bend, wide = sides[2], gridlines[0], said[2]
     xy, beyond, maps = completed_around(guiding, anew, maps, near, offset, stencil)
-    anew = anew & (np.isfinite(guiding[:, 0]) | _far(xy, before[0], nearly))
     free = anew.copy()
     beside(anew, edges, free)
     if not wide:
@@ -142,16 +138,6 @@ def _around(image, board, anew, tables, look, before, markers, gridlines, said):
     lines = _told(drew, away, joined, part, read, gridlines)
     noise = noise_of(lines[4], lines[3], read.usual)
     return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines, noise
-
-
-@compiled
-def _far(xy, drawn, limit):  # type: ignore[no-untyped-def]
-    """(M,) bool, which markers are farther than the limit from where they are drawn, or not known any more."""
-    out = np.empty(xy.shape[0], np.bool_)
-    for m in range(xy.shape[0]):
-        dx, dy = xy[m, 0] - drawn[m, 0], xy[m, 1] - drawn[m, 1]
-        out[m] = not dx * dx + dy * dy <= limit * limit
-    return out
 
 
 @compiled
@@ -178,7 +164,7 @@ def _read(drew, part, edge_cells, gridlines, look, said):  # type: ignore[no-unt
     """What was read along the gridlines of a part, judged among all of them."""
     use, before = gridlines[3], gridlines[4]
     _, lines, bend, contrasts, _, sums = drew
-    noise, swelling, _, changes, _ = said
+    noise, swelling, _, changes = said
     values, least, unjudged = JUDGED_BY_PIXELS
     which, frame, sigma, variance = part.which, look[2], look[3], noise**2
     sums, lines, contrasts = rows_of(sums, which), rows_of(lines, which), rows_of(contrasts, which)

@@ -33,7 +33,7 @@ MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
 MAX_WIDEN = 0.3  # of the blur, in one step
 SAME_BLUR = 0.03  # of the blur, by which it may be wrong in a drawing that is kept
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
-NOISY_BLUR, NOISY_LEVELS = 0.5, 0.12  # of how far noise moves these, in units of the blur
+NOISY_BLUR, NOISY_LEVELS = 0.75, 0.18  # of how far noise moves these, in units of the blur
 MOST_BLUR = 0.2  # of the blur, which no noise explains
 NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
 SMALL_BLUR = 0.12  # of a short edge; beyond that, blur, levels and places settle together;
@@ -47,9 +47,13 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move
-FEWER = 0.7  # of as many may move after a step around those that move the farthest
-NEARLY = 0.5  # of the blur: by less no marker is drawn anew there that lies where others put it
+WIDE_PATIENCE = (
+    2  # more steps there at least, after which no fewer markers move; and of the effort allowed, this share
+)
+WIDE_EFFORT, USUAL_PIXELS = (
+    0.6,
+    640 * 480,
+)  # in usual images, and more in larger ones, which take longer anyway
 MAX_STEPS = 10
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
@@ -78,7 +82,7 @@ class Draughtsman:
         """The fit after one step from everything, and its effort; ``edge_px`` is a short edge in the view."""
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
-        return _farther(fit, drawing) if wide else fit, effort(drawing.edge_px)
+        return _farther(fit, drawing), effort(drawing.edge_px)
 
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float, spent: float = 0.0) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows.
@@ -90,35 +94,36 @@ class Draughtsman:
         begun = spent > 0.0
         wide = self._wide(fit, edge_px)
         fit, drawing = self._first(view, self._free(fit, wide))
-        size, least, tries, some = drawing.edge_px, len(fit.xy), 0, False
+        size, least, tries = drawing.edge_px, len(fit.xy), 0
+        share = _share_where_wide(view) if wide else 1.0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = steps.many if drawing.sigma < SMALL_BLUR * edge_px else 1.0
         spent += effort(size)
         for step in range(MAX_STEPS - 1):
-            there = _farther(fit, drawing) if wide else fit
+            there = _farther(fit, drawing)
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
-            about = there.measured, fit.guiding, drawing.xy, fit.strides, near, steps.enough, steps.few
+            about = there.measured, drawing.xy, fit.strides, near, steps.enough, steps.few
             assert fit.reading is not None
             tables = fit.reading.use, self._mesh.spokes, self._mesh.edges
-            anew, moving = still_moving(*about, many, steps.most, *tables)
-            other = _looks_other(fit, drawing, steps.enough)
+            anew, moving, dirty = still_moving(*about, many, steps.most, *tables)
+            other = _looks_other(fit, drawing, steps.enough) and (wide or not dirty)
             count = np.count_nonzero(anew)
             everything = bool(other or count > MAX_AGAIN * len(anew))
             spent += effort(size, None if everything else count / len(anew))
             hard = not wide and _settles_slowly(fit, edge_px)
-            allowed = steps.effort * (HARD_EFFORT if hard else 1.0)
-            stuck = moving >= (FEWER * least if some else least)
-            tries = tries + 1 if stuck and not other else 0
-            if not (everything or moving) or tries == patience or ((begun or step > 0) and spent > allowed):
+            allowed = steps.effort * (HARD_EFFORT if hard else share)
+            tries = tries + 1 if moving >= least and not other else 0
+            ended = tries == patience or (dirty and not everything and step >= steps.in_dirt)
+            if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
                 break
-            least, some = min(least, len(fit.xy) if other else moving), count < moving and not everything
+            least = min(least, len(fit.xy) if other else moving)
             if everything:
                 fit, drawing = self._first(view, self._free(placed(self._mesh, there), wide))
             else:
                 fit = fit._replace(guiding=there.guiding)
-                fit, drawing = self._again(view, fit, drawing, anew, wide, some)
+                fit, drawing = self._again(view, fit, drawing, anew, wide)
         else:
-            there = _farther(fit, drawing) if wide else fit
+            there = _farther(fit, drawing)
         slow = SLOW * (drawing.sigma / size) ** 2 if wide else 0.0
         return there._replace(unsettled=unsettled(there.measured - drawing.xy, drawing.sigma, slow))
 
@@ -141,13 +146,10 @@ class Draughtsman:
         return self._stepped(view.frame, fit, drawing), drawing
 
     def _again(
-        self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_], wide: bool, some: bool
+        self, view: Sight, fit: Fit, drawing: Drawing, anew: NDArray[np.bool_], wide: bool
     ) -> tuple[Fit, Drawing]:
-        """A step around the markers that are ``anew`` (M,) bool, from what else was read; these are ``some`` of those
-        that move and are beside them."""
-        nearly_px = NEARLY * drawing.sigma if some else 0.0
-        board = self.board(view.image.shape)
-        return stepped_around(view, self._mesh, fit, drawing, anew, board, wide, nearly_px)
+        """A step around the markers that are ``anew`` (M,) bool, from what else was read."""
+        return stepped_around(view, self._mesh, fit, drawing, anew, self.board(view.image.shape), wide)
 
     def _stepped(self, frame: Frame, fit: Fit, drawing: Drawing) -> Fit:
         """The fit after the step that what was read asks for."""
@@ -213,6 +215,12 @@ def _farther(fit: Fit, drawing: Drawing) -> Fit:
     more = hidden / (1.0 - hidden) * (fit.measured - drawing.xy)
     measured = fit.measured + more
     return fit._replace(measured=measured, guiding=np.where(np.isnan(fit.guiding), np.nan, measured))
+
+
+def _share_where_wide(view: Sight) -> float:
+    """Of the effort that a preset allows."""
+    pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
+    return float(min(WIDE_EFFORT * max(pixels / USUAL_PIXELS, 1.0), 1.0))
 
 
 def _settles_slowly(fit: Fit, edge_px: float) -> bool:

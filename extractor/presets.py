@@ -27,7 +27,8 @@ class Steps(NamedTuple):
         patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
         many: with the markers that move, those beside them are drawn anew, unless these are more than twice this share,
             but fewer than that move; once they are more than this in dirt, only
-        most: so many that move the farthest.
+        most: so many that move the farthest, and there are
+        in_dirt: no more steps around markers than these.
     """
 
     profiles: tuple[int, int]
@@ -41,10 +42,11 @@ class Steps(NamedTuple):
     patience: int
     many: float
     most: float
+    in_dirt: int
 
 
 STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.3, 0.08),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0),
+    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0, 1),
+    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.3, 0.05, 1),
+    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0, 9),
 }

@@ -10,7 +10,9 @@ USUAL_EDGE_PX = 10.0
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 # Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
 SLOW = 20.0
-DIRTY = 0.72  # mean trust in the gridlines at markers that move, below which it is dirt that moves them
+DIRTY = 0.72  # mean trust in the gridlines at markers that move, below which it is dirt that moves them,
+# where this share of all markers is hidden: their gridlines are trusted by less than
+SOILED, HIDDEN = 0.04, 0.3
 OF_MEDIAN = 1.44  # a mean of squares against their median
 
 
@@ -21,14 +23,13 @@ def effort(size_px: float, share: float | None = None) -> float:
 
 
 @compiled
-def still_moving(measured, guiding, drawn, strides, near, enough, few, many, most, use, spokes, edges):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers to draw anew, and how many move or are beside those that do; none where no more than
-    ``few`` (a share of all) move.
+def still_moving(measured, drawn, strides, near, enough, few, many, most, use, spokes, edges):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers to draw anew; how many move or are beside those that do, none where no more than ``few``
+    (a share of all) move; and whether it is dirt that moves them.
 
     Those move that are more than ``near`` px and ``enough`` deviations from where they are drawn. With them go those
     beside them, unless these are more than twice ``many``, but no more than that move. Where it is dirt that moves
-    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``, and of
-    those beside them all that guide nothing: these lie where others put them.
+    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``.
     """
     count = drawn.shape[0]
     far, found = np.zeros(count), 0
@@ -38,30 +39,37 @@ def still_moving(measured, guiding, drawn, strides, near, enough, few, many, mos
             far[m] = dx * dx + dy * dy
             found += 1
     if found <= few * count:
-        return np.zeros(count, np.bool_), 0
+        return np.zeros(count, np.bool_), 0, False
     moving = far > 0.0
-    out = moving.copy()
+    out, dirty = moving.copy(), _dirty(moving, use, spokes)
     beside(moving, edges, out)
     touched = np.sum(out)
-    if found > many * count or touched <= many * count:
-        return out, touched
-    if _trust_at(moving, use, spokes) < DIRTY:
+    if touched <= many * count or (found > many * count and not dirty):
+        return out, touched, dirty
+    if dirty and touched > 2 * many * count:
+        return np.zeros(count, np.bool_), 0, dirty
+    if dirty:
         rest = max(count - int(most * count), 1)
-        out &= (far > np.partition(far, rest - 1)[rest - 1]) | np.isnan(guiding[:, 0])
-        return out, touched
-    return moving if touched > 2 * many * count else out, touched
+        return far > np.partition(far, rest - 1)[rest - 1], touched, dirty
+    return moving if touched > 2 * many * count else out, touched, dirty
 
 
 @compiled
-def _trust_at(which, use, spokes):  # type: ignore[no-untyped-def]
-    """The mean trust in the gridlines (E,) at ``which`` (M,) markers."""
-    total, count = 0.0, 0
-    for m in np.flatnonzero(which):
+def _dirty(moving, use, spokes):  # type: ignore[no-untyped-def]
+    """Whether the gridlines (E,) at the markers that are ``moving`` (M,) are little trusted, and those at some markers
+    hardly at all."""
+    total, count, hidden = 0.0, 0, 0
+    for m in range(spokes.shape[0]):
+        own, known = 0.0, 0
         for e in spokes[m]:
             if e >= 0:
-                total += use[e]
-                count += 1
-    return total / max(count, 1)
+                own += use[e]
+                known += 1
+        hidden += own < HIDDEN * known
+        if moving[m]:
+            total += own
+            count += known
+    return total < DIRTY * count and hidden > SOILED * spokes.shape[0]
 
 
 @compiled
