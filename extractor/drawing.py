@@ -55,6 +55,9 @@ WIDE_EFFORT, USUAL_PIXELS = (
     640 * 480,
 )  # in usual images, and more in larger ones, which take longer anyway
 MAX_STEPS = 10
+EXPLAINED = (
+    2.0  # times the noise of the cells' insides that a drawing may leave where it is dirt that moves markers
+)
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
 NO_ROOM = np.empty((0, 4))
@@ -105,7 +108,8 @@ class Draughtsman:
             about = there.measured, drawing.xy, fit.strides, near, steps.enough, steps.few
             assert fit.reading is not None
             tables = fit.reading.use, self._mesh.spokes, self._mesh.edges
-            anew, moving, dirty = still_moving(*about, many, steps.most, *tables)
+            explained = fit.noise < EXPLAINED * fit.grain
+            anew, moving, dirty = still_moving(*about, many, steps.most, explained, *tables)
             other = _looks_other(fit, drawing, steps.enough) and (wide or not dirty)
             count = np.count_nonzero(anew)
             everything = bool(other or count > MAX_AGAIN * len(anew))

@@ -23,13 +23,14 @@ def effort(size_px: float, share: float | None = None) -> float:
 
 
 @compiled
-def still_moving(measured, drawn, strides, near, enough, few, many, most, use, spokes, edges):  # type: ignore[no-untyped-def]
+def still_moving(measured, drawn, strides, near, enough, few, many, most, explained, use, spokes, edges):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers to draw anew; how many move or are beside those that do, none where no more than ``few``
     (a share of all) move; and whether it is dirt that moves them.
 
     Those move that are more than ``near`` px and ``enough`` deviations from where they are drawn. With them go those
     beside them, unless these are more than twice ``many``, but no more than that move. Where it is dirt that moves
-    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``.
+    them (the drawing has ``explained`` the image elsewhere), once these are more than ``many``, only those go that move
+    the farthest, at most the share ``most``, and none once these are more than twice as many.
     """
     count = drawn.shape[0]
     far, found = np.zeros(count), 0
@@ -41,7 +42,7 @@ def still_moving(measured, drawn, strides, near, enough, few, many, most, use, s
     if found <= few * count:
         return np.zeros(count, np.bool_), 0, False
     moving = far > 0.0
-    out, dirty = moving.copy(), _dirty(moving, use, spokes)
+    out, dirty = moving.copy(), explained and _dirty(moving, use, spokes)
     beside(moving, edges, out)
     touched = np.sum(out)
     if touched <= many * count or (found > many * count and not dirty):

@@ -167,13 +167,13 @@ def test_where_blur_is_wide_a_share_of_a_usual_step_is_left_everywhere() -> None
     assert (unsettled(shift, 1.0, 3.0)[1:] == unsettled(shift, 1.0, 1.0)[1:]).all()
 
 
-def dirty_at(edges: NDArray[np.int32], trust: float = 0.2) -> tuple[Any, ...]:
-    """The last three arguments of ``still_moving``: gridlines so far trusted, the first two around each marker."""
+def dirty_at(edges: NDArray[np.int32], trust: float = 0.2, explained: bool = True) -> tuple[Any, ...]:
+    """The last four arguments of ``still_moving``: gridlines so far trusted, the first two around each marker."""
     spokes = np.full((edges.max() + 1, 6), -1, np.int32)
     for m in range(len(spokes)):
         own = np.flatnonzero((edges == m).any(axis=1))[:2]
         spokes[m, : len(own)] = own
-    return np.full(len(edges), trust), spokes, edges
+    return explained, np.full(len(edges), trust), spokes, edges
 
 
 def test_moving_markers_bring_their_neighbours() -> None:
@@ -186,6 +186,8 @@ def test_moving_markers_bring_their_neighbours() -> None:
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2 and dirty
     assert not still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[2]  # nothing is hidden
+    unexplained = dirty_at(edges, explained=False)
+    assert not still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *unexplained)[2]
     anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()  # one of four is few
     anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, *dirty_at(edges))
