@@ -29,8 +29,8 @@ def still_moving(measured, drawn, strides, near, enough, few, many, most, explai
 
     Those move that are more than ``near`` px and ``enough`` deviations from where they are drawn. With them go those
     beside them, unless these are more than twice ``many``, but no more than that move. Where it is dirt that moves
-    them (the drawing has ``explained`` the image elsewhere), once these are more than ``many``, only those go that move
-    the farthest, at most the share ``most``, and none once these are more than twice as many.
+    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``, and once
+    these are more than twice as many, none, if the drawing has ``explained`` the image elsewhere.
     """
     count = drawn.shape[0]
     far, found = np.zeros(count), 0
@@ -42,13 +42,13 @@ def still_moving(measured, drawn, strides, near, enough, few, many, most, explai
     if found <= few * count:
         return np.zeros(count, np.bool_), 0, False
     moving = far > 0.0
-    out, dirty = moving.copy(), explained and _dirty(moving, use, spokes)
+    out, dirty = moving.copy(), _dirty(moving, use, spokes)
     beside(moving, edges, out)
     touched = np.sum(out)
     if touched <= many * count or (found > many * count and not dirty):
         return out, touched, dirty
     if dirty and touched > 2 * many * count:
-        return np.zeros(count, np.bool_), 0, dirty
+        return (np.zeros(count, np.bool_), 0, dirty) if explained else (out, touched, dirty)
     if dirty:
         rest = max(count - int(most * count), 1)
         return far > np.partition(far, rest - 1)[rest - 1], touched, dirty

@@ -186,8 +186,6 @@ def test_moving_markers_bring_their_neighbours() -> None:
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2 and dirty
     assert not still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[2]  # nothing is hidden
-    unexplained = dirty_at(edges, explained=False)
-    assert not still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *unexplained)[2]
     anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()  # one of four is few
     anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, *dirty_at(edges))
@@ -198,6 +196,9 @@ def test_moving_markers_bring_their_neighbours() -> None:
     assert count == 4 and dirty  # with those beside it, all are
     anew, count, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 0.4, 0.75, *dirty_at(between))
     assert count == 0 and not anew.any() and dirty  # all is dirty
+    unexplained = dirty_at(between, explained=False)
+    anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.4, 0.75, *unexplained)
+    assert count == 4 and anew.all()
     anew, _, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
     assert anew.all() and not dirty
     anew, _, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
