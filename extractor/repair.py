@@ -40,7 +40,7 @@ MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadrat
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
 # surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
 # to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
-MILD_ERROR = 1.7
+MILD_ERROR = 1.6
 HEAVY_ERROR = 2.0
 # Likewise against what a cubic leaves in nearly whole rings, on the surfaces under balls, rings, ribs, wedges and cubes
 # (their true markers, of which up to three around were taken away): 99 % of the errors stay below 1.5 such deviations.
