@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .bridge import held_in
+from .bridge import held_in, leads_elsewhere
 from .cells import Cells
 from .claims import claim, forget, no_claims
 from .engine import compiled
@@ -28,14 +28,19 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     Cells that share a corner with a numbered one are its neighbours. For the others, the numbered cells around must map
     the cell near a free place of the layout that holds its ink, with little doubt, and no other cell may claim it; the
     nearest come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What does not fit
-    across the gap, or across damaged cells by which the mesh hung together, loses its number.
+    across the gap, or across damaged cells by which the mesh hung together, loses its number. Where the white cell
+    touches nothing that it numbered, the cells around it must agree in the end, else all is ambiguous.
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
     white = numbering.white_px if numbering.origin is Origin.WHITE else np.full(2, np.nan)
     seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
     step = 1 if numbering.mirrored else 2
-    return replace(numbering, cell=_attach(seen, cells.ink, numbering.cell, white, lattice.plan, step))
+    cell = _attach(seen, cells.ink, numbering.cell, white, lattice.plan, step)
+    if numbering.origin is not Origin.WHITE or numbering.touching:
+        return replace(numbering, cell=cell)
+    about = white, lattice.white_place[0], lattice.plan
+    return replace(numbering, cell=cell, ambiguous=bool(leads_elsewhere(seen[0], cells.whole, cell, *about)))
 
 
 @compiled

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .engine import compiled, lent
-from .gradients import seen_as
+from .gradients import seen_as, slopes
 from .near import bucketed, nearest
 from .parts import connected
 from .tables import Lattice
@@ -25,6 +25,9 @@ MAX_ALONE = 0.9  # the same for a cell that is not whole, whose center may lie a
 REACH = 5.0  # how far apart the two sides may be, in cells
 BESIDE = 1.5  # a block's ways that tell are at most so much longer than its shortest
 PAIRS = 3  # cells on the near side that each beyond is compared with
+WITNESSES = 5  # cells nearest to the white one that say where it must be, of which so many are
+ENOUGH = 3
+MAX_ASIDE = 1.0  # in cells, the median between that and where it is; a wrong step makes 1.7
 SEEDS = 3  # cells nearest to the white one, of which the largest block holds the reference
 
 
@@ -63,6 +66,35 @@ def held_in(center, corner, area, whole, cell, white, beside, plan, step):  # ty
         return np.zeros(cell.shape[0], np.bool_)
     first = sizes.argmax() if np.isnan(white[0]) else _largest_near(center, block, sizes, white)
     return _held(center, corner, area, cell, block, first, beside, plan, step)
+
+
+@compiled
+def leads_elsewhere(center, whole, cell, white, white_mm, plan):  # type: ignore[no-untyped-def]
+    """Whether the numbered cells nearest to the white one put that elsewhere in the image, by the layout's slopes
+    there; not where no such cell is within reach.
+
+    A part of the pattern that does not touch the white cell may be numbered by it one step aside; what lies around the
+    white cell was numbered by that part then, and tells.
+    """
+    known = np.flatnonzero((cell >= 0) & whole)
+    if known.shape[0] < ENOUGH:
+        return False
+    xy, slope = (
+        center[known],
+        slopes(center, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside),
+    )
+    index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
+    aside, told = np.empty(WITNESSES), 0
+    for k in range(nearest(xy, bucketed(xy), white[0], white[1], index, square)):
+        i = known[index[k]]
+        a, b, c, d = slope[i, 0, 0], slope[i, 0, 1], slope[i, 1, 0], slope[i, 1, 1]
+        size = plan.size_mm[cell[i]] * np.sqrt(abs(a * d - b * c))
+        if square[k] < (REACH * size) ** 2:
+            x, y = white_mm[0] - plan.center_mm[cell[i], 0], white_mm[1] - plan.center_mm[cell[i], 1]
+            dx, dy = center[i, 0] + a * x + b * y - white[0], center[i, 1] + c * x + d * y - white[1]
+            aside[told] = np.sqrt(dx * dx + dy * dy) / size
+            told += 1
+    return told >= ENOUGH and np.median(aside[:told]) > MAX_ASIDE
 
 
 @compiled

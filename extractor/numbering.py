@@ -49,6 +49,7 @@ class Numbering:
         conflicts: cells left out because their neighbours disagreed about them.
         ambiguous: two white cells could be the reference and nothing tells them apart.
         origin: what told where the lattice begins.
+        touching: the white cell touches what was numbered by it.
     """
 
     cell: NDArray[np.int32]
@@ -57,6 +58,7 @@ class Numbering:
     conflicts: int
     ambiguous: bool = False
     origin: Origin = Origin.WHITE
+    touching: bool = True
 
 
 class _Walk(NamedTuple):
@@ -237,7 +239,7 @@ def _least_cells(cells: Cells, mesh: Mesh, lattice: Lattice) -> float:
 
 def _candidate(way: Way, walk: _Walk) -> _Candidate:
     score = way.inside - 3 * way.outside - walk.conflicts
-    numbering = Numbering(way.cell, walk.front < 0, way.white_px, walk.conflicts)
+    numbering = Numbering(way.cell, walk.front < 0, way.white_px, walk.conflicts, touching=way.touching)
     return _Candidate(way.inside, score, way.white, walk.part, way.touching, numbering)
 
 

@@ -154,9 +154,9 @@ class Extractor:
         numbering = stages.done("number", number(bgr, cells, mesh, self._lattice))
         if numbering is None:
             return Reason.REFERENCE_LOST
-        if numbering.ambiguous:
-            return Reason.AMBIGUOUS
-        return Found(cells, stages.done("attach", attach(cells, numbering, self._lattice)))
+        if not numbering.ambiguous:
+            numbering = stages.done("attach", attach(cells, numbering, self._lattice))
+        return Reason.AMBIGUOUS if numbering.ambiguous else Found(cells, numbering)
 
     def _whole(self, bgr: NDArray[np.uint8], found: Found, scale: int, stages: Stages) -> bool:
         """Whether a finer scale would number no more cells than have been numbered."""

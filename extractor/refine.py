@@ -150,11 +150,12 @@ class Refiner:
         xy, cov = self._sure(fit, places)
         strange = fit.noise > STRANGE * fit.grain
         start = places.xy_px, places.edge_px
-        lost, some = unsure_ones(xy, cov, fit.guiding, *start, strange, fit.swelling)
-        if some:
-            there = placed(self._mesh, fit, lost)
-            lost = lost_ones(xy, cov, lost, there.xy, *start)
-            regain(view, self._mesh, there, sides, places, lost, xy, cov)
+        unsure, some = unsure_ones(xy, cov, fit.guiding, *start, strange, fit.swelling)
+        if not some:
+            return self._refined(view, fit, xy, cov, ~unsure, places)
+        there = placed(self._mesh, fit, unsure)
+        lost = lost_ones(xy, cov, unsure, there.xy, *start)
+        regain(view, self._mesh, there, sides, places, lost, xy, cov)
         return self._refined(view, fit, xy, cov, ~lost, places)
 
     def _refined(

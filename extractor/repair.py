@@ -59,7 +59,7 @@ class Repaired:
 
 
 def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, int]) -> Repaired:
-    """Drop what contradicts its neighbours and repair what they imply.
+    """Drop what contradicts its neighbours, repair what they imply, and let them say what is vague.
 
     Args:
         refined: the markers as measured.

@@ -16,7 +16,7 @@ from benchmarks.stress_suite.reading import extractor_of
 from benchmarks.stress_suite.score import Score, score
 from extractor.arcs import by_layer
 from extractor.attach import attach
-from extractor.bridge import unbridged
+from extractor.bridge import leads_elsewhere, unbridged
 from extractor.cells import Cells
 from extractor.near import bucketed, nearest
 from extractor.numbering import Numbering
@@ -69,6 +69,24 @@ def test_a_layers_quadratic_is_numpys() -> None:
     np.testing.assert_allclose(place[ids[~known]], (rows @ terms)[~known])
     np.testing.assert_allclose(variance[ids[~known]], (left * (1 + leverage))[~known])
     assert np.isnan(place[np.setdiff1d(np.arange(397), ids[~known])]).all()
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("step", [(1, 1), (-1, 2), (2, -1)])
+def test_cells_around_the_white_one_tell_that_all_is_a_step_aside(
+    pattern: str, step: tuple[int, int]
+) -> None:
+    """Whatever was numbered beyond a gap: these lead back to the white cell, or past it; far from it, nobody tells."""
+    table = lattice(pattern)
+    center, whole = table.center_mm * (20.0, -20.0), np.ones(len(table.ink), np.bool_)
+    white_mm = table.white_place[0]
+    right, white_px = np.arange(len(center), dtype=np.int32), white_mm * (20.0, -20.0)
+    shifted = cells_at(table.axial + np.array(step, np.int32), table)
+    assert not leads_elsewhere(center, whole, right, white_px, white_mm, table.plan)
+    assert leads_elsewhere(center, whole, shifted, white_px, white_mm, table.plan)
+    far = np.linalg.norm(center - white_px, axis=1) > 130.0
+    assert not leads_elsewhere(center, whole & far, shifted, white_px, white_mm, table.plan)
+    assert not leads_elsewhere(center, whole & False, shifted, white_px, white_mm, table.plan)
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
