@@ -79,10 +79,8 @@ def leads_elsewhere(center, whole, cell, white, white_mm, plan):  # type: ignore
     known = np.flatnonzero((cell >= 0) & whole)
     if known.shape[0] < ENOUGH:
         return False
-    xy, slope = (
-        center[known],
-        slopes(center, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside),
-    )
+    seen, xy = seen_as(cell, plan.ink.shape[0]), center[known]
+    slope = slopes(center, cell, seen, plan.center_mm, plan.beside)
     index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
     aside, told = np.empty(WITNESSES), 0
     for k in range(nearest(xy, bucketed(xy), white[0], white[1], index, square)):

@@ -47,17 +47,11 @@ MIXED, UNMIXED, MOST_MIXED = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
 # patterns, shifted), and at most by
 OVERLAP, MOST_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = (
-    2  # more steps there at least, after which no fewer markers move; and of the effort allowed, this share
-)
-WIDE_EFFORT, USUAL_PIXELS = (
-    0.6,
-    640 * 480,
-)  # in usual images, and more in larger ones, which take longer anyway
+WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move,
+WIDE_EFFORT = 0.6  # and of the effort allowed, so much in images of
+USUAL_PIXELS = 640 * 480  # and more in larger ones, which take longer anyway
 MAX_STEPS = 10
-EXPLAINED = (
-    2.0  # times the noise of the cells' insides that a drawing may leave where it is dirt that moves markers
-)
+EXPLAINED = 2.0  # times the noise inside the cells: what a drawing leaves that explains all but dirt
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
 NO_ROOM = np.empty((0, 4))
