@@ -37,8 +37,8 @@ from .virtual import place_virtual
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
 MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss
-CROWD = 8  # times as many domains as the pattern has cells, and at least
-MIN_CROWD = 2000  # so many are not a pattern's alone
+CROWD = 3  # times as many domains as the pattern has cells, and at least
+MIN_CROWD = 1000  # so many are not a pattern's alone
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
 
 

@@ -170,13 +170,14 @@ def test_regions_of_one_pixel_are_clutter() -> None:
     assert sound(extractor().extract(image), seen).mean() > 0.95
 
 
-@pytest.mark.parametrize("pattern", ["honeycomb", "round"])
-def test_a_pattern_amid_colored_noise_is_read(pattern: str) -> None:
-    """Thousands of domains all around, so many that only what looks like a cell is looked at."""
+@pytest.mark.parametrize("grain_px", [0.7, 2.0, 4.0])
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
+def test_a_pattern_amid_colored_noise_is_read(pattern: str, grain_px: float) -> None:
+    """Thousands of domains all around, so many that only what looks like a cell is looked at; coarse ones, too."""
     seen = render(scene(pattern), size=SIZE)
-    rng = np.random.default_rng(2)
-    image = np.clip(rng.normal(110, 60, (600, 800, 3)), 0, 255).astype(np.uint8)
-    image = cv2.GaussianBlur(image, (0, 0), 0.7)
+    grain = np.random.default_rng(2).standard_normal((600, 800, 3), dtype=np.float32)
+    grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), grain_px))
+    image = np.clip(127 + 70 * grain / grain.std(), 0, 255).astype(np.uint8)
     within = cv2.convexHull(np.rint(seen.truth.marker_xy_px).astype(np.int32))
     mask = cv2.dilate(cv2.fillConvexPoly(np.zeros(SIZE[::-1], np.uint8), within, 1), np.ones((15, 15)))
     image[: SIZE[1], : SIZE[0]][mask > 0] = seen.image[mask > 0]
