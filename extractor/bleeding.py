@@ -11,12 +11,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
+from .engine import compiled, lent
 from .levels import BLACK, Levels, disc_of
 from .topology import Topology
 
 MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
-LITTLE = 0.002  # of a neighbour, which makes no difference
+LITTLE = 0.002  # of a neighbour, which makes no difference;
+SAME = 0.0003  # nor does so much more or less
 
 
 @compiled
@@ -43,8 +44,14 @@ def _bled(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
     out = np.full(inscribed.shape[0], np.nan)
     for i in range(inscribed.shape[0]):
         if np.isfinite(inscribed[i]):
-            out[i] = 0.5 * math.erfc(inscribed[i] / np.sqrt(2.0 * (sigma * sigma + variance[i])))
+            out[i] = _share(inscribed[i], variance[i], sigma)
     return out, np.nanmedian(out)
+
+
+@lent
+def _share(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
+    """What a blur makes of each neighbour in the mean of one cell's disc."""
+    return 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + variance)))
 
 
 def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float) -> Levels:
@@ -93,9 +100,11 @@ def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float
 def _rebled(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
     """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
     inscribed, variance = _discs(xy, cells, 0.0)
+    size, spread = np.nanmedian(inscribed), np.nanmedian(variance)
+    usual, more = _share(size, spread, drawn), _share(size, spread, sigma)
+    if max(usual, more) < LITTLE or abs(more - usual) < SAME:
+        return False, cell, slope, black
     before, usual = _bled(inscribed, variance, drawn)
     after, more = _bled(inscribed, variance, sigma)
-    if max(usual, more) < LITTLE:
-        return False, cell, slope, black
     left = 1.0 - 6.0 * min(usual, MAX_SHARE)
     return (True, *_unbled(cell, slope, black, color, (after - before) / left, (more - usual) / left))

@@ -75,10 +75,10 @@ class Draughtsman:
             boards[shape] = room_for(shape, self._mesh)
         return boards[shape]
 
-    def step(self, view: Sight, fit: Fit, edge_px: float) -> tuple[Fit, float]:
-        """The fit after one step from everything, and its effort; ``edge_px`` is a short edge in the view."""
-        wide = self._wide(fit, edge_px)
-        fit, drawing = self._first(view, self._free(fit, wide))
+    def approach(self, view: Sight, fit: Fit) -> tuple[Fit, float]:
+        """The fit after a first step from everything, and its effort: far from the markers' places, gridlines that may
+        bend would follow what these still lack."""
+        fit, drawing = self._first(view, _stiff(fit))
         return _farther(fit, drawing), effort(drawing.edge_px)
 
     def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float, spent: float = 0.0) -> Fit:
@@ -94,10 +94,14 @@ class Draughtsman:
         size, least, tries = drawing.edge_px, len(fit.xy), 0
         share = _share_where_wide(view) if wide else 1.0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
-        many = steps.many if drawing.sigma < SMALL_BLUR * edge_px else 1.0
+        many = 1.0 if wide else steps.many
         spent += effort(size)
         for step in range(MAX_STEPS - 1):
             there = _farther(fit, drawing)
+            hard = not wide and _settles_slowly(fit, edge_px)
+            allowed = steps.effort * (HARD_EFFORT if hard else share)
+            if (begun or step > 0) and spent + effort(size, 0.0) > allowed:
+                break
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = there.measured, drawing.xy, fit.strides, near, steps.enough, steps.few
             assert fit.reading is not None
@@ -108,8 +112,6 @@ class Draughtsman:
             count = np.count_nonzero(anew)
             everything = bool(other or count > MAX_AGAIN * len(anew))
             spent += effort(size, None if everything else count / len(anew))
-            hard = not wide and _settles_slowly(fit, edge_px)
-            allowed = steps.effort * (HARD_EFFORT if hard else share)
             tries = tries + 1 if moving >= least and not other else 0
             ended = tries == patience or (dirty and not everything and step >= steps.in_dirt)
             if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
@@ -134,9 +136,7 @@ class Draughtsman:
     def _free(self, fit: Fit, wide: bool) -> Fit:
         """The fit with how freely its gridlines may bend: not at all where the blur is ``wide``. There they would
         follow what the markers beside them still lack, and these would hardly move."""
-        if wide:
-            return fit._replace(rough=np.zeros_like(fit.rough), bend=np.zeros_like(fit.bend))
-        return roughened(self._mesh, fit)
+        return _stiff(fit) if wide else roughened(self._mesh, fit)
 
     def _first(self, view: Sight, fit: Fit) -> tuple[Fit, Drawing]:
         """A step from everything."""
@@ -199,6 +199,11 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     current = edge_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
     wider = widening(sums, aside, use, contrasts, current, sigma)
     return ((use, misfit, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
+
+
+def _stiff(fit: Fit) -> Fit:
+    """The fit with gridlines that may not bend."""
+    return fit._replace(rough=np.zeros_like(fit.rough), bend=np.zeros_like(fit.bend))
 
 
 def _widened(sigma: float, edge_px: float, wider: float) -> float:

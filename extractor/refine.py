@@ -131,18 +131,19 @@ class Refiner:
             xy[strays], cov[strays] = np.nan, np.nan
             doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
             return self._refined(view, fit, xy, cov, ~doubted, places)
-        start, spent = self._nearer(sights, view, start, edge_px) if sights else (start, 0.0)
+        start, spent = self._nearer(sights, view, start) if sights else (start, 0.0)
         fit = self._draughtsman.steps(view, start, steps, edge_px, spent)
         return self._result(view, fit, sides, places)
 
-    def _nearer(self, sights: Sights, view: Sight, fit: Fit, edge_px: float) -> tuple[Fit, float]:
+    def _nearer(self, sights: Sights, view: Sight, fit: Fit) -> tuple[Fit, float]:
         """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
         that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
-        blurred = fit.sigma >= 2 * COARSE_BLUR * self._steps.finest
-        if not blurred or usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
+        if fit.sigma < 2 * COARSE_BLUR * self._steps.finest:
+            return fit, 0.0
+        if usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
             return fit, 0.0
         coarse = sights.at(2 * view.scale)
-        stepped, spent = self._draughtsman.step(coarse, rescaled(fit, view, coarse), edge_px / 2)
+        stepped, spent = self._draughtsman.approach(coarse, rescaled(fit, view, coarse))
         return placed(self._mesh, rescaled(stepped, coarse, view)), spent
 
     def _result(self, view: Sight, fit: Fit, sides: Across, places: Places) -> Refined:

@@ -18,7 +18,7 @@ from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_
 from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout, refine
 from extractor.bleeding import bled, rebled, unbled
-from extractor.drawing import Draughtsman
+from extractor.drawing import SAME_LEVELS, Draughtsman
 from extractor.drawn import Drawing, chosen
 from extractor.information import covariances
 from extractor.levels import Levels
@@ -409,3 +409,8 @@ def test_levels_follow_the_blur_there_and_back() -> None:
     back = rebled(wider, xy, own, 1.5, 1.2)
     np.testing.assert_allclose(back.cell, cell, rtol=0.02)
     assert rebled(levels, xy, own, 0.5, 0.6) is levels
+    # a little more blur than drawn is left alone only where it makes no difference: half of what makes levels others
+    assert rebled(levels, xy, own, 1.2, 1.2005) is levels
+    kept = [sigma for sigma in np.linspace(1.2, 1.3, 41) if rebled(levels, xy, own, 1.2, sigma) is levels]
+    first = rebled(levels, xy, own, 1.2, kept[-1] + 0.0025)
+    assert first is not levels and np.abs(first.cell / cell - 1.0).max() < 0.5 * SAME_LEVELS

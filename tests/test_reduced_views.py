@@ -103,6 +103,8 @@ def test_where_few_gridlines_are_short_the_first_step_is_coarse(
     steep = shown(pattern, camera=Camera(pitch_px=20.0, rotation_deg=7.3, tilt_deg=65, tilt_axis_deg=20))
     coarse = error(steep)
     assert scales() == [2, 1]
+    (_, first), (_, then) = drawings
+    assert not (first.rough.any() or first.bend.any()) and then.rough.any()  # far off, none may bend
     monkeypatch.setattr(refine, "COARSE_EDGE_PX", np.inf)
     assert coarse < 1.25 * error(steep)
     assert scales() == [1, 1]
