@@ -27,7 +27,7 @@ from .sight import Sight, Sights
 from .step import completed, lines_of, placed, roughened
 from .stepping import MIN_NOISE, SHORTEST, short_edges, usual_edge
 from .straying import astray, collected
-from .sure import doubt, lost_ones, sure_ones, unsure_ones
+from .sure import dirtied, doubt, lost_ones, sure_ones, unsure_ones
 from .swelling import shrunk
 from .topology import Topology
 
@@ -184,6 +184,8 @@ class Refiner:
         tables = self._mesh.edges, self._mesh.spokes
         start = places.xy_px, places.edge_px, places.whole
         xy, cov = sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start, self._all)
+        assert fit.reading is not None
+        dirtied(cov, fit.reading.use, self._mesh.spokes, places.edge_px)
         if fit.unsettled is not None:
             cov += fit.unsettled
         return xy, cov

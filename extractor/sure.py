@@ -17,6 +17,7 @@ MAX_ASTRAY = 0.05  # likewise, of a marker that the image hardly shows, from whe
 OF_SWELLING = 2.0  # times the swelling of the cells, that it may be moved by besides: corners swell most
 # Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
 UNEXPLAINED = 0.015
+DIRT = 0.01  # likewise, where the drawing does explain it, but none of the marker's gridlines is trusted
 FAR_APART = 0.03  # where all triangles of a marker were found
 
 
@@ -34,6 +35,21 @@ def sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, who
         if not (dx * dx + dy * dy < limit * limit and spread < (MAX_SIGMA * edge[m]) ** 2):
             xy[m], cov[m] = np.nan, np.nan
     return xy, cov
+
+
+@compiled
+def dirtied(cov, use, spokes, edge):  # type: ignore[no-untyped-def]
+    """Widen the covariances (M, 2, 2), in place, by how little the gridlines at each marker are trusted, by their use
+    (E,): what lies on some of them moves the others, too."""
+    for m in range(cov.shape[0]):
+        hidden, count = 0.0, 0
+        for e in spokes[m]:
+            if e >= 0:
+                hidden += 1.0 - use[e]
+                count += 1
+        doubted = (DIRT * edge[m] * hidden / max(count, 1)) ** 2
+        cov[m, 0, 0] += doubted
+        cov[m, 1, 1] += doubted
 
 
 @compiled

@@ -1,11 +1,12 @@
-"""Repaired and fitted markers: their covariances cover their true errors (Monte Carlo over damaged scenes)."""
+"""Where something is damaged, covariances cover the true errors: of repaired and fitted markers, and of measured ones
+beside the damage (Monte Carlo over damaged scenes)."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks.calibration import squares
+from benchmarks.calibration import KINDS, squares
 from extractor.presets import Preset
 
 
@@ -23,3 +24,12 @@ def test_the_covariance_of_a_repaired_marker_is_true(preset: Preset, status: str
     assert len(found) >= least
     assert 0.8 < np.sqrt(found.mean()) < 1.3
     assert np.sqrt(found.max()) < 6.0
+
+
+@pytest.mark.parametrize("preset", ["balanced", pytest.param("accurate", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_covariance_of_a_measured_marker_beside_damage_is_true(preset: Preset, kind: str) -> None:
+    found = squares(preset)[kind]
+    assert len(found) > 6000
+    assert 0.8 < np.sqrt(found.mean()) < 1.3
+    assert np.mean(found > 3.0**2) < 0.02
