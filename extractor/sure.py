@@ -40,11 +40,11 @@ def sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, who
 @compiled
 def dirtied(cov, use, spokes, edge):  # type: ignore[no-untyped-def]
     """Widen the covariances (M, 2, 2), in place, by how little the gridlines at each marker are trusted, by their use
-    (E,): what lies on some of them moves the others, too."""
+    (E,), 0 where nothing was read: what lies on some of them moves the others, too."""
     for m in range(cov.shape[0]):
         hidden, count = 0.0, 0
         for e in spokes[m]:
-            if e >= 0:
+            if e >= 0 and use[e] > 0.0:
                 hidden += 1.0 - use[e]
                 count += 1
         doubted = (DIRT * edge[m] * hidden / max(count, 1)) ** 2
