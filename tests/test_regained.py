@@ -1,4 +1,4 @@
-"""What synthesis has lost: which gridlines are read around it, and that nothing else is touched."""
+"""What synthesis has lost: which gridlines are read around it, and that nothing else is touched; what is sure, and how much."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
 from extractor.excerpt import alone, rows_of, with_rows
 from extractor.regained import ELSEWHERE, _gridlines_around
-from extractor.sure import lost_ones, unsure_ones
+from extractor.sure import DIRT, dirtied, lost_ones, unsure_ones
 from extractor.topology import Topology, topology_of
 
 Array = NDArray[Any]
@@ -83,3 +83,14 @@ def test_what_hardly_shows_is_sure_only_where_others_put_it() -> None:
     assert np.isnan(xy[2:]).all() and np.isnan(cov[2:]).all() and np.isfinite(xy[:2]).all()
     lost = lost_ones(xy, cov, unsure, np.full((4, 2), np.nan), start, edge)  # nor where nobody knows
     assert lost.tolist() == [False, True, True, True]
+
+
+def test_gridlines_that_are_not_trusted_widen_a_covariance_and_unread_ones_do_not() -> None:
+    spokes = np.array([[0, 1, 2, -1, -1, -1], [2, 3, -1, -1, -1, -1], [4, 5, -1, -1, -1, -1]], np.int32)
+    use, edge = np.array([1.0, 0.4, 0.7, 1.0, 0.0, 0.0]), np.array([10.0, 20.0, 10.0])
+    cov = np.broadcast_to(np.diag([0.01, 0.02]), (3, 2, 2)).copy()
+    dirtied(cov, use, spokes, edge)
+    wider = (DIRT * edge * np.array([0.3, 0.15, 0.0])) ** 2
+    for axis, before in enumerate((0.01, 0.02)):
+        np.testing.assert_allclose(cov[:, axis, axis], before + wider)
+    assert (cov[:, 0, 1] == 0.0).all() and (cov[:, 1, 0] == 0.0).all()
