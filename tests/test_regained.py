@@ -1,4 +1,4 @@
-"""What synthesis has lost: which gridlines are read around it, and that nothing else is touched; what is sure, and how much."""
+"""What synthesis has lost: which gridlines are read around it, what stays untouched, and what is sure, by how much."""
 
 from __future__ import annotations
 
