@@ -101,7 +101,7 @@ class Draughtsman:
             hard = not wide and _settles_slowly(fit, edge_px)
             allowed = steps.effort * (HARD_EFFORT if hard else share)
             if (begun or step > 0) and spent + effort(size, 0.0) > allowed:
-                break
+                break  # whatever still moves
             near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
             about = there.measured, drawing.xy, fit.strides, near, steps.enough, steps.few
             assert fit.reading is not None

@@ -138,9 +138,8 @@ class Refiner:
     def _nearer(self, sights: Sights, view: Sight, fit: Fit) -> tuple[Fit, float]:
         """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
         that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
-        if fit.sigma < 2 * COARSE_BLUR * self._steps.finest:
-            return fit, 0.0
-        if usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
+        blurred = fit.sigma >= 2 * COARSE_BLUR * self._steps.finest
+        if not blurred or usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
             return fit, 0.0
         coarse = sights.at(2 * view.scale)
         stepped, spent = self._draughtsman.approach(coarse, rescaled(fit, view, coarse))
