@@ -10,12 +10,12 @@ from .bridge import held_in, leads_elsewhere
 from .cells import Cells
 from .claims import claim, forget, no_claims
 from .engine import compiled
-from .gradients import seen_as, slopes
+from .gradients import seen_as
 from .mapped import WITNESSES
 from .near import bucketed, nearest
 from .numbering import Numbering
 from .tables import Lattice
-from .touch import UNTURNED, spread, touch, touching, turn_like
+from .touch import UNTURNED, spread, touch, touching, turn_beside, turn_like
 from .types import Origin
 
 ROUNDS = 40
@@ -33,13 +33,12 @@ def attach(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    white = numbering.white_px if numbering.origin is Origin.WHITE else np.full(2, np.nan)
     seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
     step = 1 if numbering.mirrored else 2
-    cell = _attach(seen, cells.ink, numbering.cell, white, lattice.plan, step)
+    cell = _attach(seen, cells.ink, numbering.cell, numbering.white_px, lattice.plan, step)
     if numbering.origin is not Origin.WHITE or numbering.touching:
         return replace(numbering, cell=cell)
-    about = white, lattice.white_place[0], lattice.plan
+    about = numbering.white_px, lattice.white_place[0], lattice.plan
     return replace(numbering, cell=cell, ambiguous=bool(leads_elsewhere(seen[0], cells.whole, cell, *about)))
 
 
@@ -101,11 +100,11 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
     shaped = np.flatnonzero(candidates & whole & np.isfinite(corner[:, 0, 0]))
     fresh = np.flatnonzero((cell >= 0) & whole)
     turn, maps = np.full(cell.shape[0], UNTURNED, np.int64), np.empty((cell.shape[0], 2, 2))
-    slope = slopes(center, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside)
+    seen = seen_as(cell, plan.ink.shape[0])
     claims = no_claims(loose.shape[0], free.shape[0])
     index, square = np.empty(WITNESSES, np.int32), np.empty(WITNESSES)
     for _ in range(ROUNDS):
-        touched = spread(center, corner, area, ink, shaped, cell, free, turn, maps, slope, fresh, plan, step)
+        touched = spread(center, corner, area, ink, shaped, cell, free, turn, maps, seen, fresh, plan, step)
         fresh = np.concatenate((fresh, touched))
         known = np.flatnonzero((cell >= 0) & whole)
         if known.shape[0] < MIN_WITNESSES or np.all(cell[loose] >= 0):
@@ -120,7 +119,7 @@ def _attached(center, corner, area, whole, ink, candidates, cell, free, plan, st
         fresh = fresh[whole[fresh]]
         for i in fresh:
             count = nearest(xy, grid, center[i, 0], center[i, 1], index, square)
-            turn[i] = _turn_near(center, corner, i, known, index[:count], cell, turn, maps, slope, plan, step)
+            turn[i] = _turn_near(center, corner, i, known, index[:count], cell, turn, maps, seen, plan, step)
     return cell
 
 
@@ -139,12 +138,12 @@ def _numbered(loose, claims, limit, cell, free):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _turn_near(center, corner, i, known, near, cell, turn, maps, slope, plan, step):  # type: ignore[no-untyped-def]
+def _turn_near(center, corner, i, known, near, cell, turn, maps, seen, plan, step):  # type: ignore[no-untyped-def]
     """From which corner cell i is counted, by the nearest of the known cells that is counted from any; -1 unknown."""
     for k in near:
         j = known[k]
         if turn[j] == UNTURNED:
-            turn[j] = turn_like(center, corner, j, plan.arms_mm, cell[j], step, slope[j], maps[j])
+            turn[j] = turn_beside(center, corner, j, cell[j], seen, plan, step, maps[j])
         if turn[j] >= 0:
             return turn_like(center, corner, i, plan.arms_mm, cell[i], step, maps[j], maps[i])
     return -1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, lent
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing
 MAX_MISFIT = 0.3  # of the way to a neighbour, between its center and where a cell's own triangle puts it
@@ -30,32 +30,36 @@ def slopes(center_px, cell, seen, center_mm, beside):  # type: ignore[no-untyped
     """
     out = np.full((cell.shape[0], 2, 2), np.nan)
     for i in range(cell.shape[0]):
-        u = cell[i]
-        if u < 0:
-            continue
-        xx, xy, yy = 0.0, 0.0, 0.0
-        ax, ay, bx, by = 0.0, 0.0, 0.0, 0.0
-        for k in range(6):
-            v = beside[u, k]
-            if v < 0 or seen[v] < 0:
-                continue
-            j = seen[v]
-            x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
-            px, py = center_px[j, 0] - center_px[i, 0], center_px[j, 1] - center_px[i, 1]
-            xx += x * x
-            xy += x * y
-            yy += y * y
-            ax += px * x
-            ay += px * y
-            bx += py * x
-            by += py * y
-        determinant = xx * yy - xy * xy
-        if determinant > MIN_SPREAD * MIN_SPREAD * 0.25 * (xx + yy) ** 2:
-            out[i, 0, 0] = (ax * yy - ay * xy) / determinant
-            out[i, 0, 1] = (ay * xx - ax * xy) / determinant
-            out[i, 1, 0] = (bx * yy - by * xy) / determinant
-            out[i, 1, 1] = (by * xx - bx * xy) / determinant
+        if cell[i] >= 0:
+            lay_slope(i, center_px, cell[i], seen, center_mm, beside, out[i])
     return out
+
+
+@lent
+def lay_slope(i, center_px, u, seen, center_mm, beside, out):  # type: ignore[no-untyped-def]
+    """Write that of cell i, the layout's u."""
+    xx, xy, yy = 0.0, 0.0, 0.0
+    ax, ay, bx, by = 0.0, 0.0, 0.0, 0.0
+    for k in range(6):
+        v = beside[u, k]
+        if v < 0 or seen[v] < 0:
+            continue
+        j = seen[v]
+        x, y = center_mm[v, 0] - center_mm[u, 0], center_mm[v, 1] - center_mm[u, 1]
+        px, py = center_px[j, 0] - center_px[i, 0], center_px[j, 1] - center_px[i, 1]
+        xx += x * x
+        xy += x * y
+        yy += y * y
+        ax += px * x
+        ay += px * y
+        bx += py * x
+        by += py * y
+    determinant = xx * yy - xy * xy
+    if determinant > MIN_SPREAD * MIN_SPREAD * 0.25 * (xx + yy) ** 2:
+        out[0, 0], out[0, 1] = (ax * yy - ay * xy) / determinant, (ay * xx - ax * xy) / determinant
+        out[1, 0], out[1, 1] = (bx * yy - by * xy) / determinant, (by * xx - bx * xy) / determinant
+    else:
+        out[0, 0], out[0, 1], out[1, 0], out[1, 1] = np.nan, np.nan, np.nan, np.nan
 
 
 @compiled

@@ -45,7 +45,7 @@ class Numbering:
     Attributes:
         cell: (N,) int32, the lattice's colored cell that each cell of the image is, or -1.
         mirrored: the pattern is seen from its back.
-        white_px: (2,) the middle of the white cell; of all cells where the outline told.
+        white_px: (2,) the middle of the white cell; NaN where the outline told.
         conflicts: cells left out because their neighbours disagreed about them.
         ambiguous: two white cells could be the reference and nothing tells them apart.
         origin: what told where the lattice begins.
@@ -197,7 +197,7 @@ def number(image: NDArray[np.uint8], cells: Cells, mesh: Mesh, lattice: Lattice)
     for walk in no_white:
         # with more cells than the white cell's part has, the outline tells more
         if best is None or walk.cells > best.inside:
-            best = _with_outline(cells, lattice, walk) or best
+            best = _with_outline(lattice, walk) or best
     return best.numbering if best else None
 
 
@@ -243,14 +243,11 @@ def _candidate(way: Way, walk: _Walk) -> _Candidate:
     return _Candidate(way.inside, score, way.white, walk.part, way.touching, numbering)
 
 
-def _with_outline(cells: Cells, lattice: Lattice, walk: _Walk) -> _Candidate | None:
+def _with_outline(lattice: Lattice, walk: _Walk) -> _Candidate | None:
     """The way that the outline leaves, if it leaves only one."""
-    known = np.flatnonzero(walk.at[:, 0] != UNKNOWN)
-    settled = settle(walk.at[known], lattice)
-    if settled is None:
+    cell = settle(walk.at, lattice)
+    if cell is None:
         return None
-    cell = np.full(len(walk.at), -1, np.int32)
-    cell[known] = settled
-    inside, middle = int((settled >= 0).sum()), cells.center_px[known].mean(axis=0)
-    numbering = Numbering(cell, walk.front < 0, middle, walk.conflicts, origin=Origin.OUTLINE)
+    inside, nowhere = int(np.count_nonzero(cell >= 0)), np.full(2, np.nan)
+    numbering = Numbering(cell, walk.front < 0, nowhere, walk.conflicts, origin=Origin.OUTLINE)
     return _Candidate(inside, inside, 0.0, 0, False, numbering)

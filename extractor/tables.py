@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import compiled
-from .lattice import SIX, axial, layer_of, marker_id
+from .engine import compiled, inlined
+from .lattice import SIX, axial, marker_id
 from .neighbourhood import INNER, inner_table, neighbour_table, ring_weights
 from .reference import BLACK, WHITE, Reference
 
@@ -40,7 +40,7 @@ class Lattice:
     Attributes:
         layers: the layout's layers.
         marker_mm: (M, 2) float64.
-        cell_of: (M,) int32, the colored cell whose axial (q, r) is this marker's ("up-cell"), or -1.
+        holder: (S, S) int32, the colored cell at the axial (q, r), which ``cell_at`` looks up; -1 for none.
         corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
         ink: (U,) uint8, 1 red, 2 green, 3 blue.
         axial: (U, 2) int32, the cells' (q, r).
@@ -54,7 +54,7 @@ class Lattice:
 
     layers: int
     marker_mm: NDArray[np.float64]
-    cell_of: NDArray[np.int32]
+    holder: NDArray[np.int32]
     corner_ids: NDArray[np.int32]
     ink: NDArray[np.uint8]
     axial: NDArray[np.int32]
@@ -123,12 +123,10 @@ def lattice_of(reference: Reference) -> Lattice:
     neighbours = neighbour_table(coordinates, int(reference.layer.max()))
     inner = inner_table(coordinates, reference.layer)
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
-    cell_of = np.full(len(coordinates), -1, np.int32)
-    cell_of[lower_left] = np.arange(len(inked))
     return Lattice(
         layers=int(reference.layer.max()),
         marker_mm=reference.xy_mm,
-        cell_of=cell_of,
+        holder=_holder(coordinates[lower_left], int(reference.layer.max())),
         corner_ids=marker_ids(coordinates[lower_left]),
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
@@ -141,21 +139,31 @@ def lattice_of(reference: Reference) -> Lattice:
     )
 
 
+def _holder(at: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
+    """Where each cell's number stands in a square as large as the layout, with a rim of -1 all around."""
+    out = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
+    out[at[:, 0] + layers + 1, at[:, 1] + layers + 1] = np.arange(len(at))
+    return out
+
+
+@inlined
+def cell_at(holder, q, r):  # type: ignore[no-untyped-def]
+    """The layout's cell at the axial (q, r), or -1: without a branch, as cells come in any order."""
+    last = np.int64(holder.shape[0] - 1)
+    return holder[min(max(q + last // 2, 0), last), min(max(r + last // 2, 0), last)]
+
+
 @compiled
-def _cells_at(at, cell_of, layers, out):  # type: ignore[no-untyped-def]
-    """Write the layout's cell at each axial place, or -1."""
+def _cells_at(at, holder):  # type: ignore[no-untyped-def]
+    out = np.empty(at.shape[0], np.int32)
     for i in range(at.shape[0]):
-        q, r = at[i, 0], at[i, 1]
-        out[i] = -1
-        if q != UNKNOWN and layer_of(q, r) <= layers:
-            out[i] = cell_of[marker_id(q, r)]
+        out[i] = cell_at(holder, at[i, 0], at[i, 1])
+    return out
 
 
 def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
     """(N,) int32, the layout's cell at each axial (q, r), or -1."""
-    out = np.empty(len(at), np.int32)
-    _cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_of, lattice.layers, out)
-    return out
+    return np.asarray(_cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.holder))
 
 
 @compiled

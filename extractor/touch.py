@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .engine import compiled, lent
+from .gradients import lay_slope
 from .near import bucketed, nearest
 
 SHARED = 0.3  # of the shorter edge, between the corners of two triangles at one marker
@@ -119,14 +120,22 @@ def turn_like(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no
     return found
 
 
+@lent
+def turn_beside(center, corner, i, u, seen, plan, step, out):  # type: ignore[no-untyped-def]
+    """From which corner the triangle of cell i, the layout's u, is counted by the cells ``seen`` (U,) around it; its
+    map is written to ``out``."""
+    lay_slope(i, center, u, seen, plan.center_mm, plan.beside, out)
+    return turn_like(center, corner, i, plan.arms_mm, u, step, out, out)
+
+
 @compiled
-def spread(center, corner, area, ink, loose, cell, free, turn, maps, slope, fresh, plan, step):  # type: ignore[no-untyped-def]
+def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh, plan, step):  # type: ignore[no-untyped-def]
     """Number, in place, the loose whole cells that touch numbered ones, the cells that touch these, and so on.
 
     Args:
         loose: the cells without a number that have a triangle. fresh: the numbered ones to begin at.
         turn: (N,) from which corner each numbered cell's triangle is counted, -1 unknown, ``UNTURNED`` before it is
-            asked; maps: (N, 2, 2), by it; slope: (N, 2, 2), by its neighbours.
+            asked; maps: (N, 2, 2), by it. seen: (U,) the cells of the image by which it is asked.
 
     Returns:
         The cells that were numbered.
@@ -137,7 +146,7 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, slope, fres
         for i in fresh:
             if _beside_free(plan.beside, cell[i], free):
                 if turn[i] == UNTURNED:
-                    turn[i] = turn_like(center, corner, i, plan.arms_mm, cell[i], step, slope[i], maps[i])
+                    turn[i] = turn_beside(center, corner, i, cell[i], seen, plan, step, maps[i])
                 if turn[i] >= 0:
                     queue[end] = i
                     end += 1

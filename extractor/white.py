@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from .batch import COLOR, INSIDE, POINTS, RADIUS, X, Y, room_for_samples, sample_patches
 from .cells import Cells
 from .engine import compiled
-from .lattice import SIX, layer_of, marker_id, turned_place
-from .tables import UNKNOWN, Lattice
+from .foreseen import MAX_OUTSIDE, RINGS, bases, close, close_misfits, foreseen, grid_around
+from .lattice import turned_place
+from .tables import Lattice, cell_at
 from .whitecell import white_cell
 
 # The middle of the white cell against the inks of the cells beside it, both as sums over the channels.
@@ -33,19 +34,6 @@ MIN_WEAKEST = 0.5
 MIN_BALANCE = 0.4
 MAX_WHITES = 16
 MIN_FAR = 0.75  # the weakest channel, where no walked cell touches it
-MAX_OUTSIDE = 0.02  # of a part's cells, where it is put into the layout
-# The down-cells around a cell (q, r), as steps to their own (q, r), the nearest first: three touch its sides.
-STEPS = np.array([[q, r] for q in range(-4, 6) for r in range(-5, 5)], np.int32)
-# From a cell's center to theirs, in axial steps, and in edges of an equilateral lattice.
-STEP_REACH = 6
-OFFSETS = STEPS + np.array([-2 / 3, 1 / 3])
-DISTANCES = np.sqrt((OFFSETS**2).sum(axis=1) + OFFSETS[:, 0] * OFFSETS[:, 1])
-# How far from the nearest numbered cell the white one is looked for; farther only when it is not found nearer.
-WHITE_REACHES = (0.7, 1.7, 2.7, 3.7)
-DISTANT = np.digitize(DISTANCES, WHITE_REACHES, right=True)
-ORDER = np.argsort(DISTANT, kind="stable")
-STEPS, OFFSETS = STEPS[ORDER], OFFSETS[ORDER]
-RINGS = np.searchsorted(DISTANT[ORDER], np.arange(len(WHITE_REACHES) + 1))  # where in these each reach begins
 
 
 class Way(NamedTuple):
@@ -77,12 +65,12 @@ def ways_from_white(
         at: (N, 2) axial coordinates of the cells, up to turns and shifts; ``UNKNOWN`` for those not walked to.
     """
     center = cells.center_px
-    known, basis = _bases(center, at)
+    known, basis = bases(center, at)
     # more cells than the layout has do not fit into it anywhere
     if len(known) == 0 or len(known) - len(lattice.ink) > MAX_OUTSIDE * len(known):
         return []
     radius, level, inks, strongest = _shown(image, center, cells.area_px, cells.ink, known)
-    layout = lattice.cell_of, lattice.layers, *lattice.white_place, lattice.center_mm
+    layout = lattice.layers, lattice.holder, *lattice.white_place, lattice.center_mm
     seen = known, basis, radius, level
     ring, cell, inside, middle, mean, white = _searched(image, center, at, seen, inks, strongest, layout)
     fits = np.flatnonzero(inside)
@@ -101,45 +89,28 @@ def _searched(image, center, at, seen, inks, strongest, layout):  # type: ignore
     What three cells surround has been seen as well as it can be; it is not looked at again from farther off, nor is
     what was tried.
     """
-    known = seen[0]
-    grid = _axial_grid(at, known)
-    closed, black = np.zeros(grid[2] * grid[3], np.bool_), np.empty(3)
+    known, layers = seen[0], layout[0]
+    grid, black = grid_around(at, known, seen[3]), np.empty(3)
     for ring in range(RINGS.shape[0] - 1):
-        begin, end, far = RINGS[ring], RINGS[ring + 1], ring > 0
-        sums = _foreseen(center, at, seen, STEPS[begin:end], OFFSETS[begin:end], grid)
-        places, mean, white, votes, color = _colored(image, sums, closed, grid, strongest, far)
+        far = ring > 0
+        if ring == 1:
+            close_misfits(grid, at, known, layers)
+        places, means, votes = foreseen(center, seen, grid, ring)
+        mean, white, color = _colored(image, means, strongest, far)
         if not far:
             if not _dark(mean, votes):
                 break
             _between(color, votes, black)
-            _close(closed, places[votes == 3], grid)
+            close(grid, places[votes == 3])
         bright = _brightest(mean, white, MIN_FAR if far else MIN_WEAKEST)
         if bright.shape[0] == 0:
             continue
-        cell, inside, middle = _tried(image, center, at, known, places[bright], layout, inks, black)
+        cell, inside, middle = _tried(image, center, at, known, places[bright], layout[1:], inks, black)
         if inside.any():
             return ring, cell, inside, middle, mean[bright], white[bright]
-        _close(closed, places[bright], grid)
+        close(grid, places[bright])
     nothing = np.empty(0)
     return -1, np.empty((0, 0), np.int32), np.empty(0, np.int64), np.empty((0, 2)), nothing, nothing
-
-
-@compiled
-def _axial_grid(at, known):  # type: ignore[no-untyped-def]
-    """The least axial q and r of a grid that holds all places which the known cells see, and its rows and columns."""
-    low_q, low_r, high_q, high_r = 1 << 20, 1 << 20, -(1 << 20), -(1 << 20)
-    for i in known:
-        low_q, high_q = min(low_q, at[i, 0]), max(high_q, at[i, 0])
-        low_r, high_r = min(low_r, at[i, 1]), max(high_r, at[i, 1])
-    rows, columns = high_q - low_q + 2 * STEP_REACH + 1, high_r - low_r + 2 * STEP_REACH + 1
-    return low_q - STEP_REACH, low_r - STEP_REACH, rows, columns
-
-
-@compiled
-def _close(closed, places, grid):  # type: ignore[no-untyped-def]
-    """Mark places as not to be looked at again, in place."""
-    for n in range(places.shape[0]):
-        closed[(places[n, 0] - grid[0]) * grid[3] + places[n, 1] - grid[1]] = True
 
 
 @compiled
@@ -167,50 +138,6 @@ def _brightest(brightness, white, least):  # type: ignore[no-untyped-def]
     """The places bright enough that are at least so white, at most ``MAX_WHITES``, the brightest first."""
     bright = np.flatnonzero((brightness > WHITE_RATIO) & (white >= least))
     return bright[np.argsort(-brightness[bright], kind="mergesort")][:MAX_WHITES]
-
-
-@compiled
-def _bases(center, at):  # type: ignore[no-untyped-def]
-    """(K,) the cells with a place and neighbours that say which way the lattice runs, and (K, 2, 2) how: the image step
-    per axial step, by least squares over the six neighbours of each."""
-    reach, found = 1, 0
-    for i in range(at.shape[0]):
-        if at[i, 0] != UNKNOWN:
-            reach = max(reach, abs(at[i, 0]) + 1, abs(at[i, 1]) + 1)
-    side = 2 * reach + 1
-    holder = np.full((side, side), -1, np.int32)
-    for i in range(center.shape[0]):
-        if at[i, 0] != UNKNOWN:
-            holder[at[i, 0] + reach, at[i, 1] + reach] = i
-    known, basis = np.empty(center.shape[0], np.int64), np.empty((center.shape[0], 2, 2))
-    for i in range(center.shape[0]):
-        if at[i, 0] == UNKNOWN:
-            continue
-        nqq, nqr, nrr = 0.0, 0.0, 0.0
-        xq, xr, yq, yr = 0.0, 0.0, 0.0, 0.0
-        for k in range(6):
-            dq, dr = SIX[k, 0], SIX[k, 1]
-            q, r = at[i, 0] + dq + reach, at[i, 1] + dr + reach
-            if holder[q, r] < 0:
-                continue
-            dx = center[holder[q, r], 0] - center[i, 0]
-            dy = center[holder[q, r], 1] - center[i, 1]
-            nqq += dq * dq
-            nqr += dq * dr
-            nrr += dr * dr
-            xq += dx * dq
-            xr += dx * dr
-            yq += dy * dq
-            yr += dy * dr
-        determinant = nqq * nrr - nqr * nqr
-        if determinant > 0.5:
-            basis[found, 0, 0] = (xq * nrr - xr * nqr) / determinant
-            basis[found, 0, 1] = (xr * nqq - xq * nqr) / determinant
-            basis[found, 1, 0] = (yq * nrr - yr * nqr) / determinant
-            basis[found, 1, 1] = (yr * nqq - yq * nqr) / determinant
-            known[found] = i
-            found += 1
-    return known[:found], basis[:found]
 
 
 @compiled
@@ -252,60 +179,27 @@ def _shown(image, center, area, ink, known):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _foreseen(center, at, seen, steps, offsets, grid):  # type: ignore[no-untyped-def]
-    """(P, 5) of each place of the grid x, y, radius and level, summed over the known cells that see it at one of these
-    steps, and the number of these."""
-    low_q, low_r, rows, columns = grid
-    known, basis, radius_of, level_of = seen
-    sums = np.zeros((rows * columns, 5))
-    way = np.empty(steps.shape[0], np.int64)
-    for k in range(steps.shape[0]):
-        way[k] = steps[k, 0] * columns + steps[k, 1]
-    for n in range(known.shape[0]):
-        i = known[n]
-        if np.isnan(level_of[n]):
-            continue
-        x, y, radius, level = center[i, 0], center[i, 1], radius_of[n], level_of[n]
-        a, b, c, d = basis[n, 0, 0], basis[n, 0, 1], basis[n, 1, 0], basis[n, 1, 1]
-        here = (at[i, 0] - low_q) * columns + at[i, 1] - low_r
-        for k in range(steps.shape[0]):
-            to = np.uint64(here + way[k])
-            sums[to, 0] += x + a * offsets[k, 0] + b * offsets[k, 1]
-            sums[to, 1] += y + c * offsets[k, 0] + d * offsets[k, 1]
-            sums[to, 2] += radius
-            sums[to, 3] += level
-            sums[to, 4] += 1.0
-    return sums
-
-
-@compiled
-def _colored(image, sums, closed, grid, strongest, far):  # type: ignore[no-untyped-def]
-    """The places that any cell sees and that are not closed: axial, brightness against the inks, how white, 0 where it
-    is colored, how many cells tell, and (D, 3) their colors.
+def _colored(image, means, strongest, far):  # type: ignore[no-untyped-def]
+    """Of foreseen places (P, 4) the brightness against the inks, how white, 0 where it is colored, and (P, 3) their
+    colors.
 
     Far from the next cell a prediction may hit a colored cell: there only the weakest channel tells.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    count = np.count_nonzero((sums[:, 4] > 0.0) & ~closed)
-    places, seen = np.empty((count, 2), np.int32), np.zeros((count, 3))
-    ratio, white, votes = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
-    room, begin, found = room_for_samples(), 0, 0
-    patches, level = room.patches, np.empty(POINTS)
-    for place in range(sums.shape[0]):
-        number = sums[place, 4]
-        if number > 0.0 and not closed[place]:
-            places[found, 0], places[found, 1] = place // grid[3] + grid[0], place % grid[3] + grid[1]
-            votes[found] = int(number)
-            n = found - begin
-            patches[X + n], patches[Y + n] = sums[place, 0] / number, sums[place, 1] / number
-            patches[RADIUS + n], level[n] = sums[place, 2] / number, sums[place, 3] / number
-            found += 1
-        if found - begin == POINTS or (place == sums.shape[0] - 1 and found > begin):
-            sample_patches(flat, height, width, found - begin, room)
-            for n in range(begin, found):
-                ratio[n], white[n] = _judged(patches, n - begin, level[n - begin], strongest, far, seen[n])
-            begin = found
-    return places, ratio, white, votes, seen
+    count = means.shape[0]
+    ratio, white, seen = np.zeros(count), np.zeros(count), np.zeros((count, 3))
+    room = room_for_samples()
+    patches = room.patches
+    for first in range(0, count, POINTS):
+        here = min(count - first, POINTS)
+        for n in range(here):
+            patches[X + n], patches[Y + n] = means[first + n, 0], means[first + n, 1]
+            patches[RADIUS + n] = means[first + n, 2]
+        sample_patches(flat, height, width, here, room)
+        for n in range(here):
+            level, own = means[first + n, 3], seen[first + n]
+            ratio[first + n], white[first + n] = _judged(patches, n, level, strongest, far, own)
+    return ratio, white, seen
 
 
 @compiled
@@ -326,11 +220,11 @@ def _judged(patches, n, level, strongest, far, seen):  # type: ignore[no-untyped
 def _tried(image, center, at, known, places, layout, inks, black):  # type: ignore[no-untyped-def]
     """(P, N) int32 what ``_put`` makes of the known cells at each place, (P,) how many of them have one in the layout,
     and (P, 2) px the middle of the white cell: 0 and NaN where it is not there."""
-    cell_of, layers, white_mm, to_mm, center_mm = layout
+    holder, white_mm, to_mm, center_mm = layout
     cell, inside = np.empty((places.shape[0], at.shape[0]), np.int32), np.zeros(places.shape[0], np.int64)
     middle = np.full((places.shape[0], 2), np.nan)
     for n in range(places.shape[0]):
-        count = _put(at, known, places[n], cell_of, layers, cell[n])
+        count = _put(at, known, places[n], holder, cell[n])
         if count > 0:
             middle[n] = white_cell(image, center, cell[n], white_mm, to_mm, center_mm, inks, black)
             inside[n] = 0 if np.isnan(middle[n, 0]) else count
@@ -338,7 +232,7 @@ def _tried(image, center, at, known, places, layout, inks, black):  # type: igno
 
 
 @compiled
-def _put(at, known, place, cell_of, layers, out):  # type: ignore[no-untyped-def]
+def _put(at, known, place, holder, out):  # type: ignore[no-untyped-def]
     """Write the layout's cell of each known cell, or -1, where a down-cell at the axial place is the white one; how
     many have one, 0 where too many have none.
 
@@ -349,8 +243,7 @@ def _put(at, known, place, cell_of, layers, out):  # type: ignore[no-untyped-def
     out[:] = -1
     for i in known:
         q, r = turned_place(at[i, 0] - place[0] + turn, at[i, 1] - place[1], turn)
-        if layer_of(q, r) <= layers:
-            out[i] = cell_of[marker_id(q, r)]
+        out[i] = cell_at(holder, q, r)
         if out[i] < 0:
             outside += 1
             if outside > MAX_OUTSIDE * known.shape[0]:
