@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .engine import compiled, lent
-from .levels import BLACK, Levels, disc_of
+from .levels import BLACK, Levels, disc_in, disc_of
 from .topology import Topology
 
 MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
@@ -24,34 +24,28 @@ SAME = 0.0003  # nor does so much more or less
 def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
     """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
     blur ``assumed``, NaN where the cell is not known; and the median of that."""
-    inscribed, variance = _discs(xy, cells, assumed)
-    return _bled(inscribed, variance, sigma)
-
-
-@compiled
-def _discs(xy, cells, sigma):  # type: ignore[no-untyped-def]
-    """(K,) the radius of each cell's inscribed circle, and the variance in one direction of the pixels that its level
-    is taken from."""
-    inscribed, variance = np.empty(cells.shape[0]), np.empty(cells.shape[0])
+    inscribed = _inscribed(xy, cells)
+    out = np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        inscribed[i], radius = disc_of(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], sigma)
-        variance[i] = 0.25 * radius * radius
-    return inscribed, variance
-
-
-@compiled
-def _bled(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
-    out = np.full(inscribed.shape[0], np.nan)
-    for i in range(inscribed.shape[0]):
-        if np.isfinite(inscribed[i]):
-            out[i] = _share(inscribed[i], variance[i], sigma)
+        out[i] = _share(inscribed[i], assumed, sigma)
     return out, np.nanmedian(out)
 
 
+@compiled
+def _inscribed(xy, cells):  # type: ignore[no-untyped-def]
+    """(K,) the radius of each cell's inscribed circle, NaN where the cell is not known."""
+    out = np.empty(cells.shape[0])
+    for i in range(cells.shape[0]):
+        out[i] = disc_of(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], 0.0)[0]
+    return out
+
+
 @lent
-def _share(inscribed, variance, sigma):  # type: ignore[no-untyped-def]
-    """What a blur makes of each neighbour in the mean of one cell's disc."""
-    return 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + variance)))
+def _share(inscribed, assumed, sigma):  # type: ignore[no-untyped-def]
+    """What a blur makes of each neighbour in the mean of one cell's disc, which is taken with another blur assumed."""
+    radius = disc_in(inscribed, assumed)
+    # a disc's pixels have a quarter of its radius squared for their variance in one direction
+    return 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
 
 
 def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float) -> Levels:
@@ -99,12 +93,12 @@ def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float
 @compiled
 def _rebled(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
     """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
-    inscribed, variance = _discs(xy, cells, 0.0)
-    size, spread = np.nanmedian(inscribed), np.nanmedian(variance)
-    usual, more = _share(size, spread, drawn), _share(size, spread, sigma)
+    inscribed = _inscribed(xy, cells)
+    size = np.nanmedian(inscribed)
+    usual, more = _share(size, 0.0, drawn), _share(size, 0.0, sigma)
     if max(usual, more) < LITTLE or abs(more - usual) < SAME:
         return False, cell, slope, black
-    before, usual = _bled(inscribed, variance, drawn)
-    after, more = _bled(inscribed, variance, sigma)
-    left = 1.0 - 6.0 * min(usual, MAX_SHARE)
-    return (True, *_unbled(cell, slope, black, color, (after - before) / left, (more - usual) / left))
+    left, change = 1.0 - 6.0 * min(usual, MAX_SHARE), np.empty(cells.shape[0])
+    for i in range(cells.shape[0]):
+        change[i] = (_share(inscribed[i], 0.0, sigma) - _share(inscribed[i], 0.0, drawn)) / left
+    return (True, *_unbled(cell, slope, black, color, change, (more - usual) / left))

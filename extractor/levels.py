@@ -58,8 +58,14 @@ def disc_of(a, b, c, sigma):  # type: ignore[no-untyped-def]
     around += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
     around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
     inscribed = area / max(around, 1e-9)
+    return inscribed, disc_in(inscribed, sigma)
+
+
+@compiled
+def disc_in(inscribed, sigma):  # type: ignore[no-untyped-def]
+    """The radius of that disc, by the inscribed circle's."""
     most = DISC if sigma == 0.0 else DISC_BEFORE
-    return inscribed, max(min(most * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
+    return max(min(most * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
 
 
 @compiled
