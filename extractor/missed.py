@@ -16,6 +16,7 @@ SMALL_AREA_PX = 30  # of a cell at the reduced scale; larger ones show all that 
 MIN_COSINE = 0.9  # between a color and the ink that should be there, grey taken off
 MIN_STRENGTH = 0.4  # of the ink's strength
 RADIUS = 0.12  # of the square root of a cell's area, over which colors are averaged
+WITNESSES = 60  # cells that say what the inks look like
 
 
 def missed(image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice, scale: int) -> int:
@@ -53,10 +54,10 @@ def _missed(image, center_px, area_px, cell, plan, small_px):  # type: ignore[no
 
 @compiled
 def _usual(image, center_px, area_px, cell, numbered, ink):  # type: ignore[no-untyped-def]
-    """(4, 3) the mean colors of the inks, grey taken off, 0 where there is none, and their strength."""
+    """(4, 3) the mean colors of the inks by some cells, grey taken off, 0 where there is none, and their strength."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     usual, strength, color, own = np.zeros((4, 3)), np.zeros(4), np.zeros(3), np.zeros(4)
-    for i in numbered:
+    for i in numbered[:: max(1, numbered.shape[0] // WITNESSES)]:
         radius = RADIUS * np.sqrt(area_px[i])
         if sample_patch(flat, height, width, center_px[i, 0], center_px[i, 1], radius, color):
             for channel in range(3):
