@@ -1,7 +1,7 @@
 """A step by synthesis around some markers: what is drawn anew there is read, judged and solved, and nothing else.
 
 The markers that are drawn anew are solved together with those beside them, between others that are held where the last
-step left them. Levels, blur and swelling are what the last step from everything said.
+step left them. Levels, blur, noise, swelling and what misfit is usual are what the last step from everything said.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .offsets import foot_of
 from .settling import beside
 from .sight import Sight
 from .step import JUDGED_BY_PIXELS, PRIOR_PX, completed_around
-from .stepping import PRIOR_BEYOND_PX, middles, misfits, noise_of, strides, usual_misfit, votes, weighed
+from .stepping import PRIOR_BEYOND_PX, middles, misfits, strides, votes, weighed
 from .swelling import unswollen
 from .topology import Topology
 
@@ -54,8 +54,7 @@ class Read(NamedTuple):
         lines, contrasts, sums, bend: as drawn and read, bending eliminated from the sums.
         to_a, to_b, off: the votes, and how the levels' change explains some.
         loose, kept: how freely they bend, and what their bending is.
-        use, misfit: how far they are trusted, and why. usual: misfit, of all gridlines. aside: px, as the cells are
-            swollen.
+        use: how far they are trusted. aside: px, as the cells are swollen.
     """
 
     lines: NDArray[np.float64]
@@ -68,8 +67,6 @@ class Read(NamedTuple):
     loose: NDArray[np.float64]
     kept: NDArray[np.float64]
     use: NDArray[np.float64]
-    misfit: NDArray[np.float64]
-    usual: float
     aside: NDArray[np.float64]
 
 
@@ -96,33 +93,31 @@ def stepped_around(
         fit.loose,
         fit.information.beside,
         reading.use,
-        fit.misfit,
         reading.foot,
         reading.aside,
     )
     changes = bettered.cell - levels.cell, bettered.black - levels.black
-    said = fit.noise, fit.swelling, wide, changes
+    said = fit.noise, fit.usual, fit.swelling, wide, changes
     given = view.image, tuple(board), anew, tables, look, tuple(drawing[:6])
-    drew, markers, gridlines, noise = _around(*given, markers, gridlines, said)
+    drew, markers, gridlines = _around(*given, markers, gridlines, said)
     xy, lines, drawn_bend, contrasts, black, sums = drew
     drawing = drawing._replace(
         xy=xy, lines=lines, bend=drawn_bend, contrasts=contrasts, black=black, sums=sums
     )
     measured, guiding, beyond, maps, rough, stepped, diagonal = markers
     where = {"xy": xy, "measured": measured, "guiding": guiding, "beyond": beyond, "maps": maps}
-    bend, loose, joined, use, misfit, foot, aside = gridlines
-    how = {"bend": bend, "loose": loose, "rough": rough, "strides": stepped, "misfit": misfit, "noise": noise}
-    about = {"foot": foot, "use": use, "aside": aside, "noise": noise}
-    reading = reading._replace(lines=lines, contrasts=contrasts, **about)
+    bend, loose, joined, use, foot, aside = gridlines
+    how = {"bend": bend, "loose": loose, "rough": rough, "strides": stepped}
+    reading = reading._replace(lines=lines, contrasts=contrasts, foot=foot, use=use, aside=aside)
     return fit._replace(**where, **how, information=Information(diagonal, joined), reading=reading), drawing
 
 
 @compiled
 def _around(image, board, anew, tables, look, before, markers, gridlines, said):  # type: ignore[no-untyped-def]
-    """The first six of a ``Drawing``; of the fit what belongs to markers, what belongs to gridlines, and the noise."""
+    """The first six of a ``Drawing``; of the fit what belongs to markers, and what belongs to gridlines."""
     sides, (spokes, near, offset, stencil, ahead, third) = tables
     measured, guiding, maps, rough, stepped, known = markers
-    edges, bend, wide = sides[2], gridlines[0], said[2]
+    edges, bend, wide = sides[2], gridlines[0], said[3]
     xy, beyond, maps = completed_around(guiding, anew, maps, near, offset, stencil)
     free = anew.copy()
     beside(anew, edges, free)
@@ -136,8 +131,7 @@ def _around(image, board, anew, tables, look, before, markers, gridlines, said):
     where = _moved(drew[0], away, diagonal, part, measured, guiding, stepped, known)
     measured, guiding, stepped, known = where
     lines = _told(drew, away, joined, part, read, gridlines)
-    noise = noise_of(lines[4], lines[3], read.usual)
-    return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines, noise
+    return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines
 
 
 @compiled
@@ -161,10 +155,10 @@ def _part(free, beyond, rough, away, edges, spokes):  # type: ignore[no-untyped-
 
 @compiled
 def _read(drew, part, edge_cells, gridlines, look, said):  # type: ignore[no-untyped-def]
-    """What was read along the gridlines of a part, judged among all of them."""
-    use, before = gridlines[3], gridlines[4]
+    """What was read along the gridlines of a part, judged as all of them were."""
+    use = gridlines[3]
     _, lines, bend, contrasts, _, sums = drew
-    noise, swelling, _, changes = said
+    noise, usual, swelling, _, changes = said
     values, least, unjudged = JUDGED_BY_PIXELS
     which, frame, sigma, variance = part.which, look[2], look[3], noise**2
     sums, lines, contrasts = rows_of(sums, which), rows_of(lines, which), rows_of(contrasts, which)
@@ -177,9 +171,8 @@ def _read(drew, part, edge_cells, gridlines, look, said):  # type: ignore[no-unt
         loose = freedom(sums, to_a, to_b, off, bend, part.rough, *about)
     kept = eliminate(sums, to_a, to_b, off, bend, loose, variance)
     misfit, pardon = misfits(sums, to_a, to_b, values, least), hidden_misfit(loose, contrasts, sigma)
-    usual = usual_misfit(replaced(before, which, misfit))
     trusted = weighed(sums, misfit, usual, pardon, values, unjudged)
-    return Read(lines, contrasts, sums, to_a, to_b, off, bend, loose, kept, trusted, misfit, usual, aside)
+    return Read(lines, contrasts, sums, to_a, to_b, off, bend, loose, kept, trusted, aside)
 
 
 @compiled
@@ -223,12 +216,12 @@ def _moved(xy, away, diagonal, part, measured, guiding, stepped, known):  # type
 
 @compiled
 def _told(drew, away, own, part, read, gridlines):  # type: ignore[no-untyped-def]
-    """Of all gridlines, those of the part as they were read: bending, how freely, information beside, use, misfit, foot
-    and how far aside."""
-    which, (bend, loose, joined, use, misfit, foot, aside) = part.which, gridlines
+    """Of all gridlines, those of the part as they were read: bending, how freely, information beside, use, foot and how
+    far aside."""
+    which, (bend, loose, joined, use, foot, aside) = part.which, gridlines
     own_bend = bent(read.bend, read.kept, away, read.lines, part.ends)
     own_foot = foot_of(read.contrasts, rows_of(drew[4], which), read.off)
     bend, joined = with_rows(bend, which, own_bend), with_rows(joined, which, own)
     loose, use = replaced(loose, which, read.loose), replaced(use, which, read.use)
-    misfit, foot = replaced(misfit, which, read.misfit), replaced(foot, which, own_foot)
-    return bend, loose, joined, use, misfit, foot, replaced(aside, which, read.aside)
+    foot, aside = replaced(foot, which, own_foot), replaced(aside, which, read.aside)
+    return bend, loose, joined, use, foot, aside

@@ -24,7 +24,7 @@ from .presets import Steps
 from .settling import SLOW, bent_share, effort, still_moving, unsettled, usual_deviation
 from .sight import Frame, Sight
 from .step import JUDGED_BY_PIXELS, listened, moved_on, placed, roughened, solution
-from .stepping import middles, trust, usual_edge, votes, widening
+from .stepping import middles, trust, votes, widening
 from .swelling import swelling_of, unswollen
 from .synthesis import edge_contrasts
 from .topology import Topology
@@ -35,7 +35,6 @@ SAME_BLUR = 0.03  # of the blur, by which it may be wrong in a drawing that is k
 SAME_LEVELS = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
 NOISY_BLUR, NOISY_LEVELS = 0.75, 0.18  # of how far noise moves these, in units of the blur
 MOST_BLUR = 0.2  # of the blur, which no noise explains
-NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
 SMALL_BLUR = 0.12  # of a short edge; beyond that, blur, levels and places settle together;
 BENT = 0.02  # of an edge, and where gridlines are bent by more,
 MANY_BENT = 0.25  # of them, each step bends others. Then
@@ -81,20 +80,23 @@ class Draughtsman:
         fit, drawing = self._first(view, _stiff(fit))
         return _farther(fit, drawing), effort(drawing.edge_px)
 
-    def steps(self, view: Sight, fit: Fit, steps: Steps, edge_px: float, spent: float = 0.0) -> Fit:
+    def steps(
+        self, view: Sight, fit: Fit, steps: Steps, edge_px: float, usual_px: float, spent: float = 0.0
+    ) -> Fit:
         """The fit after as many steps as it takes, or as a preset allows.
 
         Args:
-            edge_px: a short edge in the view.
+            edge_px, usual_px: a short edge in the view, and a usual one, if these are much blurred.
             spent: the effort of a step that has already been taken.
         """
         begun = spent > 0.0
-        wide = self._wide(fit, edge_px)
+        wide = fit.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
         fit, drawing = self._first(view, self._free(fit, wide))
         size, least, tries = drawing.edge_px, len(fit.xy), 0
         share = _share_where_wide(view) if wide else 1.0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = 1.0 if wide else steps.many
+        resolved = np.inf if wide or steps.near == 0.0 else SMALL_BLUR
         spent += effort(size)
         for step in range(MAX_STEPS - 1):
             there = _farther(fit, drawing)
@@ -102,12 +104,12 @@ class Draughtsman:
             allowed = steps.effort * (HARD_EFFORT if hard else share)
             if (begun or step > 0) and spent + effort(size, 0.0) > allowed:
                 break  # whatever still moves
-            near = steps.near * min(drawing.sigma, (NEAR_BLUR * edge_px) ** 2 / drawing.sigma)
-            about = there.measured, drawing.xy, fit.strides, near, steps.enough, steps.few
             assert fit.reading is not None
-            tables = fit.reading.use, self._mesh.spokes, self._mesh.edges
+            moves = there.measured, drawing.xy, fit.strides
             explained = fit.noise < EXPLAINED * fit.grain
-            anew, moving, dirty = still_moving(*about, many, steps.most, explained, *tables)
+            rule = steps.near, drawing.sigma, resolved, steps.enough, steps.few, many, steps.most, explained
+            tables = fit.reading.use, self._mesh.spokes, self._mesh.edges
+            anew, moving, dirty = still_moving(*moves, *rule, *tables)
             other = _looks_other(fit, drawing, steps.enough) and (wide or not dirty)
             count = np.count_nonzero(anew)
             everything = bool(other or count > MAX_AGAIN * len(anew))
@@ -126,12 +128,6 @@ class Draughtsman:
             there = _farther(fit, drawing)
         slow = SLOW * (drawing.sigma / size) ** 2 if wide else 0.0
         return there._replace(unsettled=unsettled(there.measured - drawing.xy, drawing.sigma, slow))
-
-    def _wide(self, fit: Fit, edge_px: float) -> bool:
-        """Whether a usual edge is blurred into the next; ``edge_px`` is a short one."""
-        if fit.sigma < WIDE_BLUR * edge_px:
-            return False
-        return bool(fit.sigma > WIDE_BLUR * usual_edge(fit.xy, self._mesh.edges))
 
     def _free(self, fit: Fit, wide: bool) -> Fit:
         """The fit with how freely its gridlines may bend: not at all where the blur is ``wide``. There they would
@@ -159,20 +155,20 @@ class Draughtsman:
         tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
         inks = bettered.cell, bettered.slope
         read, wider, noise, *step = _step(seen, changes, inks, now, tables, tuple(frame))
-        use, misfit, loose, foot, swelling, aside = read
+        use, usual, loose, foot, swelling, aside = read
         how = NO_ROOM, use, aside, drawing.sigma, noise, True
         reading = Reading(drawing.lines, drawing.contrasts, foot, *how)
         sigma = _widened(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNMIXED * drawing.edge_px:
             bettered = rebled(bettered, fit.xy, mesh, drawing.sigma, sigma)
         about = {"loose": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
-        return moved_on(fit, step, misfit=misfit, swelling=swelling, **about)
+        return moved_on(fit, step, usual=usual, swelling=swelling, **about)
 
 
 @compiled
 def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-def]
-    """Use, misfit, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside for it;
-    by how much it says that the blur is larger; its noise; and the solution.
+    """Use, usual misfit, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside
+    for it; by how much it says that the blur is larger; its noise; and the solution.
 
     Args:
         seen: lines, contrasts, black, sums and blur of a drawing.
@@ -190,7 +186,7 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     aside = unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling)
     said = bend, rough, before, lines, edges, noise
     loose, kept = listened(sums, to_a, to_b, off, *said, values, least, unjudged)
-    use, misfit, found = trust(
+    use, usual, found = trust(
         sums, to_a, to_b, hidden_misfit(loose, contrasts, sigma), values, least, unjudged
     )
     noise = found if np.isfinite(found) else noise
@@ -198,7 +194,7 @@ def _step(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-d
     step = solution(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
     current = edge_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
     wider = widening(sums, aside, use, contrasts, current, sigma)
-    return ((use, misfit, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
+    return ((use, usual, loose, foot_of(contrasts, black, off), swelling, aside), wider, noise) + step
 
 
 def _stiff(fit: Fit) -> Fit:

@@ -86,7 +86,7 @@ class Fit(NamedTuple):
         bend: (E, 2) px, by how much they do.
         strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
         reading: what that step saw.
-        misfit: (E,) of the gridlines, as ``misfits`` gives it; None where nothing is drawn.
+        usual: by how much gridlines miss what they show, as ``usual_misfit`` gives it; NaN where nothing is drawn.
         swelling: by how much the sides of all cells have moved outward, px.
         unsettled: (M, 2, 2) px^2, what it may have left; None where nothing is drawn.
     """
@@ -106,7 +106,7 @@ class Fit(NamedTuple):
     bend: NDArray[np.float64]
     strides: NDArray[np.float64]
     reading: Reading | None
-    misfit: NDArray[np.float64] | None = None
+    usual: float = np.nan
     swelling: float = 0.0
     unsettled: NDArray[np.float64] | None = None
 

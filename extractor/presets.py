@@ -22,7 +22,7 @@ class Steps(NamedTuple):
         effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are
             allowed in any case.
         enough: no more steps once no marker moves by more than so many of its standard deviations
-        near: and by more than this share of the blur,
+        near: and by more than this share of the blur, or less where gridlines are short,
         few: but for this share of the markers;
         patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
         many: with the markers that move, those beside them are drawn anew, unless these are more than twice this share,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bending import around
-from .drawing import MIN_SIGMA_PX, SMALL_BLUR, Draughtsman
+from .drawing import MIN_SIGMA_PX, SMALL_BLUR, WIDE_BLUR, Draughtsman
 from .engine import compiled
 from .fit import Across, Fit, Refined, Seen
 from .information import Information
@@ -117,7 +117,8 @@ class Refiner:
         sights: Sights | None = None,
     ) -> Refined:
         """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge. With
-        ``sights``, a first step may be taken in a coarser view."""
+        ``sights``, a first step may be taken at twice the scale, where blur and usual gridlines allow that and only
+        short ones do not."""
         mesh, steps, places, edge_px = self._mesh, self._steps, _in(view, places), edge_px / view.scale
         if fit.swelling != 0.0:
             places = replace(places, xy_px=shrunk(places.xy_px, mesh.cells, fit.swelling))
@@ -131,17 +132,17 @@ class Refiner:
             xy[strays], cov[strays] = np.nan, np.nan
             doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
             return self._refined(view, fit, xy, cov, ~doubted, places)
-        start, spent = self._nearer(sights, view, start) if sights else (start, 0.0)
-        fit = self._draughtsman.steps(view, start, steps, edge_px, spent)
+        coarser = start.sigma >= 2 * COARSE_BLUR * steps.finest
+        blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
+        usual_px, spent = usual_edge(start.xy, mesh.edges) if blurred else edge_px, 0.0
+        if sights and coarser and usual_px >= 2 * COARSE_EDGE_PX:
+            start, spent = self._nearer(view, start, sights.at(2 * view.scale))
+        fit = self._draughtsman.steps(view, start, steps, edge_px, usual_px, spent)
         return self._result(view, fit, sides, places)
 
-    def _nearer(self, sights: Sights, view: Sight, fit: Fit) -> tuple[Fit, float]:
-        """The fit after a first step at twice the scale, and what this cost, where the blur and usual gridlines allow
-        that scale, and only short ones do not: the markers start nearer then, for a fraction of a step."""
-        blurred = fit.sigma >= 2 * COARSE_BLUR * self._steps.finest
-        if not blurred or usual_edge(fit.xy, self._mesh.edges) < 2 * COARSE_EDGE_PX:
-            return fit, 0.0
-        coarse = sights.at(2 * view.scale)
+    def _nearer(self, view: Sight, fit: Fit, coarse: Sight) -> tuple[Fit, float]:
+        """The fit after a first step in a coarser view, and what this cost: the markers start nearer then, for a
+        fraction of a step."""
         stepped, spent = self._draughtsman.approach(coarse, rescaled(fit, view, coarse))
         return placed(self._mesh, rescaled(stepped, coarse, view)), spent
 
@@ -195,10 +196,11 @@ def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
     ratio = old.scale / view.scale
     # a pixel's own variance is a twelfth of its area
     blur2 = (old.scale * fit.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
+    there = 0.5 * ratio - 0.5  # of a pixel's middle
     return fit._replace(
-        xy=view.reduced(old.full(fit.xy)),
-        measured=view.reduced(old.full(fit.measured)),
-        guiding=view.reduced(old.full(fit.guiding)),
+        xy=ratio * fit.xy + there,
+        measured=ratio * fit.measured + there,
+        guiding=ratio * fit.guiding + there,
         maps=ratio * fit.maps,
         sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
         swelling=ratio * fit.swelling,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .engine import compiled
+from .engine import compiled, lent
 
 USUAL_EDGE_PX = 10.0
+NEAR_BLUR = 0.06  # of an edge; what is more blurred answers less simply to a shift
 LEFT, MOST_LEFT = 1.0, 0.5  # of a step, per blur, that another step would still correct; and at most
 # Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
 SLOW = 20.0
@@ -23,20 +24,28 @@ def effort(size_px: float, share: float | None = None) -> float:
 
 
 @compiled
-def still_moving(measured, drawn, strides, near, enough, few, many, most, explained, use, spokes, edges):  # type: ignore[no-untyped-def]
+def still_moving(  # type: ignore[no-untyped-def]
+    measured, drawn, strides, near, sigma, resolved, enough, few, many, most, explained, use, spokes, edges
+):
     """(M,) bool, the markers to draw anew; how many move or are beside those that do, none where no more than ``few``
     (a share of all) move; and whether it is dirt that moves them.
 
-    Those move that are more than ``near`` px and ``enough`` deviations from where they are drawn. With them go those
-    beside them, unless these are more than twice ``many``, but no more than that move. Where it is dirt that moves
-    them, once these are more than ``many``, only those go that move the farthest, at most the share ``most``, and once
-    these are more than twice as many, none, if the drawing has ``explained`` the image elsewhere.
+    Those move that are more than ``near``, a share of the blur ``sigma``, and ``enough`` deviations from where they are
+    drawn; but no marker with a gridline of which the blur is more than the share ``resolved``: what is so small is
+    hardly read better from elsewhere. With them go those beside them, unless these are more than twice ``many``, but no
+    more than that move. Where it is dirt that moves them, once these are more than ``many``, only those go that move
+    the farthest, at most the share ``most``, and once these are more than twice as many, none, if the drawing has
+    ``explained`` the image elsewhere.
     """
     count = drawn.shape[0]
     far, found = np.zeros(count), 0
     for m in range(count):
+        if not strides[m] > enough:
+            continue
+        edge = _shortest(m, drawn, spokes, edges)
+        least = near * min(sigma, (NEAR_BLUR * edge) ** 2 / sigma)
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
-        if dx * dx + dy * dy > near * near and strides[m] > enough:
+        if dx * dx + dy * dy > least * least and not sigma > resolved * edge:
             far[m] = dx * dx + dy * dy
             found += 1
     if found <= few * count:
@@ -53,6 +62,19 @@ def still_moving(measured, drawn, strides, near, enough, few, many, most, explai
         rest = max(count - int(most * count), 1)
         return far > np.partition(far, rest - 1)[rest - 1], touched, dirty
     return moving if touched > 2 * many * count else out, touched, dirty
+
+
+@lent
+def _shortest(m, xy, spokes, edges):  # type: ignore[no-untyped-def]
+    """The length of the shortest gridline at a marker, px; infinite where none is known."""
+    square = np.inf
+    for k in range(spokes.shape[1]):
+        e = spokes[m, k]
+        if e >= 0:
+            dx, dy = xy[edges[e, 0], 0] - xy[edges[e, 1], 0], xy[edges[e, 0], 1] - xy[edges[e, 1], 1]
+            own = dx * dx + dy * dy
+            square = own if own < square else square
+    return np.sqrt(square)
 
 
 @compiled

@@ -110,7 +110,7 @@ def usual_misfit(misfit):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def noise_of(misfit, use, usual):  # type: ignore[no-untyped-def]
+def _noise_of(misfit, use, usual):  # type: ignore[no-untyped-def]
     """The noise by the gridlines' misfit (E,), the ``usual`` one, and how far they are in ``use`` (E,); NaN where none
     was judged."""
     sound = misfit[use == 1.0]
@@ -121,8 +121,8 @@ def noise_of(misfit, use, usual):  # type: ignore[no-untyped-def]
 
 @compiled
 def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; (E,) their misfit; and the noise
-    (NaN where nothing was read).
+    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; their usual misfit, and
+    the noise (NaN where nothing was read).
 
     Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
     misfit of less than its ``pardon`` (E,) is always forgiven.
@@ -130,7 +130,7 @@ def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no
     misfit = misfits(sums, to_a, to_b, values, least)
     usual = usual_misfit(misfit)
     use = weighed(sums, misfit, usual, pardon, values, unjudged)
-    return use, misfit, noise_of(misfit, use, usual)
+    return use, usual, _noise_of(misfit, use, usual)
 
 
 @compiled

@@ -178,37 +178,52 @@ def dirty_at(edges: NDArray[np.int32], trust: float = 0.2, explained: bool = Tru
 
 def test_moving_markers_bring_their_neighbours() -> None:
     edges = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
-    drawn = np.zeros((4, 2))
-    measured = np.array([[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]])
+    drawn = np.array([[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [60.0, 0.0]])
+    measured = drawn + [[0.2, 0.0], [0.05, 0.0], [0.2, 0.0], [np.nan, np.nan]]
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
     moving = measured, drawn, strides
-    anew, count, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges))
+    far, much = (0.1, 1.0, np.inf, 5.0), (0.3, 1.0, np.inf, 5.0)
+    anew, count, dirty = still_moving(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2 and dirty
-    assert not still_moving(*moving, 0.1, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[2]  # nothing is hidden
-    anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.25, 1.0, 1.0, *dirty_at(edges))
+    assert not still_moving(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[2]  # nothing is hidden
+    anew, count, _ = still_moving(*moving, *far, 0.25, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.25, *dirty_at(edges))
+    anew, count, _ = still_moving(*moving, *far, 0.0, 0.5, 0.25, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     between = np.array([[0, 1], [0, 2], [0, 3]], np.int32)
-    anew, count, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, *dirty_at(between))
+    anew, count, dirty = still_moving(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between))
     np.testing.assert_array_equal(anew, [True, False, False, False])
     assert count == 4 and dirty  # with those beside it, all are
-    anew, count, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 0.4, 0.75, *dirty_at(between))
+    anew, count, dirty = still_moving(*moving, *far, 0.0, 0.4, 0.75, *dirty_at(between))
     assert count == 0 and not anew.any() and dirty  # all is dirty
     unexplained = dirty_at(between, explained=False)
-    anew, count, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.4, 0.75, *unexplained)
+    anew, count, _ = still_moving(*moving, *far, 0.0, 0.4, 0.75, *unexplained)
     assert count == 4 and anew.all()
-    anew, _, dirty = still_moving(*moving, 0.1, 5.0, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
+    anew, _, dirty = still_moving(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
     assert anew.all() and not dirty
-    anew, _, _ = still_moving(*moving, 0.1, 5.0, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
+    anew, _, _ = still_moving(*moving, *far, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
     np.testing.assert_array_equal(anew, [True, False, False, False])
-    anew, count, _ = still_moving(*moving, 0.3, 5.0, 0.0, 1.0, 1.0, *dirty_at(edges))
+    anew, count, _ = still_moving(*moving, *much, 0.0, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
     beside(np.array([False, False, False, True]), edges, out)
     np.testing.assert_array_equal(out, [False, False, True, False])
     np.testing.assert_array_equal(chosen(out, np.ones((4, 2)), np.zeros((4, 2)))[:, 0], [0, 0, 1, 0])
+
+
+def test_how_far_a_marker_must_move_is_told_by_the_shortest_gridline_there() -> None:
+    """Of markers that move alike, those between short gridlines go, and not those where blur is all that is seen."""
+    edges = np.array([[0, 1], [2, 3], [4, 5]], np.int32)
+    drawn = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 50.0], [10.0, 50.0], [0.0, 90.0], [6.0, 90.0]])
+    moving = drawn + [0.0, 0.05], drawn, np.full(6, 9.0)
+    usual = 0.0, 1.0, 1.0, *dirty_at(edges, 1.0)
+    assert still_moving(*moving, 0.0, 1.0, np.inf, 5.0, *usual)[0].all()
+    # a tenth of the blur is too far; of the share that short gridlines answer with, 0.36 and 0.13, it is not
+    anew = still_moving(*moving, 0.1, 1.0, np.inf, 5.0, *usual)[0]
+    np.testing.assert_array_equal(anew, [False, False, True, True, True, True])
+    anew = still_moving(*moving, 0.1, 1.0, 0.12, 5.0, *usual)[0]
+    np.testing.assert_array_equal(anew, [False, False, True, True, False, False])
 
 
 @given(
@@ -220,10 +235,11 @@ def test_where_many_move_the_farthest_are_drawn_anew(far: list[float], most: flo
     """Each marker has one beside it that does not move: with these, they are twice as many."""
     half, near = len(far), 0.2
     edges = np.stack([np.arange(half), half + np.arange(half)], axis=1).astype(np.int32)
-    measured = np.concatenate([far, np.zeros(half)])[:, None] * np.array([0.6, 0.8])
-    away = np.linalg.norm(measured, axis=1)
+    shift = np.concatenate([far, np.zeros(half)])[:, None] * np.array([0.6, 0.8])
+    drawn = np.stack([np.repeat([0.0, 30.0], half), np.tile(50.0 * np.arange(half), 2)], axis=1)
+    away = np.linalg.norm(shift, axis=1)
     assume(np.abs(away - near).min() > 1e-9 and np.diff(np.sort(away[:half])).min() > 1e-9)
-    about = measured, np.zeros((2 * half, 2)), np.full(2 * half, 9.0), near, 5.0, 0.0
+    about = drawn + shift, drawn, np.full(2 * half, 9.0), near, 1.0, np.inf, 5.0, 0.0
     anew, touched, dirty = still_moving(*about, many, most, *dirty_at(edges))
     moving = np.count_nonzero(away > near)
     assert dirty == (moving > 0)
