@@ -10,7 +10,8 @@ from .information import covariances
 from .placing import MAX_APART
 from .step import PRIOR_PX
 
-MAX_SHIFT = 0.25  # in units of the edges around the marker
+MAX_SHIFT = 0.25  # in units of the edges around the marker,
+MAX_WHOLE_SHIFT = 0.13  # and where all of its triangles agree: in steep views these lie so far off
 MAX_SIGMA = 0.03  # of what is measured, in the same units
 MAX_STRANGE = 0.13  # likewise, that a marker may be moved by where the drawing explains nothing well
 MAX_ASTRAY = 0.05  # likewise, of a marker that the image hardly shows, from where its neighbours put it
@@ -28,7 +29,7 @@ def sure_ones(measured, diagonal, beside, loose, edges, spokes, start, edge, who
     cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
     for m in range(xy.shape[0]):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        limit = (MAX_APART if whole[m] else MAX_SHIFT) * edge[m]
+        limit = (MAX_WHOLE_SHIFT if whole[m] else MAX_SHIFT) * edge[m]
         cov[m, 0, 0] += HIDDEN**2 * hidden[m]
         cov[m, 1, 1] += HIDDEN**2 * hidden[m]
         spread = cov[m, 0, 0] + cov[m, 1, 1]
