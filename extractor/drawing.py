@@ -53,6 +53,9 @@ MAX_STEPS = 10
 EXPLAINED = 2.0  # times the noise inside the cells: what a drawing leaves that explains all but dirt
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
+AFTER_DIRT = (
+    0.45  # of them, once dirt has moved some: so many are moved by dirt, whatever they look like then
+)
 NO_ROOM = np.empty((0, 4))
 
 
@@ -92,7 +95,7 @@ class Draughtsman:
         begun = spent > 0.0
         wide = fit.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
         fit, drawing = self._first(view, self._free(fit, wide))
-        size, least, tries = drawing.edge_px, len(fit.xy), 0
+        size, least, tries, soiled = drawing.edge_px, len(fit.xy), 0, False
         share = _share_where_wide(view) if wide else 1.0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = 1.0 if wide else steps.many
@@ -115,7 +118,9 @@ class Draughtsman:
             everything = bool(other or count > MAX_AGAIN * len(anew))
             spent += effort(size, None if everything else count / len(anew))
             tries = tries + 1 if moving >= least and not other else 0
-            ended = tries == patience or (dirty and not everything and step >= steps.in_dirt)
+            soiled = soiled or dirty
+            by_dirt = dirty or (soiled and count > AFTER_DIRT * len(anew))
+            ended = tries == patience or (by_dirt and not everything and step >= steps.in_dirt)
             if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
                 break
             least = min(least, len(fit.xy) if other else moving)

@@ -117,6 +117,31 @@ def test_no_image_takes_more_than_its_preset_allows(preset: str, monkeypatch: py
         assert len(taken) <= max(most, 2)
 
 
+@pytest.mark.parametrize(("share", "dirty", "steps"), [(0.4, True, 2), (0.5, True, 1), (0.5, False, 2)])
+def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
+    share: float, dirty: bool, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though the gridlines at those that move are trusted at the next look."""
+    looks, taken, plain = [0.1, share, 0.0], [], Draughtsman._again
+
+    def look(measured: NDArray[np.float64], *rest: Any) -> tuple[NDArray[np.bool_], int, bool]:
+        anew = np.arange(len(measured)) < looks[0] * len(measured)
+        first = len(looks) == 3
+        looks.pop(0)
+        return anew, int(anew.sum()), dirty and first
+
+    def counted(self: Draughtsman, *given: Any) -> Any:
+        taken.append(given)
+        return plain(self, *given)
+
+    monkeypatch.setattr("extractor.drawing.still_moving", look)
+    monkeypatch.setattr("extractor.drawing.effort", lambda *_: 0.1)
+    monkeypatch.setattr(Draughtsman, "_again", counted)
+    monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(patience=5))
+    Extractor(extractor("round").layout).extract(shown("round").image)
+    assert len(taken) == steps
+
+
 def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer markers are drawn anew, in fewer steps, and the error hardly grows."""
     taken: list[int] = []
