@@ -16,7 +16,7 @@ from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
 from extractor.excerpt import alone, rows_of, with_rows
 from extractor.regained import ELSEWHERE, _gridlines_around
-from extractor.sure import DIRT, dirtied, lost_ones, unsure_ones
+from extractor.sure import DIRT, MAX_SHIFT, MAX_WHOLE_SHIFT, dirtied, lost_ones, sure_ones, unsure_ones
 from extractor.topology import Topology, topology_of
 
 Array = NDArray[Any]
@@ -83,6 +83,21 @@ def test_what_hardly_shows_is_sure_only_where_others_put_it() -> None:
     assert np.isnan(xy[2:]).all() and np.isnan(cov[2:]).all() and np.isfinite(xy[:2]).all()
     lost = lost_ones(xy, cov, unsure, np.full((4, 2), np.nan), start, edge)  # nor where nobody knows
     assert lost.tolist() == [False, True, True, True]
+
+
+def test_a_marker_far_from_its_triangles_is_not_sure_and_less_so_where_all_agree() -> None:
+    """In a steep view triangles that agree lie 0.12 edges off: what synthesis says there stands."""
+    edges, spokes = np.array([[0, 1]], np.int32), np.full((2, 6), -1, np.int32)
+    spokes[:, 0] = 0
+    diagonal, beside = np.array([[1e4, 0.0, 1e4]] * 2), np.zeros((1, 4))
+    start, edge, every = np.array([[0.0, 0.0], [30.0, 0.0]]), np.full(2, 10.0), np.ones(2, np.bool_)
+    for whole, limit in ((True, MAX_WHOLE_SHIFT), (False, MAX_SHIFT)):
+        for share, sure in ((0.95, True), (1.05, False)):
+            near = start, edge, np.full(2, whole)
+            measured = start + [0.0, share * limit * 10.0]
+            xy, cov = sure_ones(measured, diagonal, beside, np.zeros(1), edges, spokes, *near, every)
+            assert np.isfinite(xy).all() == np.isfinite(cov).all() == sure
+    assert 0.12 < MAX_WHOLE_SHIFT < MAX_SHIFT
 
 
 def test_gridlines_that_are_not_trusted_widen_a_covariance_and_unread_ones_do_not() -> None:
