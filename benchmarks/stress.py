@@ -22,10 +22,7 @@ from benchmarks.stress_suite.kinds import Case
 from benchmarks.stress_suite.reading import Result, notable_lines, overlay, read, warm_up
 from benchmarks.stress_suite.report import failures, one_line, plot, rows_of, summary, table, write_json
 
-RUNS, FEW_RUNS = (
-    15,
-    5,
-)  # of an image, and of one of many alike: a median of fewer is off by 0.03 of the plain frame
+RUNS, FEW_RUNS = 15, 5  # of an image, and of one of many alike; a median of five is off by 0.03
 
 
 def _job(job: tuple[Case, int]) -> Result:
