@@ -53,9 +53,7 @@ MAX_STEPS = 10
 EXPLAINED = 2.0  # times the noise inside the cells: what a drawing leaves that explains all but dirt
 BOARDS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_AGAIN = 0.7  # of the markers may be drawn anew; for more, everything is
-AFTER_DIRT = (
-    0.45  # of them, once dirt has moved some: so many are moved by dirt, whatever they look like then
-)
+AFTER_DIRT = 0.45  # of them, once dirt has moved some: it is dirt that moves so many, too
 NO_ROOM = np.empty((0, 4))
 
 

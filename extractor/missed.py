@@ -57,7 +57,9 @@ def _usual(image, center_px, area_px, cell, numbered, ink):  # type: ignore[no-u
     """(4, 3) the mean colors of the inks by some cells, grey taken off, 0 where there is none, and their strength."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     usual, strength, color, own = np.zeros((4, 3)), np.zeros(4), np.zeros(3), np.zeros(4)
-    for i in numbered[:: max(1, numbered.shape[0] // WITNESSES)]:
+    every = max(1, numbered.shape[0] // WITNESSES)
+    every += every % 3 == 0  # along a row every third cell has the same ink
+    for i in numbered[::every]:
         radius = RADIUS * np.sqrt(area_px[i])
         if sample_patch(flat, height, width, center_px[i, 0], center_px[i, 1], radius, color):
             for channel in range(3):

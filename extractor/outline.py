@@ -52,9 +52,7 @@ def _settled(at, axial, holder):  # type: ignore[no-untyped-def]
 def _rim_first(at, known):  # type: ignore[no-untyped-def]
     """(K, 2) int32 the known places, those near the outline before all others: where cells lie outside, some of these
     do."""
-    place = np.empty((known.shape[0], 2), np.int32)
-    for k in range(known.shape[0]):
-        place[k] = at[known[k]]
+    place = at[known]
     extents, out, filled = _extents(place), np.empty_like(place), 0
     middle = extents[:, 0] + extents[:, 1]
     away = np.empty(known.shape[0], np.int64)  # in half steps
