@@ -1,0 +1,45 @@
+"""Hashes of every top-level definition's syntax tree, sorted: equal before and after a move of code.
+
+    .venv/bin/python tools/definition_hashes.py > before.txt     # then move code, and compare
+    .venv/bin/python tools/definition_hashes.py | diff before.txt -
+
+Where a definition stands does not count, nor do the modules that it imports from: a move changes just these. Functions,
+classes and assignments count, with their comments left out and their docstrings kept.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+FOLDERS = ("extractor", "cmpdesign", "benchmarks")
+
+
+class WithoutModules(ast.NodeTransformer):
+    """Takes away which module an import within a definition names."""
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom:
+        return ast.ImportFrom(module="", names=node.names, level=0)
+
+
+def definitions(path: Path) -> list[str]:
+    """One line for every top-level definition of a file."""
+    lines = []
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            name = node.name
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            name = ",".join(ast.unparse(target) for target in targets)
+        else:
+            continue
+        tree = ast.dump(WithoutModules().visit(node))
+        lines.append(f"{hashlib.sha256(tree.encode()).hexdigest()[:24]}  {name}")
+    return lines
+
+
+if __name__ == "__main__":
+    files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
+    print(*sorted(line for path in files for line in definitions(path)), sep="\n")
