@@ -28,9 +28,17 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
-from benchmarks.published import publish
-from benchmarks.scenes import KINDS, WRONG_SHARE, Case, bounds_px, extractor_of, inner_markers, shortest_edges
+from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.published import publish
+from benchmarks.support.scenes import (
+    KINDS,
+    WRONG_SHARE,
+    Case,
+    bounds_px,
+    extractor_of,
+    inner_markers,
+    shortest_edges,
+)
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
 from extractor.presets import PRESETS, Preset

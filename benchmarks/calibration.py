@@ -16,7 +16,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.machine import sentence
+from benchmarks.support.machine import sentence
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import (
     Blob,
     Camera,
@@ -29,7 +30,6 @@ from cmpdesign.scene import (
     standard_scene,
 )
 from cmpdesign.scene.standard import BLACK_RGB
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
 from extractor.presets import PRESETS, Preset
 

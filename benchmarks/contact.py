@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
+from benchmarks.support.machine import sentence, write_json
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
-from cmpdesign.contact.green import green
+from cmpdesign.contact.layer.green import green
 from cmpdesign.scene import standard_layout
 
 Array = NDArray[np.float64]

@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_suite.drawn import DRAWN
-from benchmarks.stress_suite.frames import PATTERNS, Shot
-from benchmarks.stress_suite.kinds import Case
-from benchmarks.stress_suite.reading import Result, notable_lines, overlay, read, warm_up, wrong_in
-from benchmarks.stress_suite.report import one_line
+from benchmarks.suites.scoring.reading import Result, notable_lines, overlay, read, warm_up, wrong_in
+from benchmarks.suites.scoring.report import one_line
+from benchmarks.suites.stress.drawn import DRAWN
+from benchmarks.suites.stress.frames import PATTERNS, Shot
+from benchmarks.suites.stress.kinds import Case
 from extractor import Markers
 
 IMAGES, SEED = 2100, 5000

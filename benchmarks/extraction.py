@@ -27,12 +27,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
-from benchmarks.published import publish
-from benchmarks.scenes import WRONG_SHARE, shortest_edges
-from cmpdesign.layout import Layout
+from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.published import publish
+from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Rendered, render, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.presets import PRESETS, Preset
 

@@ -17,17 +17,17 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design, load_design
-from cmpdesign.laser.setup import complete
-from cmpdesign.writers.laser.asmade import as_made
-from cmpdesign.writers.laser.beam import Points
-from cmpdesign.writers.laser.drawing import job_drawing
-from cmpdesign.writers.laser.job import Job, Pass, make_job
-from cmpdesign.writers.laser.order import ordered
-from cmpdesign.writers.laser.product import product
-from cmpdesign.writers.laser.strokes import loops
-from cmpdesign.writers.laser.svg import drawing_to_svg
+from cmpdesign.design.design import Design, load_design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.products.laser.as_made import as_made
+from cmpdesign.products.laser.formats.drawing import job_drawing
+from cmpdesign.products.laser.formats.svg import drawing_to_svg
+from cmpdesign.products.laser.job import Job, Pass, make_job
+from cmpdesign.products.laser.paths.beam import Points
+from cmpdesign.products.laser.paths.order import ordered
+from cmpdesign.products.laser.paths.strokes import loops
+from cmpdesign.products.laser.product import product
+from cmpdesign.products.laser.setup import complete
 
 VPYPE_HOME = Path(sys.prefix) / "vpype"
 PX_IN_MM = 96 / 25.4
@@ -123,7 +123,7 @@ def formats() -> None:
     print(f"{'cells':>8}{'files':>8}{'MB':>8}{'CPU s':>8}{'wall s':>8}{'limit s':>9}")
     with tempfile.TemporaryDirectory() as folder:
         machine = Path(folder) / "co2-40w.toml"
-        from cmpdesign.laser.library import machines
+        from cmpdesign.products.laser.library import machines
 
         text = machines()["co2-40w"].read_text()
         machine.write_text(

@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machine import sentence, write_json
+from benchmarks.support.machine import sentence, write_json
 from cmpdesign import build_layout, load_design
-from cmpdesign.layout import RED
-from cmpdesign.mold.measure import measure
-from cmpdesign.mold.parts import parts_of
-from cmpdesign.mold.shells import Feature, Slab, slab_solid, slab_volume_mm3
-from cmpdesign.mold.stack import stack_of
-from cmpdesign.writers.step import Solid, read_step, solid_to_step
+from cmpdesign.patterns.colors import RED
+from cmpdesign.products.mold.parts import parts_of
+from cmpdesign.products.mold.solids.measure import measure
+from cmpdesign.products.mold.solids.shells import Feature, Slab, slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.stack.stack import stack_of
+from cmpdesign.products.mold.step.step import Solid, read_step, solid_to_step
 
 LAYERS, QUICK_LAYERS = (10, 20, 39, 60), (3, 6)
 # Runs of plates up to the boolean one's size; the larger one is run once.

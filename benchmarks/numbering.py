@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.article.graph import connect
-from benchmarks.article.numbering import lattice_of as article_lattice
-from benchmarks.article.numbering import number as article_number
+from benchmarks.suites.article.graph import connect
+from benchmarks.suites.article.numbering import lattice_of as article_lattice
+from benchmarks.suites.article.numbering import number as article_number
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import (
     Camera,
     Damage,
@@ -33,9 +34,8 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, parse_layout
-from extractor.reference import Reference
+from extractor.layout.reference import Reference
 
 PATTERNS = ("honeycomb", "round", "elliptical")
 SEEDS = (1, 2, 3)

@@ -30,14 +30,14 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
-from cmpdesign.build import build_layout
+from benchmarks.support.machine import sentence, write_json
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
-from cmpdesign.design import load_design
-from cmpdesign.layout import Layout
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, cramer_rao, render
 from cmpdesign.scene.standard import BLACK_RGB, INKS
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Reconstructor, Rig, View, ViewExtractor, parse_layout, triangulate
 
 Array = NDArray[np.float64]

@@ -31,8 +31,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
-from benchmarks.scanlines import Error, Window, error
+from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.scanlines import Error, Window, error
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.scene import Dent, Pinhole, Scene, composed, render, standard_layout, standard_scene
 

@@ -22,7 +22,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import sentence, write_json
+from benchmarks.support.machine import sentence, write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 CLI = "from cmpdesign.cli import main; main()"

@@ -31,8 +31,9 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial import cKDTree
 
-from benchmarks.machine import sentence, write_json
-from cmpdesign.layout import Layout
+from benchmarks.support.machine import sentence, write_json
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
     Camera,
     Optics,
@@ -48,7 +49,6 @@ from cmpdesign.scene import (
     standard_layout,
 )
 from cmpdesign.scene.standard import BLACK_RGB, INKS
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import FrameStatus, StartKind, Tracked, Tracker, parse_layout
 
 FRAMES, QUICK_FRAMES = 2000, 120

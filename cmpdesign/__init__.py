@@ -9,30 +9,30 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmpdesign.build import build_layout as build_layout
-    from cmpdesign.checks import check_design as check_design
-    from cmpdesign.design import Design as Design
-    from cmpdesign.design import load_design as load_design
+    from cmpdesign.design.design import Design as Design
+    from cmpdesign.design.design import load_design as load_design
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import OutputError as OutputError
-    from cmpdesign.layout import Layout as Layout
-    from cmpdesign.writers.layout_file import write_layout as write_layout
-    from cmpdesign.writers.svg import write_svg as write_svg
+    from cmpdesign.files.layout_json import write_layout as write_layout
+    from cmpdesign.layout.build import build_layout as build_layout
+    from cmpdesign.layout.checks import check_design as check_design
+    from cmpdesign.layout.layout import Layout as Layout
+    from cmpdesign.products.drawing.svg import write_svg as write_svg
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "CmpDesignError": "cmpdesign.errors",
-    "Design": "cmpdesign.design",
+    "Design": "cmpdesign.design.design",
     "DesignError": "cmpdesign.errors",
-    "Layout": "cmpdesign.layout",
+    "Layout": "cmpdesign.layout.layout",
     "OutputError": "cmpdesign.errors",
-    "build_layout": "cmpdesign.build",
-    "check_design": "cmpdesign.checks",
-    "load_design": "cmpdesign.design",
-    "write_layout": "cmpdesign.writers.layout_file",
-    "write_svg": "cmpdesign.writers.svg",
+    "build_layout": "cmpdesign.layout.build",
+    "check_design": "cmpdesign.layout.checks",
+    "load_design": "cmpdesign.design.design",
+    "write_layout": "cmpdesign.files.layout_json",
+    "write_svg": "cmpdesign.products.drawing.svg",
 }
 
 __all__ = sorted([*_HOMES, "__version__"])

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from cmpdesign.scene import Truth
-    from extractor.types import Markers
+    from extractor.result import Markers
 
 OUT = Path("out")
 COMMANDS = (
@@ -84,7 +84,7 @@ def main() -> int:
 
 def _table() -> Table:
     """The sample once more, warm: figures against the truth, and the median run's stages."""
-    from cmpdesign.images import read_image
+    from cmpdesign.files.images import read_image
     from cmpdesign.scene import load_truth
     from extractor import Extractor, load_layout
 

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .errors import ExtractorError, ImageError, LayoutError, PoseError, RigError
-from .types import Markers, Origin, Reason, Status, VirtualStatus
+from extractor.errors import ExtractorError, ImageError, LayoutError, PoseError, RigError
+from extractor.result import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
-    from .camera import View
-    from .dense import Field
-    from .displacement import Rest
-    from .pipeline import Extractor
-    from .reference import Reference, load_layout, parse_layout
-    from .rig import Rig, load_rig, parse_rig
-    from .stereo import Reconstructor, Shape
-    from .tracking import FrameStatus, StartKind, Tracked, Tracker
-    from .triangulation import PointReason, triangulate
-    from .views import ShapeFrame, ShapeTracker, ViewExtractor
+    from extractor.layout.layout_file import load_layout, parse_layout
+    from extractor.layout.reference import Reference
+    from extractor.pipeline import Extractor
+    from extractor.space.camera import View
+    from extractor.space.field import Field
+    from extractor.space.reconstruction import Reconstructor, Shape
+    from extractor.space.rig import Rig, load_rig, parse_rig
+    from extractor.space.triangulation import PointReason, triangulate
+    from extractor.space.views import ShapeFrame, ShapeTracker, ViewExtractor
+    from extractor.track.displacement import Rest
+    from extractor.track.tracker import FrameStatus, StartKind, Tracked, Tracker
 
 __all__ = [
     "Extractor",
@@ -58,27 +59,27 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Extractor": "pipeline",
-    "Field": "dense",
-    "FrameStatus": "tracking",
-    "PointReason": "triangulation",
-    "Reconstructor": "stereo",
-    "Reference": "reference",
-    "Rest": "displacement",
-    "Rig": "rig",
-    "Shape": "stereo",
-    "ShapeFrame": "views",
-    "ShapeTracker": "views",
-    "StartKind": "tracking",
-    "Tracked": "tracking",
-    "Tracker": "tracking",
-    "View": "camera",
-    "ViewExtractor": "views",
-    "load_layout": "reference",
-    "load_rig": "rig",
-    "parse_layout": "reference",
-    "parse_rig": "rig",
-    "triangulate": "triangulation",
+    "Extractor": "extractor.pipeline",
+    "Field": "extractor.space.field",
+    "FrameStatus": "extractor.track.tracker",
+    "PointReason": "extractor.space.triangulation",
+    "Reconstructor": "extractor.space.reconstruction",
+    "Reference": "extractor.layout.reference",
+    "Rest": "extractor.track.displacement",
+    "Rig": "extractor.space.rig",
+    "Shape": "extractor.space.reconstruction",
+    "ShapeFrame": "extractor.space.views",
+    "ShapeTracker": "extractor.space.views",
+    "StartKind": "extractor.track.tracker",
+    "Tracked": "extractor.track.tracker",
+    "Tracker": "extractor.track.tracker",
+    "View": "extractor.space.camera",
+    "ViewExtractor": "extractor.space.views",
+    "load_layout": "extractor.layout.layout_file",
+    "load_rig": "extractor.space.rig",
+    "parse_layout": "extractor.layout.layout_file",
+    "parse_rig": "extractor.space.rig",
+    "triangulate": "extractor.space.triangulation",
 }
 
 
@@ -88,4 +89,4 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    return getattr(import_module(_HOMES[name]), name)

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .image import prepare
-from .reference import Reference
-from .types import Markers, Status
+from extractor.image.input import prepare
+from extractor.layout.reference import Reference
+from extractor.result import Markers, Status
 
 Picture = NDArray[np.uint8]
 

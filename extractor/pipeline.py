@@ -9,31 +9,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .amid import amid, outlined
-from .attach import attach
-from .cells import Cells, find_cells, with_triangles
-from .color import nominal_hues_deg, to_colors
-from .errors import LayoutError
-from .fit import Seen
-from .image import prepare
-from .mesh import build_mesh
-from .missed import missed
-from .numbering import Numbering, number
-from .placing import Places, place
-from .presets import PRESETS, Preset
-from .reference import Reference
-from .refine import Refiner
-from .regions import grow
-from .repair import repair
-from .seeds import NO_CROWD, Seeds, find_seeds, large_enough
-from .segmentation import segment
-from .sight import Sights
-from .tables import lattice_of
-from .target import find_target
-from .topology import topology_of
-from .triangles import fit_triangles, rough_triangles
-from .types import Markers, Origin, Reason
-from .virtual import place_virtual
+from extractor.cells.cell_mesh import build_mesh
+from extractor.cells.cells import Cells, find_cells, with_triangles
+from extractor.cells.region_growing import grow
+from extractor.cells.seeds import NO_CROWD, Seeds, find_seeds, large_enough
+from extractor.cells.triangle_fit import fit_triangles, rough_triangles
+from extractor.complete.repair import repair
+from extractor.complete.virtual_markers import place_virtual
+from extractor.errors import LayoutError
+from extractor.image.color import nominal_hues_deg, to_colors
+from extractor.image.ink_segmentation import segment
+from extractor.image.input import prepare
+from extractor.image.pyramid import Sights
+from extractor.image.target_area import find_target
+from extractor.layout.lattice_tables import lattice_of
+from extractor.layout.reference import Reference
+from extractor.layout.topology import topology_of
+from extractor.numbering.gaps.detached_cells import attach
+from extractor.numbering.lattice_walk import Numbering, number
+from extractor.numbering.marker_places import Places, place
+from extractor.numbering.missed_cells import missed
+from extractor.numbering.small_pattern import amid, outlined
+from extractor.presets import PRESETS, Preset
+from extractor.refine.estimate import Seen
+from extractor.refine.refiner import Refiner
+from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
 MAX_MISSED = 0.01  # of the pattern's cells that a reduced scale may miss

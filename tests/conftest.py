@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
-from cmpdesign.layout import Layout
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 
 PATTERNS = ("honeycomb", "round", "elliptical", "square")
 

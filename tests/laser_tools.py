@@ -11,15 +11,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
-from cmpdesign.laser.coupon import Coupon
-from cmpdesign.laser.setup import complete
-from cmpdesign.layout import Layout
-from cmpdesign.scene.coverage import coverage
-from cmpdesign.scene.optics import point_spread
-from cmpdesign.scene.paths import Segments
-from cmpdesign.writers.laser.job import Job, make_job
+from cmpdesign.design.design import load_design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.products.laser.coupon.design import Coupon
+from cmpdesign.products.laser.job import Job, make_job
+from cmpdesign.products.laser.setup import complete
+from cmpdesign.scene.drawing.coverage import coverage
+from cmpdesign.scene.drawing.paths import Segments
+from cmpdesign.scene.parts.optics import point_spread
 
 Points = NDArray[np.float64]
 PIXEL_MM = 0.002

@@ -15,8 +15,8 @@ import numpy as np
 import resvg_py
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
-from cmpdesign.writers.svg import layout_to_svg
+from cmpdesign.layout.layout import Layout
+from cmpdesign.products.drawing.svg import layout_to_svg
 
 OVERSAMPLING = 4
 PAPER = (225, 230, 228)

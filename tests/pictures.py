@@ -11,7 +11,7 @@ import numpy as np
 from conftest import small_layout, small_text
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Optics, Rendered, Scene, Sensor, render
 from extractor import Extractor, parse_layout
 

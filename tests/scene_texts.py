@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from cmpdesign.layout import Layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import SceneFile, load_scene
 
 SIZE = (96, 80)

@@ -9,18 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from benchmarks.stress_suite.conditions import matching
-from benchmarks.stress_suite.reading import read
+from benchmarks.suites.scoring.reading import read
+from benchmarks.suites.stress.conditions import matching
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Blob, Camera, Damage, Optics, Press, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, parse_layout
-from extractor.drawing import Draughtsman
-from extractor.drawn import Drawing
-from extractor.fit import Fit
-from extractor.settling import beside
-from extractor.step import roughened
-from extractor.topology import Topology
+from extractor.layout.topology import Topology
+from extractor.refine.drawn_pattern import Drawing
+from extractor.refine.estimate import Fit
+from extractor.refine.refinement_step import roughened
+from extractor.refine.solve.convergence import beside
+from extractor.refine.synthesis_steps import Draughtsman
 
 SIZE = (300, 260)
 

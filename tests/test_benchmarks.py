@@ -14,15 +14,15 @@ import pytest
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.article.corners import plain_triangles  # noqa: E402
-from benchmarks.comparison.measure import errors_of, measure  # noqa: E402
-from benchmarks.comparison.methods import METHODS, REFERENCE  # noqa: E402
-from benchmarks.comparison.report import markdown, picture  # noqa: E402
-from benchmarks.published import filled  # noqa: E402
-from benchmarks.scenes import Case, checkerboard, inner_markers  # noqa: E402
-from cmpdesign.layout import BLACK, RED, WHITE  # noqa: E402
-from cmpdesign.scene import Rendered, Truth, standard_layout  # noqa: E402
-from extractor.regions import Regions  # noqa: E402
+from benchmarks.suites.article.corners import plain_triangles
+from benchmarks.suites.comparison.measure import errors_of, measure
+from benchmarks.suites.comparison.methods import METHODS, REFERENCE
+from benchmarks.suites.comparison.report import markdown, picture
+from benchmarks.support.published import filled
+from benchmarks.support.scenes import Case, checkerboard, inner_markers
+from cmpdesign.patterns.colors import BLACK, RED, WHITE
+from cmpdesign.scene import Rendered, Truth, standard_layout
+from extractor.cells.region_growing import Regions
 
 
 @pytest.mark.slow

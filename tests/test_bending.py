@@ -12,17 +12,34 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
-from cmpdesign.layout import Layout
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Rendered, render
 from cmpdesign.scene.standard import standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
-from extractor.bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
-from extractor.dropping import _drop_slid, _slid
-from extractor.gridlines import KNOWN, LENGTH, UX, local_maps
-from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, CC, CD, DD, MISFIT, SUMS, A, B, C, D
-from extractor.tables import lattice_of
-from extractor.topology import Topology, topology_of
+from extractor.complete.consistency_filter import _drop_slid, _slid
+from extractor.layout.lattice_tables import lattice_of
+from extractor.layout.topology import Topology, topology_of
+from extractor.refine.measure.gridline_bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
+from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, local_maps
+from extractor.refine.synthesis.residual_kernel import (
+    AA,
+    AB,
+    AC,
+    AD,
+    BB,
+    BC,
+    BD,
+    CC,
+    CD,
+    DD,
+    MISFIT,
+    SUMS,
+    A,
+    B,
+    C,
+    D,
+)
 
 Array = NDArray[np.float64]
 LAYERS = 6

@@ -8,20 +8,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene.standard import standard_layout
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
-from extractor.cells import Cells
-from extractor.dropping import _drop_slid, _slid
-from extractor.fit import Refined
-from extractor.neighbourhood import MIN_CUBIC, MIN_QUADRATIC, cubic_variance
-from extractor.numbering import Numbering
-from extractor.placing import Places, place
-from extractor.repair import Repaired, repair
-from extractor.stepping import RIM_PX, moved
-from extractor.tables import Lattice, lattice_of
-from extractor.topology import Topology, topology_of
+from extractor.cells.cells import Cells
+from extractor.complete.consistency_filter import _drop_slid, _slid
+from extractor.complete.repair import Repaired, repair
+from extractor.layout.lattice_tables import Lattice, lattice_of
+from extractor.layout.neighbour_tables import MIN_QUADRATIC
+from extractor.layout.topology import Topology, topology_of
+from extractor.localmap.neighbour_prediction import MIN_CUBIC, cubic_variance
+from extractor.numbering.lattice_walk import Numbering
+from extractor.numbering.marker_places import Places, place
+from extractor.refine.estimate import Refined
+from extractor.refine.measure.gridline_weights import RIM_PX, moved
 
 Array = NDArray[np.float64]
 LAYERS, EDGE_PX, SIZE = 6, 20.0, (400, 400)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from extractor.cells import NEIGHBOURS, _few_larger
+from extractor.cells.cells import NEIGHBOURS, _few_larger
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from cmpdesign.build import build_layout
-from cmpdesign.checks import Finding, check_design
-from cmpdesign.design import Design
-from cmpdesign.layout import Layout
-from cmpdesign.measures import cell_angles_deg, cell_areas_mm2, cell_widths_mm, edge_lengths_mm
-from cmpdesign.report import report, report_to_json
+from cmpdesign.design.design import Design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.checks import Finding, check_design
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.measures import cell_angles_deg, cell_areas_mm2, cell_widths_mm, edge_lengths_mm
+from cmpdesign.layout.report import report, report_to_json
 
 
 def findings(**fields: object) -> list[Finding]:

@@ -16,8 +16,8 @@ from typer.testing import CliRunner, Result
 
 from cmpdesign import __version__
 from cmpdesign.cli import app
-from cmpdesign.templates import templates
-from extractor.reference import load_layout
+from cmpdesign.design.templates import templates
+from extractor.layout.layout_file import load_layout
 
 
 def run(*arguments: object) -> Result:

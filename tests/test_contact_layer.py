@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cmpdesign.contact import ContactError, Elastomer
-from cmpdesign.contact.green import REACH, green
-from cmpdesign.contact.kernels import compliances
-from cmpdesign.contact.operator import Operator
+from cmpdesign.contact.layer.green import REACH, green
+from cmpdesign.contact.layer.kernels import compliances
+from cmpdesign.contact.layer.operator import Operator
 
 Array = NDArray[np.float64]
 POISSONS = (0.0, 0.25, 0.3, 0.45, 0.49, 0.4999)

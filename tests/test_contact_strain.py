@@ -9,8 +9,8 @@ import skfem
 from numpy.typing import NDArray
 
 from cmpdesign.contact import Elastomer
-from cmpdesign.contact.green import green
-from cmpdesign.contact.operator import Operator
+from cmpdesign.contact.layer.green import green
+from cmpdesign.contact.layer.operator import Operator
 from cmpdesign.contact.strain import LINEAR_UP_TO, largest_strain
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from benchmarks.scenes import KINDS, Case, extractor_of, inner_markers
+from benchmarks.support.scenes import KINDS, Case, extractor_of, inner_markers
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus
 from extractor.presets import PRESETS

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.damage import Read, alone, case_of, drawn, main, name_of, table, taken_for_others, totals
-from benchmarks.stress_suite.conditions import BY_NAME
-from benchmarks.stress_suite.drawn import DRAWN
-from benchmarks.stress_suite.frames import PATTERNS, Frame, plain
-from benchmarks.stress_suite.kinds import frame_of
-from benchmarks.stress_suite.reading import extractor_of, read
+from benchmarks.suites.scoring.reading import extractor_of, read
+from benchmarks.suites.stress.conditions import BY_NAME
+from benchmarks.suites.stress.drawn import DRAWN
+from benchmarks.suites.stress.frames import PATTERNS, Frame, plain
+from benchmarks.suites.stress.kinds import frame_of
 
 IMAGES, SEED = 42, 60000  # every kind in every pattern, twice
 

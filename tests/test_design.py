@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cmpdesign
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design, design_schema, design_schema_text, load_design
+from cmpdesign.design.design import Design, design_schema, design_schema_text, load_design
 from cmpdesign.errors import DesignError
+from cmpdesign.layout.build import build_layout
 from cmpdesign.patterns import patterns
 
 

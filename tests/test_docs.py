@@ -32,14 +32,14 @@ from typer.testing import CliRunner
 
 from cmpdesign import demo
 from cmpdesign.cli import app
-from cmpdesign.design import Design
+from cmpdesign.design.design import Design
+from cmpdesign.design.templates import templates
 from cmpdesign.patterns import patterns
-from cmpdesign.templates import templates
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
-from docs.figures import everything, fields  # noqa: E402
+from docs.figures import everything, fields
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 IMAGES = ROOT / "docs" / "images"

@@ -12,9 +12,9 @@ from laser_tools import coupon_photo
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.laser.coupon import load_coupon
-from cmpdesign.laser.library import machines, materials
-from cmpdesign.laser.options import LaserOptions
+from cmpdesign.design.laser_options import LaserOptions
+from cmpdesign.products.laser.coupon.design import load_coupon
+from cmpdesign.products.laser.library import machines, materials
 
 PAGE = Path(__file__).parent.parent / "docs" / "laser.md"
 

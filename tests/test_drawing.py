@@ -13,20 +13,21 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Blob, Damage, Optics, Press, Rendered, Sensor, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
-from extractor import Extractor, Status, parse_layout, refine
-from extractor.bleeding import bled, rebled, unbled
-from extractor.drawing import SAME_LEVELS, Draughtsman
-from extractor.drawn import Drawing, chosen
-from extractor.information import covariances
-from extractor.levels import Levels
-from extractor.painting import RUNS, draw_cells, erase_cells, room_for_strokes
+from extractor import Extractor, Status, parse_layout
+from extractor.layout.topology import topology_of
 from extractor.presets import STEPS
-from extractor.settling import beside, still_moving, unsettled
-from extractor.step import placed
-from extractor.topology import topology_of
+from extractor.refine import refiner as refine
+from extractor.refine.drawn_pattern import Drawing, chosen
+from extractor.refine.refinement_step import placed
+from extractor.refine.solve.convergence import beside, still_moving, unsettled
+from extractor.refine.solve.fisher_information import covariances
+from extractor.refine.synthesis.blur_bleed import bled, rebled, unbled
+from extractor.refine.synthesis.ink_levels import Levels
+from extractor.refine.synthesis.pattern_drawing import RUNS, draw_cells, erase_cells, room_for_strokes
+from extractor.refine.synthesis_steps import SAME_LEVELS, Draughtsman
 
 SIZE = (300, 260)
 LAYERS = 5
@@ -86,7 +87,7 @@ def test_steps_in_part_end_where_steps_from_everything_do(monkeypatch: pytest.Mo
     seen = shown("round", surface=composed(Press(4.0, 0.6)))
     preset = STEPS["accurate"]
     part = extractor("round", "accurate").extract(seen.image)
-    monkeypatch.setattr("extractor.drawing.MAX_AGAIN", -1.0)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.MAX_AGAIN", -1.0)
     whole = extractor("round", "accurate").extract(seen.image)
     deviation = np.sqrt(np.einsum("mii->m", whole.cov_px2))
     away = np.linalg.norm(part.xy_px - whole.xy_px, axis=1)
@@ -134,8 +135,8 @@ def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
         taken.append(given)
         return plain(self, *given)
 
-    monkeypatch.setattr("extractor.drawing.still_moving", look)
-    monkeypatch.setattr("extractor.drawing.effort", lambda *_: 0.1)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.still_moving", look)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.effort", lambda *_: 0.1)
     monkeypatch.setattr(Draughtsman, "_again", counted)
     monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(patience=5))
     Extractor(extractor("round").layout).extract(shown("round").image)

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.writers.earlier import LIST_NAME, remove, stale_files, with_lists
+from cmpdesign.files.earlier_files import LIST_NAME, remove, stale_files, with_lists
 
 
 def build(output: Path, files: dict[str, str | bytes]) -> list[str]:

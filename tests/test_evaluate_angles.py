@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmpdesign.evaluate import angles
-from cmpdesign.evaluate.cells import (
+from cmpdesign.evaluate.measures.cells import (
     bent,
     drawn,
     number_holds,

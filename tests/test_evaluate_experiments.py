@@ -14,12 +14,12 @@ from evaluation import small_sensor_text
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.evaluate.conditions import draw, middle
-from cmpdesign.evaluate.contacts import Load, surface
-from cmpdesign.evaluate.cube import POSITIONS_MM, SIDE_MM
-from cmpdesign.evaluate.instrument import instrument
+from cmpdesign.evaluate.measures.cube import POSITIONS_MM, SIDE_MM
 from cmpdesign.evaluate.reliability import METHODS, holds, judged
-from cmpdesign.evaluate.sensor import SensorError, load_sensor, parse_sensor
+from cmpdesign.evaluate.simulated.conditions import draw, middle
+from cmpdesign.evaluate.simulated.contacts import Load, surface
+from cmpdesign.evaluate.simulated.instrument import instrument
+from cmpdesign.evaluate.simulated.sensor import SensorError, load_sensor, parse_sensor
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmpdesign.evaluate.article import change_percent
-from cmpdesign.evaluate.edges import circumscribed_square_mm, edge_points, mean_extent_mm, response
-from cmpdesign.evaluate.statistics import Share, number, spread, wilson
+from cmpdesign.evaluate.measures.edges import circumscribed_square_mm, edge_points, mean_extent_mm, response
+from cmpdesign.evaluate.report.statistics import Share, number, spread, wilson
 
 
 @pytest.mark.parametrize(

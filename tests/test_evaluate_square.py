@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from conftest import small_layout
 
-from cmpdesign.evaluate.square import SquareReader, joined
-from cmpdesign.evaluate.square_quads import find_quads
-from cmpdesign.evaluate.square_saddles import SaddleReader
-from cmpdesign.layout import Layout
+from cmpdesign.evaluate.square.contours import SquareReader, joined
+from cmpdesign.evaluate.square.quads import find_quads
+from cmpdesign.evaluate.square.saddles import SaddleReader
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Blob, Camera, Damage, Light, Optics, Scene, Sensor, Truth, Twist, composed, render
 
 PITCH_PX = 26.0

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.stress_suite.conditions import BY_NAME, matching
-from benchmarks.stress_suite.frames import Shot
-from benchmarks.stress_suite.kinds import frame_of
-from benchmarks.stress_suite.reading import extractor_of, wrong_in
-from extractor.amid import amid, outlined
-from extractor.cells import Cells
-from extractor.numbering import Numbering
-from extractor.seeds import SAFE_AREA_PX, find_seeds
-from extractor.tables import lattice_of
+from benchmarks.suites.scoring.reading import extractor_of, wrong_in
+from benchmarks.suites.stress.conditions import BY_NAME, matching
+from benchmarks.suites.stress.frames import Shot
+from benchmarks.suites.stress.kinds import frame_of
+from extractor.cells.cells import Cells
+from extractor.cells.seeds import SAFE_AREA_PX, find_seeds
+from extractor.layout.lattice_tables import lattice_of
+from extractor.numbering.lattice_walk import Numbering
+from extractor.numbering.small_pattern import amid, outlined
 
 
 def shot_of(name: str) -> Shot:

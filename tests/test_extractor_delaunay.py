@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from extractor.delaunay import delaunay
+from extractor.numeric.delaunay import delaunay
 
 Points = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from extractor import parse_layout
-from extractor.foreseen import MAX_OUTSIDE, close_misfits, foreseen, grid_around
-from extractor.lattice import turned
-from extractor.outline import settle
-from extractor.tables import UNKNOWN, Lattice, lattice_of
-from extractor.white import _put
+from extractor.layout.lattice import turned
+from extractor.layout.lattice_tables import UNKNOWN, Lattice, lattice_of
+from extractor.localmap.cell_prediction import MAX_OUTSIDE, close_misfits, foreseen, grid_around
+from extractor.numbering.outline_fit import settle
+from extractor.numbering.white_search import _put
 
 LAYERS = 7
 TURN, SHIFT = st.integers(0, 2), st.tuples(st.integers(-9, 9), st.integers(-9, 9))

@@ -10,17 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from benchmarks.stress_suite.damage import one_hole, scratches
-from benchmarks.stress_suite.frames import PATTERNS, RGB, Frame, plain
-from benchmarks.stress_suite.reading import extractor_of
-from benchmarks.stress_suite.score import Score, score
-from extractor.arcs import by_layer
-from extractor.attach import attach
-from extractor.bridge import leads_elsewhere, unbridged
-from extractor.cells import Cells
-from extractor.near import bucketed, nearest
-from extractor.numbering import Numbering
-from extractor.tables import Lattice, cells_at, lattice_of
+from benchmarks.suites.scoring.reading import extractor_of
+from benchmarks.suites.scoring.score import Score, score
+from benchmarks.suites.stress.damage import one_hole, scratches
+from benchmarks.suites.stress.frames import PATTERNS, RGB, Frame, plain
+from extractor.cells.cells import Cells
+from extractor.complete.layer_arcs import by_layer
+from extractor.layout.lattice_tables import Lattice, cells_at, lattice_of
+from extractor.numbering.gaps.detached_cells import attach
+from extractor.numbering.gaps.gap_check import leads_elsewhere, unbridged
+from extractor.numbering.lattice_walk import Numbering
+from extractor.numeric.nearest_points import bucketed, nearest
 
 
 def read(frame: Frame) -> Score:

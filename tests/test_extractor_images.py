@@ -13,7 +13,7 @@ from conftest import PATTERNS, small_layout, small_text
 from numpy.typing import NDArray
 from pictures import STRANGE, Image, extractor, picture, recolored, scene_of
 
-from cmpdesign.layout import BLACK, WHITE
+from cmpdesign.patterns.colors import BLACK, WHITE
 from cmpdesign.scene import Truth
 from extractor import (
     Extractor,

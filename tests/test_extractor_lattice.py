@@ -7,8 +7,8 @@ import pytest
 from conftest import small_layout, small_text
 
 from extractor import parse_layout
-from extractor.lattice import axial, layer_of, marker_id
-from extractor.tables import cells_at, lattice_of
+from extractor.layout.lattice import axial, layer_of, marker_id
+from extractor.layout.lattice_tables import cells_at, lattice_of
 
 # Turn right: the six steps of the lattice clockwise, y up; a ring starts at 120 degrees and first runs to the right.
 STEPS = [(1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1), (0, 1)]

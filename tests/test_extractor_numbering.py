@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pictures import extractor, picture, recolored, scene_of
 
-from cmpdesign.layout import BLACK
+from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import (
     Camera,
     Damage,
@@ -27,10 +27,10 @@ from cmpdesign.scene import (
     render,
 )
 from extractor import Markers, Status, parse_layout
-from extractor.cells import Cells
-from extractor.mesh import build_mesh
-from extractor.numbering import number
-from extractor.tables import lattice_of
+from extractor.cells.cell_mesh import build_mesh
+from extractor.cells.cells import Cells
+from extractor.layout.lattice_tables import lattice_of
+from extractor.numbering.lattice_walk import number
 
 TRIANGULAR = ("honeycomb", "round", "elliptical")
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from pictures import picture
 
 from extractor import parse_layout
-from extractor.color import find_hues, hue_weights, nominal_hues_deg, to_colors
-from extractor.image import estimate_noise
-from extractor.regions import GROW_THRESHOLD, grow
-from extractor.seeds import find_seeds
-from extractor.segmentation import Segmentation, segment
-from extractor.target import Target, find_target
+from extractor.cells.region_growing import GROW_THRESHOLD, grow
+from extractor.cells.seeds import find_seeds
+from extractor.image.color import find_hues, hue_weights, nominal_hues_deg, to_colors
+from extractor.image.ink_segmentation import Segmentation, segment
+from extractor.image.input import estimate_noise
+from extractor.image.target_area import Target, find_target
 
 Image = NDArray[np.uint8]
 NOMINAL_DEG = nominal_hues_deg(dict(small_layout().palette))

@@ -9,8 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from extractor.regions import Regions
-from extractor.triangles import fit_triangles
+from extractor.cells.region_growing import Regions
+from extractor.cells.triangle_fit import fit_triangles
 
 Points = NDArray[np.float64]
 FINE = 8  # small pixels to a pixel and axis

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.stress_suite.damage import DIRT, centres, rings, white_missing
-from benchmarks.stress_suite.frames import PATTERNS, Frame, plain
-from benchmarks.stress_suite.reading import extractor_of
-from benchmarks.stress_suite.score import score
-from cmpdesign.layout import BLACK
+from benchmarks.suites.scoring.reading import extractor_of
+from benchmarks.suites.scoring.score import score
+from benchmarks.suites.stress.damage import DIRT, centres, rings, white_missing
+from benchmarks.suites.stress.frames import PATTERNS, Frame, plain
+from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import Blob, Damage, Glare, Scratch
 from cmpdesign.scene.standard import INKS
 from extractor import Markers, Origin

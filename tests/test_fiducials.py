@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from conftest import small_document
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
+from cmpdesign.design.design import load_design
 from cmpdesign.errors import DesignError
-from cmpdesign.reading import read_layout
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.reading.read_layout import read_layout
 from extractor.errors import LayoutError
-from extractor.reference import SCHEMA_PATH, parse_layout
+from extractor.layout.layout_file import SCHEMA_PATH, parse_layout
 
 
 @pytest.mark.parametrize("count", [3, 4])

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import (
     Blob,
     Camera,
@@ -32,25 +33,24 @@ from cmpdesign.scene import (
     render,
 )
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
-from extractor.cells import Cells
-from extractor.drawing import Draughtsman
-from extractor.drawn import Board, room_for
-from extractor.fit import Refined
-from extractor.information import covariances, solve
-from extractor.meeting import overlap
-from extractor.mesh import build_mesh
-from extractor.neighbourhood import predicted
-from extractor.placing import Places
+from extractor.cells.cell_mesh import build_mesh
+from extractor.cells.cells import Cells
+from extractor.cells.region_growing import grow
+from extractor.cells.seeds import find_seeds
+from extractor.cells.triangle_fit import fit_triangles
+from extractor.complete.repair import repair
+from extractor.image.ink_segmentation import Segmentation
+from extractor.layout.lattice_tables import lattice_of
+from extractor.layout.topology import topology_of
+from extractor.localmap.neighbour_prediction import predicted
+from extractor.numbering.marker_places import Places
 from extractor.presets import PRESETS
-from extractor.regions import grow
-from extractor.repair import repair
-from extractor.seeds import find_seeds
-from extractor.segmentation import Segmentation
-from extractor.tables import lattice_of
-from extractor.topology import topology_of
-from extractor.triangles import fit_triangles
+from extractor.refine.drawn_pattern import Board, room_for
+from extractor.refine.estimate import Refined
+from extractor.refine.solve.fisher_information import covariances, solve
+from extractor.refine.solve.shared_pixels import overlap
+from extractor.refine.synthesis_steps import Draughtsman
 
 ROOT = Path(__file__).parent.parent
 LAYERS = 5

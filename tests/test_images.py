@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cmpdesign.images import ImageFileError, read_image
+from cmpdesign.files.images import ImageFileError, read_image
 
 COLOR = np.arange(20 * 24 * 3, dtype=np.uint8).reshape(20, 24, 3)
 

@@ -14,12 +14,12 @@ from laser_tools import coupon_photo, groups_of, run_gcode
 from typer.testing import CliRunner, Result
 
 from cmpdesign.cli import app
-from cmpdesign.design import load_design
-from cmpdesign.laser.coupon import Coupon, coupon_to_json, design_coupon, load_coupon
-from cmpdesign.laser.photo import read_coupon
-from cmpdesign.laser.setup import complete
-from cmpdesign.writers.laser.coupon import coupon as coupon_drawing
-from cmpdesign.writers.laser.gcode import drawing_to_gcode
+from cmpdesign.design.design import load_design
+from cmpdesign.products.laser.coupon.design import Coupon, coupon_to_json, design_coupon, load_coupon
+from cmpdesign.products.laser.coupon.job import coupon as coupon_drawing
+from cmpdesign.products.laser.coupon.photo import read_coupon
+from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
+from cmpdesign.products.laser.setup import complete
 
 PIECE = design_coupon(complete(load_design("honeycomb").laser))
 CUT = {patch.name: (0.10 + 0.02 * i, 0.12 + 0.015 * i) for i, patch in enumerate(PIECE.patches)}

@@ -18,12 +18,12 @@ import svgelements
 from laser_tools import Points, groups_of, made_job, run_gcode
 
 from cmpdesign.cli import app
-from cmpdesign.writers.laser.drawing import Drawing, job_drawing
-from cmpdesign.writers.laser.dxf import drawing_to_dxf
-from cmpdesign.writers.laser.gcode import drawing_to_gcode
-from cmpdesign.writers.laser.job import Job
-from cmpdesign.writers.laser.lightburn import drawing_to_lightburn
-from cmpdesign.writers.laser.svg import drawing_to_svg
+from cmpdesign.products.laser.formats.drawing import Drawing, job_drawing
+from cmpdesign.products.laser.formats.dxf import drawing_to_dxf
+from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
+from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
+from cmpdesign.products.laser.formats.svg import drawing_to_svg
+from cmpdesign.products.laser.job import Job
 
 WITH_OUTLINE = {"laser__outline": "true", "laser__passes": "2"}
 CASES = [

@@ -16,21 +16,21 @@ from laser_tools import Points, groups_of, made_job, run_gcode
 from typer.testing import CliRunner, Result
 
 from cmpdesign.cli import app
-from cmpdesign.laser.library import load_machine, load_material, machines, materials
-from cmpdesign.layout import COLORS
-from cmpdesign.writers.laser.asmade_svg import as_made_svg
-from cmpdesign.writers.laser.drawing import job_drawing
-from cmpdesign.writers.laser.figures import timing
-from cmpdesign.writers.laser.gcode import drawing_to_gcode
-from cmpdesign.writers.laser.job import Job
-from cmpdesign.writers.laser.order import ordered, shortest_pause
-from cmpdesign.writers.laser.refuse import duplicates, open_paths
-from cmpdesign.writers.laser.strokes import ragged
-from cmpdesign.writers.laser.timing import move_times_s
-from cmpdesign.writers.laser.tour import length_mm, short_tour
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.laser.as_made_svg import as_made_svg
+from cmpdesign.products.laser.figures import timing
+from cmpdesign.products.laser.formats.drawing import job_drawing
+from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
+from cmpdesign.products.laser.job import Job
+from cmpdesign.products.laser.library import load_machine, load_material, machines, materials
+from cmpdesign.products.laser.paths.order import ordered, shortest_pause
+from cmpdesign.products.laser.paths.strokes import ragged
+from cmpdesign.products.laser.paths.timing import move_times_s
+from cmpdesign.products.laser.paths.tour import length_mm, short_tour
+from cmpdesign.products.laser.refuse import duplicates, open_paths
 from extractor import Extractor
-from extractor.reference import parse_layout
+from extractor.layout.layout_file import parse_layout
 
 PX_PER_MM = 20.0
 
@@ -211,7 +211,7 @@ def test_times_are_those_of_the_moves() -> None:
     job = made_job(laser__passes="3")
     one, machine = job.cell_passes[0], job.setup.machine
     burn = run_gcode(drawing_to_gcode(job_drawing(job).only(one)))
-    length = lambda moves: np.hypot(*(np.array(moves)[:, 2:4] - np.array(moves)[:, :2]).T)  # noqa: E731
+    length = lambda moves: np.hypot(*(np.array(moves)[:, 2:4] - np.array(moves)[:, :2]).T)
     accel = machine.acceleration_mm_s2.value
     total = move_times_s(length(burn.burnt), one.speed_mm_s, accel).sum()
     total += move_times_s(length(burn.dark), machine.travel_mm_s.value, accel).sum()

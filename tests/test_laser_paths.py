@@ -11,15 +11,15 @@ from laser_tools import PIXEL_MM, Points, filled, groups_of, made_job, run_gcode
 from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
-from cmpdesign.layout import BLACK
-from cmpdesign.writers.laser.asmade import as_made
-from cmpdesign.writers.laser.beam import Beam
-from cmpdesign.writers.laser.cavities import Cavities, burnt_areas_mm2, burnt_outlines_mm, cavities
-from cmpdesign.writers.laser.corners import balanced_spur, sliver, spur_gain
-from cmpdesign.writers.laser.drawing import job_drawing
-from cmpdesign.writers.laser.fill import hatch, rings
-from cmpdesign.writers.laser.gcode import drawing_to_gcode
-from cmpdesign.writers.laser.kerf import inset, inset_outline, outset_outline, polygon_areas
+from cmpdesign.patterns.colors import BLACK
+from cmpdesign.products.laser.as_made import as_made
+from cmpdesign.products.laser.formats.drawing import job_drawing
+from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
+from cmpdesign.products.laser.paths.beam import Beam
+from cmpdesign.products.laser.paths.cavities import Cavities, burnt_areas_mm2, burnt_outlines_mm, cavities
+from cmpdesign.products.laser.paths.corners import balanced_spur, sliver, spur_gain
+from cmpdesign.products.laser.paths.fill import hatch, rings
+from cmpdesign.products.laser.paths.kerf import inset, inset_outline, outset_outline, polygon_areas
 
 TRIANGLE = 1.5 * np.array([(0, 0), (1, 0), (0.5, np.sqrt(0.75))])
 

@@ -12,14 +12,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design
+from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
-from cmpdesign.layout import BLACK, BLUE, GREEN, RED, WHITE, Layout
-from cmpdesign.measures import cell_areas_mm2
-from cmpdesign.numbering import axial_from_layer
-from cmpdesign.outline import rotation
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.measures import cell_areas_mm2
+from cmpdesign.layout.outline import rotation
 from cmpdesign.patterns import patterns
+from cmpdesign.patterns.colors import BLACK, BLUE, GREEN, RED, WHITE
+from cmpdesign.patterns.numbering import axial_from_layer
 
 NAMES = list(patterns())
 TRIANGULAR = [name for name, pattern in patterns().items() if pattern.graph.name == "triangular"]
@@ -356,8 +357,9 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 def test_docstring_examples() -> None:
     import cmpdesign.checks
-    import cmpdesign.design
     import cmpdesign.report
+
+    import cmpdesign.design
     import cmpdesign.units
 
     for module in (cmpdesign.build, cmpdesign.design, cmpdesign.checks, cmpdesign.report, cmpdesign.units):

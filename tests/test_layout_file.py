@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design
+from cmpdesign.design.design import Design
 from cmpdesign.errors import OutputError
-from cmpdesign.layout import COLORS, Layout
+from cmpdesign.files.atomic import write_file, write_folder
+from cmpdesign.files.layout_json import layout_to_json, write_layout
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns import patterns
-from cmpdesign.writers.atomic import write_file, write_folder
-from cmpdesign.writers.layout_file import layout_to_json, write_layout
+from cmpdesign.patterns.colors import COLORS
 
 
 def layout(pattern: str = "honeycomb", layers: int = 3) -> Layout:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from extractor.medians import median_of
+from extractor.numeric.median import median_of
 
 
 @settings(deadline=None)  # the first call may compile

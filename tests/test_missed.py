@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from extractor.missed import WITNESSES, _usual
+from extractor.numbering.missed_cells import WITNESSES, _usual
 
 INKS = np.array(
     [[0, 0, 0], [20, 30, 200], [30, 160, 40], [190, 60, 20]], np.uint8

@@ -13,17 +13,19 @@ from hypothesis import strategies as st
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.errors import DesignError
-from cmpdesign.mold import caps, finish, make, pad, shells
-from cmpdesign.mold.checks import check_mold, refuse_impossible
-from cmpdesign.mold.loops import Loop, circle, frustum_volume_mm3, polygon, rounded
-from cmpdesign.mold.measure import drafts_deg, measure, of_kind
-from cmpdesign.mold.meshes import make_meshes
-from cmpdesign.mold.parts import Part, parts_of
-from cmpdesign.mold.sheets import tiled_sheet
-from cmpdesign.mold.shells import Feature, Slab, slab_solid, slab_volume_mm3
-from cmpdesign.mold.stack import Stack, stack_of
-from cmpdesign.products import Maker
-from cmpdesign.writers.step import Solid, read_step, solid_to_step
+from cmpdesign.products.mold import finish, make, pad
+from cmpdesign.products.mold.checks import check_mold, refuse_impossible
+from cmpdesign.products.mold.meshes import make_meshes
+from cmpdesign.products.mold.parts import Part, parts_of
+from cmpdesign.products.mold.shapes import caps
+from cmpdesign.products.mold.solids import shells
+from cmpdesign.products.mold.solids.loops import Loop, circle, frustum_volume_mm3, polygon, rounded
+from cmpdesign.products.mold.solids.measure import drafts_deg, measure, of_kind
+from cmpdesign.products.mold.solids.shells import Feature, Slab, slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.tiled_faces import tiled_sheet
+from cmpdesign.products.mold.stack.stack import Stack, stack_of
+from cmpdesign.products.mold.step.step import Solid, read_step, solid_to_step
+from cmpdesign.products.registry import Maker
 
 DESIGNS = {
     "honeycomb": {"layers": "3"},

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.mold import make
-from cmpdesign.mold.bosses import STENCIL_LEAN, bosses
-from cmpdesign.mold.checks import facet_sag_mm
-from cmpdesign.mold.dished import dished_sheet
-from cmpdesign.mold.measure import distance_mm, of_kind, overlap_mm3, volume_mm3
-from cmpdesign.mold.pad import _cavities
-from cmpdesign.mold.parts import Part, parts_of
-from cmpdesign.mold.shells import Slab, slab_solid
-from cmpdesign.mold.stack import Stack, stack_of
-from cmpdesign.writers.step_assembly import Place
+from cmpdesign.products.mold import make
+from cmpdesign.products.mold.checks import facet_sag_mm
+from cmpdesign.products.mold.pad import _cavities
+from cmpdesign.products.mold.parts import Part, parts_of
+from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, bosses
+from cmpdesign.products.mold.shapes.dished import dished_sheet
+from cmpdesign.products.mold.solids.measure import distance_mm, of_kind, overlap_mm3, volume_mm3
+from cmpdesign.products.mold.solids.shells import Slab, slab_solid
+from cmpdesign.products.mold.stack.stack import Stack, stack_of
+from cmpdesign.products.mold.step.assembly import Place
 
 DESIGNS = {
     "honeycomb": {"layers": "2", "mold.clearance_mm": "0.16"},

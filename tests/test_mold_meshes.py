@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.mold import meshes as product
-from cmpdesign.mold.job_sheet import job_sheet
-from cmpdesign.mold.meshes import make_meshes, part_mesh
-from cmpdesign.mold.pad import pad_meshes
-from cmpdesign.mold.parts import parts_of
-from cmpdesign.mold.pictures import exploded
-from cmpdesign.mold.stack import stack_of
-from cmpdesign.products import Made
-from cmpdesign.writers.mesh_3mf import meshes_to_3mf, read_3mf
-from cmpdesign.writers.mesh_png import ABOVE, BELOW, View, draw_meshes
-from cmpdesign.writers.meshes import Mesh
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, View, draw_meshes
+from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
+from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mold import meshes as product
+from cmpdesign.products.mold.job_sheet import job_sheet
+from cmpdesign.products.mold.meshes import make_meshes, part_mesh
+from cmpdesign.products.mold.pad import pad_meshes
+from cmpdesign.products.mold.parts import parts_of
+from cmpdesign.products.mold.pictures import exploded
+from cmpdesign.products.mold.stack.stack import stack_of
+from cmpdesign.products.registry import Made
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_layers_fill_the_pad_without_gap_or_overlap() -> None:
     volumes = {mesh.name: mesh.volume_mm3() for mesh, _ in pad_meshes(stack)}
     middle = sum(volumes[name] for name in ("black", "red", "green", "blue", "white"))
     outline = stack.layout.outline_mm
-    from cmpdesign.mold.loops import frustum_volume_mm3, polygon
+    from cmpdesign.products.mold.solids.loops import frustum_volume_mm3, polygon
 
     edge = polygon(outline).moved(stack.lean * 4.0)
     assert middle == pytest.approx(frustum_volume_mm3(edge, edge.moved(stack.lean * 0.5), 0.5), rel=1e-9)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.mold.checks import check_mold
-from cmpdesign.mold.make import mold_figures
-from cmpdesign.mold.options import MoldOptions
-from cmpdesign.mold.parts import parts_of
-from cmpdesign.mold.stack import stack_of
-from cmpdesign.writers.print_sheet import make_print_sheet
-from cmpdesign.writers.sheet_options import SheetOptions
+from cmpdesign.design.mold_options import MoldOptions
+from cmpdesign.design.sheet_options import SheetOptions
+from cmpdesign.products.mold.checks import check_mold
+from cmpdesign.products.mold.make import mold_figures
+from cmpdesign.products.mold.parts import parts_of
+from cmpdesign.products.mold.stack.stack import stack_of
+from cmpdesign.products.sheet.print_sheet import make_print_sheet
 
 CROWNS = {
     "none": {},

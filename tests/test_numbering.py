@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmpdesign.numbering import (
+from cmpdesign.patterns.numbering import (
     axial_from_layer,
     id_from_axial,
     id_from_layer,

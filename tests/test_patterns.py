@@ -12,9 +12,9 @@ from scipy.integrate import quad
 from shapely import union_all
 from shapely.geometry import Polygon
 
-from cmpdesign.design import ASPECT_MAX, ASPECT_MIN
-from cmpdesign.graphs import TRIANGULAR, Graph
+from cmpdesign.design.design import ASPECT_MAX, ASPECT_MIN
 from cmpdesign.patterns import Pattern, Shape, patterns, register
+from cmpdesign.patterns.graphs import TRIANGULAR, Graph
 
 ALL = list(patterns().values())
 SHAPES = st.builds(

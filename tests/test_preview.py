@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design, load_design
-from cmpdesign.layout import COLORS, Layout
+from cmpdesign.design.design import Design, load_design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns import patterns
-from cmpdesign.writers.preview import LONG_SIDE_PX, MARGIN_PX, TITLE_PX, draw_preview, preview_png
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.drawing.preview import LONG_SIDE_PX, MARGIN_PX, TITLE_PX, draw_preview, preview_png
 
 
 def layout(pattern: str, **more: object) -> Layout:

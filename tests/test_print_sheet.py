@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.cli import app
-from cmpdesign.design import Design
+from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
-from cmpdesign.resolution import resolution_dpi
-from cmpdesign.sheet_key import SheetKey, parse_key
-from cmpdesign.sheet_reading import SheetBars, SheetReading, find_bars, measured
-from cmpdesign.sheet_verdict import PERSPECTIVE_TOLERANCE_MM
-from cmpdesign.writers.layout_file import layout_to_json
-from cmpdesign.writers.print_sheet import make_print_sheet
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.files.resolution import resolution_dpi
+from cmpdesign.products.sheet.key import SheetKey, parse_key
+from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_bars, measured
+from cmpdesign.products.sheet.verdict import PERSPECTIVE_TOLERANCE_MM
 
 DPI = 200.0
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]

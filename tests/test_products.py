@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from conftest import small_layout
 
-from cmpdesign import products
-from cmpdesign.checks import Finding
-from cmpdesign.design import Design, load_design
+from cmpdesign.design.design import Design, load_design
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.layout import Layout
-from cmpdesign.products import PRODUCTS, USUAL, Made, Product, chosen_products, make_products
-from cmpdesign.report import report
-from cmpdesign.writers.preview import draw_preview
+from cmpdesign.layout.checks import Finding
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.report import report
+from cmpdesign.products import registry as products
+from cmpdesign.products.drawing.preview import draw_preview
+from cmpdesign.products.registry import PRODUCTS, USUAL, Made, Product, chosen_products, make_products
 
 FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
 

@@ -15,9 +15,9 @@ import pytest
 from conftest import small_layout, small_text
 from photographs import View, photograph, raster_from_layout, rasterise, through
 
-from cmpdesign.layout import BLUE, GREEN, RED
 from cmpdesign.patterns import patterns
-from cmpdesign.writers.svg import layout_to_svg
+from cmpdesign.patterns.colors import BLUE, GREEN, RED
+from cmpdesign.products.drawing.svg import layout_to_svg
 from extractor import Extractor, Status, parse_layout
 
 TRIANGULAR = ("honeycomb", "round", "elliptical")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene.standard import standard_layout
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import parse_layout
-from extractor.lanes import LANES
-from extractor.quadratics import lay_quadratics
-from extractor.topology import Topology, topology_of
+from extractor.layout.topology import Topology, topology_of
+from extractor.localmap.regularised_maps import lay_quadratics
+from extractor.numeric.batched_systems import LANES
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ import pytest
 from test_drawing import extractor, shown
 
 from cmpdesign.scene import Camera
-from extractor import Status, refine
-from extractor.drawing import Draughtsman
-from extractor.fit import Fit
-from extractor.sight import Sight, Sights
+from extractor import Status
+from extractor.image.pyramid import Sight, Sights
+from extractor.refine import refiner as refine
+from extractor.refine.estimate import Fit
+from extractor.refine.synthesis_steps import Draughtsman
 
 
 @pytest.fixture

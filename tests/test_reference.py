@@ -15,11 +15,12 @@ from conftest import PATTERNS, small_document, small_layout, small_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
 from extractor.errors import LayoutError
-from extractor.reference import SCHEMA_PATH, Reference, load_layout, parse_layout
+from extractor.layout.layout_file import SCHEMA_PATH, load_layout, parse_layout
+from extractor.layout.reference import Reference
 
 SCHEMA = json.loads(SCHEMA_PATH.read_text(encoding="utf-8"))
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)

@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Optics, Scene, Sensor, render, standard_layout, standard_scene
-from cmpdesign.scene.bound import cramer_rao
-from cmpdesign.scene.camera import Camera
-from cmpdesign.scene.exact_bound import exact_bound
-from cmpdesign.scene.light import Light
-from cmpdesign.scene.surface import Press, Twist, composed
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.scene.bounds.bound import cramer_rao
+from cmpdesign.scene.bounds.exact_bound import exact_bound
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.parts.light import Light
+from cmpdesign.scene.parts.surface import Press, Twist, composed
 from extractor import Extractor, parse_layout
 
 SIZE = (300, 260)

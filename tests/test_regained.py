@@ -9,15 +9,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.stress_suite.frames import plain
-from benchmarks.stress_suite.reading import extractor_of
+from benchmarks.suites.scoring.reading import extractor_of
+from benchmarks.suites.stress.frames import plain
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene.standard import standard_layout
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Status, parse_layout
-from extractor.excerpt import alone, rows_of, with_rows
-from extractor.regained import ELSEWHERE, _gridlines_around
-from extractor.sure import DIRT, MAX_SHIFT, MAX_WHOLE_SHIFT, dirtied, lost_ones, sure_ones, unsure_ones
-from extractor.topology import Topology, topology_of
+from extractor.layout.topology import Topology, topology_of
+from extractor.refine.acceptance import (
+    DIRT,
+    MAX_SHIFT,
+    MAX_WHOLE_SHIFT,
+    dirtied,
+    lost_ones,
+    sure_ones,
+    unsure_ones,
+)
+from extractor.refine.recovered_markers import ELSEWHERE, _gridlines_around
+from extractor.refine.solve.subproblem import alone, rows_of, with_rows
 
 Array = NDArray[Any]
 
@@ -62,7 +70,7 @@ def test_what_was_lost_is_put_where_it_is(monkeypatch: pytest.MonkeyPatch) -> No
         xy[chosen], cov[chosen] = np.nan, np.nan
         return unsure_ones(xy, cov, *others)  # type: ignore[no-any-return]
 
-    monkeypatch.setattr("extractor.refine.unsure_ones", taken)
+    monkeypatch.setattr("extractor.refine.refiner.unsure_ones", taken)
     markers = extractor_of("honeycomb", 11).extract(shot.image)
     assert (markers.status[chosen] == Status.MEASURED).all()
     error = np.linalg.norm(markers.xy_px - shot.truths[0].marker_xy_px, axis=1)[chosen]

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from extractor.lanes import LANES
-from extractor.lattice import axial
-from extractor.neighbourhood import MIN_LINEAR, MIN_QUADRATIC, neighbour_table, predicted
+from extractor.layout.lattice import axial
+from extractor.layout.neighbour_tables import MIN_LINEAR, MIN_QUADRATIC, neighbour_table
+from extractor.localmap.neighbour_prediction import predicted
+from extractor.numeric.batched_systems import LANES
 
 LAYERS = 5
 

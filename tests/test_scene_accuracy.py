@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.scanlines import Window, edge_shifts, error, reference
+from benchmarks.support.scanlines import Window, edge_shifts, error, reference
 from cmpdesign.scene import (
     Camera,
     Dent,
@@ -21,7 +21,7 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.view import views
+from cmpdesign.scene.drawing.view import views
 
 SIZE = (200, 160)
 WINDOW = Window(70, 50, 60, 60)

@@ -17,9 +17,9 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.bound import edge_information
-from cmpdesign.scene.camera import Camera
-from cmpdesign.scene.render import render_truth
+from cmpdesign.scene.bounds.bound import edge_information
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.drawing.render import render_truth
 
 
 def rms_per_axis(covariance: np.ndarray) -> float:

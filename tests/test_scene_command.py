@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from cmpdesign.cli.app import app
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.layout import Layout
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import load_truth, load_truths, render, standard_layout
-from cmpdesign.scene.film import open_film
-from cmpdesign.writers.layout_file import layout_to_json
+from cmpdesign.scene.files.film import open_film
 
 
 @pytest.fixture(scope="module")

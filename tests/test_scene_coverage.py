@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.special import erf, ndtr
 
-from cmpdesign.scene.coverage import Engine, coverage
-from cmpdesign.scene.optics import box_gaussian, point_spread
-from cmpdesign.scene.paths import CHORD_PX, Segments, join, segments
+from cmpdesign.scene.drawing.coverage import Engine, coverage
+from cmpdesign.scene.drawing.paths import CHORD_PX, Segments, join, segments
+from cmpdesign.scene.parts.optics import box_gaussian, point_spread
 
 WIDTH, HEIGHT = SIZE = (23, 17)
 Points = NDArray[np.float64]

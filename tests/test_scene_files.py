@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cmpdesign.scene.sensor
 import cv2
 import numpy as np
 import pytest
 from scene_texts import MOVING, SIZE, scene_writer
 
-import cmpdesign.scene.sensor
-from cmpdesign.layout import Layout
+from cmpdesign.design.templates import scene_templates
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
     Camera,
     Damage,
@@ -37,8 +38,7 @@ from cmpdesign.scene import (
     save_truths,
     standard_layout,
 )
-from cmpdesign.scene.keys import flattened, value_at, with_values
-from cmpdesign.templates import scene_templates
+from cmpdesign.scene.files.key_frames import flattened, value_at, with_values
 
 ROOT = Path(__file__).parent.parent
 BALL = """
@@ -339,13 +339,13 @@ def test_what_is_absent_is_not_even_imported(tmp_path: Path) -> None:
         assert result.returncode == 0, result.stderr
         return set(result.stdout.split())
 
-    contact = {"cmpdesign.contact", "cmpdesign.scene.pressing", "scipy.ndimage", "shapely"}
+    contact = {"cmpdesign.contact", "cmpdesign.scene.files.contacts", "scipy.ndimage", "shapely"}
     optional = contact | {
         "scipy.special",
         "cv2",
         "extractor",
-        "cmpdesign.video",
-        "cmpdesign.scene.folds_compiled",
+        "cmpdesign.files.video",
+        "cmpdesign.scene.drawing.folds_compiled",
     }
     flat = loaded("size_px = [96, 80]\n[camera]\npitch_px = 16")
     assert flat & optional == set()
@@ -353,7 +353,7 @@ def test_what_is_absent_is_not_even_imported(tmp_path: Path) -> None:
 
 
 def test_what_is_absent_is_not_called(written, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
-    module = sys.modules["cmpdesign.scene.render"]
+    module = sys.modules["cmpdesign.scene.drawing.render"]
     called: list[str] = []
     for name in ("gain", "add_hidden_parts", "bled", "missing", "_with_dirt", "point_spread"):
         original = getattr(module, name)
@@ -363,7 +363,7 @@ def test_what_is_absent_is_not_called(written, monkeypatch: pytest.MonkeyPatch) 
             return _original(*args)  # type: ignore[operator]
 
         monkeypatch.setattr(module, name, noted)
-    found = sys.modules["cmpdesign.scene.view"]
+    found = sys.modules["cmpdesign.scene.drawing.view"]
     monkeypatch.setattr(found, "find_folds", lambda *_: called.append("find_folds"))
     monkeypatch.setattr(cmpdesign.scene.sensor, "_jpeg", lambda *_: called.append("jpeg"))
     file = written("size_px = [96, 80]\n[camera]\npitch_px = 16")

@@ -10,7 +10,8 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
-from cmpdesign.layout import BLACK, Layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import (
     Blob,
     Damage,
@@ -23,9 +24,9 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
-from cmpdesign.scene.folds import add_hidden_parts
-from cmpdesign.scene.patches import patches, subdivision
-from cmpdesign.scene.view import look
+from cmpdesign.scene.drawing.folds import add_hidden_parts
+from cmpdesign.scene.drawing.patches import patches, subdivision
+from cmpdesign.scene.drawing.view import look
 
 SIZE = (200, 160)
 WINDOW = (slice(50, 110), slice(75, 140))  # rows and columns around the dent
@@ -69,7 +70,7 @@ def test_the_nearest_part_is_drawn(steep: Scene, monkeypatch: pytest.MonkeyPatch
     error = np.abs(drawn.image[WINDOW] - expected[WINDOW]).mean(axis=2)
     assert error.max() < 100 and error.mean() < 2.0  # the buffer's own edges are a third of a pixel wide
     # Without the correction it is wrong there, so the comparison can fail.
-    monkeypatch.setattr(sys.modules["cmpdesign.scene.render"], "add_hidden_parts", lambda *_: None)
+    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "add_hidden_parts", lambda *_: None)
     signed = np.abs(render(steep, size=SIZE).image[WINDOW] - expected[WINDOW]).mean(axis=2)
     assert (signed > 100).mean() > 0.003
 
@@ -93,7 +94,7 @@ def test_hidden_markers_are_not_visible(steep: Scene) -> None:
 def test_nothing_changes_beside_the_fold(steep: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     blurred = replace(steep, optics=Optics(1.0))
     with_it = render(blurred, size=SIZE).image.astype(int)
-    monkeypatch.setattr(sys.modules["cmpdesign.scene.render"], "add_hidden_parts", lambda *_: None)
+    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "add_hidden_parts", lambda *_: None)
     changed = np.abs(with_it - render(blurred, size=SIZE).image).max(axis=2) > 0
     assert 20 < changed.sum() < 0.03 * changed.size
     rows, columns = np.nonzero(changed)

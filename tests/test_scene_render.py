@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cmpdesign.errors import OutputError
-from cmpdesign.layout import BLACK, GREEN, RED, Layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, GREEN, RED
 from cmpdesign.scene import (
     Blob,
     Busy,
@@ -39,7 +40,7 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.camera import project
+from cmpdesign.scene.camera.plain import project
 from cmpdesign.scene.standard import INKS
 
 SIZE = (320, 280)

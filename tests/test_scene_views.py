@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cmpdesign.layout import COLORS, Layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import COLORS
 from cmpdesign.scene import (
     Blob,
     Camera,
@@ -28,10 +29,10 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
-from cmpdesign.scene.camera import homography, pinhole
-from cmpdesign.scene.pinhole import distorted, project_3d
+from cmpdesign.scene.camera.pinhole import distorted, project_3d
+from cmpdesign.scene.camera.plain import homography, pinhole
+from cmpdesign.scene.drawing.view import look
 from cmpdesign.scene.standard import INKS
-from cmpdesign.scene.view import look
 
 SIZE = (320, 240)
 BARREL = (-0.21, 0.06, 0.002, -0.003, -0.01)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr, owens_t
 
-from extractor.gaussian import OF_CORNER, correlated, lay_corner, normal
-from extractor.painting import draw_cells, erase_cells, room_for_strokes
+from extractor.numeric.gaussian import OF_CORNER, correlated, lay_corner, normal
+from extractor.refine.synthesis.pattern_drawing import draw_cells, erase_cells, room_for_strokes
 
 FINE, SIGMA, SHAPE = 15, 2.0, (100, 110)  # an odd number: pixels' middles are sampled
 near = st.floats(-3.2, 3.2).filter(lambda z: abs(z) > 1e-3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from extractor.sight import Sights
+from extractor.image.pyramid import Sights
 
 
 @pytest.mark.parametrize("scale", [1, 2, 3, 4, 7, 17])

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.mold.measure import measure, volume_mm3
-from cmpdesign.mold.parts import parts_of
-from cmpdesign.mold.stack import stack_of
-from cmpdesign.writers.step import Solid, read_step, solid_to_step
-from cmpdesign.writers.step_text import real
+from cmpdesign.products.mold.parts import parts_of
+from cmpdesign.products.mold.solids.measure import measure, volume_mm3
+from cmpdesign.products.mold.stack.stack import stack_of
+from cmpdesign.products.mold.step.step import Solid, read_step, solid_to_step
+from cmpdesign.products.mold.step.text import real
 
 CROWNS = ("flat", "sphere", "cylinder")
 

@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cmpdesign.layout import Layout
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Blob, Damage, Press, Scratch, Surface, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
-from extractor.gridlines import local_maps
+from extractor.layout.topology import Topology, topology_of
 from extractor.presets import Preset
-from extractor.straying import doubted_ones, straying
-from extractor.topology import Topology, topology_of
+from extractor.refine.outliers import doubted_ones, straying
+from extractor.refine.synthesis.gridlines import local_maps
 
 Array = NDArray[np.float64]
 SCRATCH = Damage(scratches=(Scratch((-7.0, 0.5), (1.0, 6.5), 0.5, (150.0, 150.0, 150.0)),))

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.stress import main
-from benchmarks.stress_suite.conditions import BY_NAME, KINDS, cases
-from benchmarks.stress_suite.frames import PATTERNS, Shot, plain
-from benchmarks.stress_suite.kinds import Case, Kind
-from benchmarks.stress_suite.reading import Result, extractor_of, read
-from benchmarks.stress_suite.report import PROMISED_SHARE, failures, rows_of
-from benchmarks.stress_suite.score import score, smallest_contrast
+from benchmarks.stress.__main__ import main
+from benchmarks.suites.scoring.reading import Result, extractor_of, read
+from benchmarks.suites.scoring.report import PROMISED_SHARE, failures, rows_of
+from benchmarks.suites.scoring.score import score, smallest_contrast
+from benchmarks.suites.stress.conditions import BY_NAME, KINDS, cases
+from benchmarks.suites.stress.frames import PATTERNS, Shot, plain
+from benchmarks.suites.stress.kinds import Case, Kind
 from extractor import Markers, Status
 
 STANDARD_STEPS = ("megapixels", "small cells", "medium cells", "large cells")  # whose later steps are large

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import svgelements
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design, load_design
-from cmpdesign.layout import BLACK, COLORS, Layout
+from cmpdesign.design.design import Design, load_design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns import patterns
-from cmpdesign.writers.svg import layout_to_svg, scale_length_mm
+from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.drawing.svg import layout_to_svg, scale_length_mm
 
 # svgelements converts the sheet's mm to pixels of 1/96 inch and takes 1 mm for 0.0393701 inch.
 PX_PER_MM = 96 * 0.0393701

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.stress_suite.frames import Shot, plain
-from benchmarks.stress_suite.reading import extractor_of
+from benchmarks.suites.scoring.reading import extractor_of
+from benchmarks.suites.stress.frames import Shot, plain
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene.standard import standard_layout
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Markers, parse_layout
-from extractor.swelling import shrunk, swelling_of, unswollen
-from extractor.synthesis import AA, AB, AC, AD, BB, BC, BD, MISFIT, SUMS, C, D
-from extractor.topology import Topology, topology_of
+from extractor.layout.topology import Topology, topology_of
+from extractor.refine.synthesis.dot_gain import shrunk, swelling_of, unswollen
+from extractor.refine.synthesis.residual_kernel import AA, AB, AC, AD, BB, BC, BD, MISFIT, SUMS, C, D
 
 Array = NDArray[Any]
 BLUR = 0.6

@@ -8,13 +8,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cmpdesign.build import build_layout
-from cmpdesign.checks import check_design
-from cmpdesign.design import design_schema, load_design
+from cmpdesign.design.design import design_schema, load_design
+from cmpdesign.design.templates import find_design, templates
 from cmpdesign.errors import DesignError
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.checks import check_design
+from cmpdesign.layout.report import report
 from cmpdesign.patterns import patterns
-from cmpdesign.report import report
-from cmpdesign.templates import find_design, templates
 
 NAMES = list(templates())
 

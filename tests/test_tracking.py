@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from tracking_scenes import LAYERS, PITCH_MM, PITCH_PX, SIZE, errors, moving, reference, scene, shot
 
 from cmpdesign.scene import Camera, Light, Optics, Press, Rendered, composed, render
-from cmpdesign.scene.camera import homography
+from cmpdesign.scene.camera.plain import homography
 from extractor import Extractor, FrameStatus, StartKind, Status, Tracker
 from extractor.errors import LayoutError
-from extractor.warm_tables import completed, tables_of
+from extractor.track.warm_tables import completed, tables_of
 
 WRONG_PX = 0.4 * PITCH_PX
 

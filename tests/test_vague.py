@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Blob, Damage, Press, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Status, parse_layout
-from extractor.vague import VAGUE, blend, vague_ones
+from extractor.complete.uncertain_markers import VAGUE, blend, vague_ones
 
 Array = NDArray[Any]
 
@@ -71,7 +71,7 @@ def test_under_dirt_others_help(pattern: str, monkeypatch: pytest.MonkeyPatch) -
     extractor = Extractor(parse_layout(layout_to_json(layout)))
     blended = extractor.extract(seen.image)
     monkeypatch.setattr(
-        "extractor.repair.vague_ones", lambda cov, edge: (np.zeros(len(edge), np.bool_), False)
+        "extractor.complete.repair.vague_ones", lambda cov, edge: (np.zeros(len(edge), np.bool_), False)
     )
     alone = extractor.extract(seen.image)
     both = (blended.status == Status.MEASURED) & (alone.status == Status.MEASURED)

@@ -12,10 +12,10 @@ from conftest import small_layout, small_text
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.reading.verify import judge, verify
 from cmpdesign.scene import Camera, Light, Optics, Rendered, Scene, Sensor, colored_leds, render
-from cmpdesign.verify import judge, verify
 from extractor import Extractor, Markers, Reason, parse_layout
-from extractor.reference import Reference
+from extractor.layout.reference import Reference
 
 LAYERS = 4
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from view_scenes import DISTORTION, looking, opencv_px, pair, pressed, reference
 
 from extractor import RigError, View, load_rig, parse_rig
-from extractor.camera import distorted, undistorted
+from extractor.space.camera import distorted, undistorted
 
 RIG = """
 [[view]]

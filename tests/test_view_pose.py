@@ -7,7 +7,7 @@ import pytest
 from view_scenes import flat, looking, noisy, opencv_px, pair, reference, unplaced
 
 from extractor import PoseError, View
-from extractor.pose import place_views
+from extractor.space.pose import place_views
 
 NONE = (0.0, 0.0, 0.0)
 

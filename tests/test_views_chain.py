@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from view_scenes import HALF, SMALL, Array, binocular, binocular_shot, contact, reference, rig_of
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import load_scene, render
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import (
     FrameStatus,
     ImageError,

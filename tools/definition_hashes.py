@@ -18,10 +18,13 @@ FOLDERS = ("extractor", "cmpdesign", "benchmarks")
 
 
 class WithoutModules(ast.NodeTransformer):
-    """Takes away which module an import within a definition names."""
+    """Takes away imports within a definition, and keeps the names that they bring."""
 
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom:
-        return ast.ImportFrom(module="", names=node.names, level=0)
+    def __init__(self) -> None:
+        self.brought: set[str] = set()
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
+        self.brought |= {alias.asname or alias.name for alias in node.names}
 
 
 def definitions(path: Path) -> list[str]:
@@ -35,7 +38,8 @@ def definitions(path: Path) -> list[str]:
             name = ",".join(ast.unparse(target) for target in targets)
         else:
             continue
-        tree = ast.dump(WithoutModules().visit(node))
+        without = WithoutModules()
+        tree = ast.dump(without.visit(node)) + ",".join(sorted(without.brought))
         lines.append(f"{hashlib.sha256(tree.encode()).hexdigest()[:24]}  {name}")
     return lines
 

@@ -15,7 +15,6 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +87,9 @@ def scenes(pattern: str, layers: int) -> dict[str, Scene]:
     noisy = Sensor(noise=2)
 
     def scene(**parts: Any) -> Scene:
-        return Scene(**{"layout": layout, "camera": camera, "optics": Optics(1.0), "sensor": noisy, "seed": 5, **parts})
+        return Scene(
+            **{"layout": layout, "camera": camera, "optics": Optics(1.0), "sensor": noisy, "seed": 5, **parts}
+        )
 
     bent = composed(Press(radius_mm=5, depth_mm=0.9), Twist(radius_mm=6, angle_deg=15))
     return {
@@ -139,7 +140,10 @@ def reads(folder: Path) -> Iterator[tuple[str, str]]:
 def tracks(folder: Path) -> Iterator[tuple[str, str]]:
     layout = folder / "made" / "tac3d" / "layout.json"
     frames = folder / "frames"
-    yield "sequence exit", str(command("render", str(layout), "--scene", "press-and-twist", "-o", str(frames)))
+    yield (
+        "sequence exit",
+        str(command("render", str(layout), "--scene", "press-and-twist", "-o", str(frames))),
+    )
     from cv2 import imread
 
     for warm in (True, False):
@@ -171,7 +175,11 @@ def shapes(folder: Path) -> Iterator[tuple[str, str]]:
 def evaluations(folder: Path) -> Iterator[tuple[str, str]]:
     import json
 
-    for name, options in (("precision", ("--trials", "1")), ("reliability", ("--trials", "1")), ("angles", ())):
+    for name, options in (
+        ("precision", ("--trials", "1")),
+        ("reliability", ("--trials", "1")),
+        ("angles", ()),
+    ):
         out = folder / name
         yield f"evaluate {name} exit", str(command("evaluate", name, "-o", str(out), *options))
         report = json.loads((out / "report.json").read_text(encoding="utf-8"))
@@ -181,7 +189,9 @@ def evaluations(folder: Path) -> Iterator[tuple[str, str]]:
 def without_times(value: Any) -> Any:
     """A report without what differs from run to run."""
     if isinstance(value, dict):
-        return {k: without_times(v) for k, v in value.items() if not k.endswith(("_ms", "_s", "digest", "code"))}
+        return {
+            k: without_times(v) for k, v in value.items() if not k.endswith(("_ms", "_s", "digest", "code"))
+        }
     return [without_times(item) for item in value] if isinstance(value, list) else value
 
 

@@ -23,10 +23,10 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = os.environ["RA
 import cv2
 from rich.console import Console
 
-from benchmarks.comparison.measure import CASES, Result, measure
-from benchmarks.comparison.report import markdown, scene_table
-from benchmarks.machine import sentence, write_json
-from benchmarks.published import publish
+from benchmarks.suites.comparison.measure import CASES, Result, measure
+from benchmarks.suites.comparison.report import markdown, scene_table
+from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.published import publish
 
 REPETITIONS, QUICK_REPETITIONS = 11, 3
 

@@ -8,7 +8,18 @@ import typer
 from typer.core import TyperGroup
 
 from cmpdesign import __version__
-from cmpdesign.cli import build, check, evaluate, kerf, reconstruct, render, schema, templates, track, verify
+from cmpdesign.cli.commands import (
+    build,
+    check,
+    evaluate,
+    kerf,
+    reconstruct,
+    render,
+    schema,
+    templates,
+    track,
+    verify,
+)
 from cmpdesign.cli.terminal import BAD_INPUT, is_expected, print_error
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.increment import TOLERANCE, TOLERANCE_RUBBING, Problem, State
+from cmpdesign.contact.friction.increment import TOLERANCE, TOLERANCE_RUBBING, Problem, State
 from cmpdesign.contact.result import Contact
 from cmpdesign.contact.strain import LINEAR_UP_TO, largest_strain
 

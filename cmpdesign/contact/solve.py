@@ -9,10 +9,10 @@ import numpy as np
 
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import ContactError, require
+from cmpdesign.contact.friction.increment import Problem, State, advance, untouched
 from cmpdesign.contact.grid import make_grid
-from cmpdesign.contact.increment import Problem, State, advance, untouched
 from cmpdesign.contact.motion import Motion
-from cmpdesign.contact.objects import Indenter
+from cmpdesign.contact.objects.objects import Indenter
 from cmpdesign.contact.report import report
 from cmpdesign.contact.result import Contact
 

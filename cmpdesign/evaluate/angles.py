@@ -38,7 +38,7 @@ def trials(options: Options) -> list[Trial]:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The first angle, in steps of ``STEP_DEG``, at which a cell is lost."""
-    from cmpdesign.evaluate.cells import number_holds, shape_holds
+    from cmpdesign.evaluate.measures.cells import number_holds, shape_holds
 
     holds, limit = (
         (shape_holds, change_limit_deg) if values["kind"] == "shape" else (number_holds, turn_limit_deg)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from cmpdesign.design import Design
+from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.contacts import Load, surface
-from cmpdesign.evaluate.instrument import Instrument, instrument_of
 from cmpdesign.evaluate.precision import MEASURES
+from cmpdesign.evaluate.report.statistics import number, spread
 from cmpdesign.evaluate.runner import Options, Trial, rng
-from cmpdesign.evaluate.sensor import parse_sensor
-from cmpdesign.evaluate.statistics import number, spread
+from cmpdesign.evaluate.simulated.contacts import Load, surface
+from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_of
+from cmpdesign.evaluate.simulated.sensor import parse_sensor
 
 REACH_MM = 4.0
 
@@ -69,8 +69,8 @@ def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One design under one contact; the place and the light are the same for all designs."""
-    from cmpdesign.evaluate.conditions import draw
-    from cmpdesign.evaluate.shapes import compared
+    from cmpdesign.evaluate.measures.shapes import compared
+    from cmpdesign.evaluate.simulated.conditions import draw
 
     one = _instrument(values["sensor"], values["design"], values["preset"])
     load = one.sensor.table.load[values["load"]]
@@ -99,8 +99,8 @@ def figures(
 
 def costs(design: Design) -> dict[str, Any]:
     """What a design is and what it takes to make: density, smallest feature, laser time."""
-    from cmpdesign.build import build_layout
-    from cmpdesign.measures import cell_areas_mm2, cell_widths_mm
+    from cmpdesign.layout.build import build_layout
+    from cmpdesign.layout.measures import cell_areas_mm2, cell_widths_mm
 
     layout = build_layout(design)
     markers = int(layout.present.sum())
@@ -116,11 +116,11 @@ def costs(design: Design) -> dict[str, Any]:
 
 def laser_time_s(design: Design) -> float | None:
     """How long the design's laser job takes; None where it cannot be made, with its own machine and material."""
-    from cmpdesign.build import build_layout
     from cmpdesign.errors import DesignError
-    from cmpdesign.laser.setup import complete
-    from cmpdesign.writers.laser.figures import timing
-    from cmpdesign.writers.laser.job import make_job
+    from cmpdesign.layout.build import build_layout
+    from cmpdesign.products.laser.figures import timing
+    from cmpdesign.products.laser.job import make_job
+    from cmpdesign.products.laser.setup import complete
 
     try:
         job = make_job(design.name, build_layout(design), complete(design.laser))

@@ -12,7 +12,7 @@ from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.designs import Entry
 from cmpdesign.evaluate.journal import Journal
-from cmpdesign.evaluate.page import Section, page
+from cmpdesign.evaluate.report.page import Section, page
 from cmpdesign.evaluate.runner import Options, Trial, Work, run
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
@@ -83,7 +83,7 @@ def evaluate(
         CmpDesignError: the folder holds a run under other conditions, or a value out of range.
         OutputError: something cannot be written; the trials done are kept.
     """
-    from cmpdesign.writers.atomic import write_folder
+    from cmpdesign.files.atomic import write_folder
 
     conditions = {"experiment": one.name, "version": __version__, **options.values}
     todo = one.trials(options)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article, cube
-from cmpdesign.evaluate.contacts import REST, Load, surface
+from cmpdesign.evaluate import article
+from cmpdesign.evaluate.measures import cube
+from cmpdesign.evaluate.report.statistics import number, spread
 from cmpdesign.evaluate.runner import Options, Trial, rng
-from cmpdesign.evaluate.statistics import number, spread
+from cmpdesign.evaluate.simulated.contacts import REST, Load, surface
 
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0
@@ -43,9 +44,9 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One object or cube at one place, with both patterns."""
     if "mode" in values:
         return cube.work(values)
-    from cmpdesign.evaluate.conditions import middle
-    from cmpdesign.evaluate.instrument import instrument
-    from cmpdesign.evaluate.shapes import compared
+    from cmpdesign.evaluate.measures.shapes import compared
+    from cmpdesign.evaluate.simulated.conditions import middle
+    from cmpdesign.evaluate.simulated.instrument import instrument
 
     text = values["sensor"]
     random = rng(values["seed"], values["object"], values["index"])

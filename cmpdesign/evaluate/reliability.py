@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.evaluate import article
-from cmpdesign.evaluate.contacts import Load, Moved, surface
-from cmpdesign.evaluate.instrument import Instrument, instrument
+from cmpdesign.evaluate.report.statistics import Share, spread
 from cmpdesign.evaluate.runner import Options, Trial, rng
-from cmpdesign.evaluate.statistics import Share, spread
+from cmpdesign.evaluate.simulated.contacts import Load, Moved, surface
+from cmpdesign.evaluate.simulated.instrument import Instrument, instrument
 
 if TYPE_CHECKING:
-    from cmpdesign.evaluate.conditions import Drawn
+    from cmpdesign.evaluate.simulated.conditions import Drawn
     from cmpdesign.scene import Rendered
     from cmpdesign.scene.truth import Truth
     from extractor import Markers
@@ -56,8 +56,8 @@ def trials(options: Options) -> list[Trial]:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """What each method reads of one contact."""
-    from cmpdesign.evaluate.conditions import draw
-    from extractor.types import Status
+    from cmpdesign.evaluate.simulated.conditions import draw
+    from extractor.result import Status
 
     text, mode = values["sensor"], values["mode"]
     random = rng(values["seed"], mode, values["index"])

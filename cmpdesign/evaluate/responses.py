@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article, cube
+from cmpdesign.evaluate import article
+from cmpdesign.evaluate.measures import cube
 from cmpdesign.evaluate.precision import cube_trials
+from cmpdesign.evaluate.report.statistics import number, spread
 from cmpdesign.evaluate.runner import Options, Trial
-from cmpdesign.evaluate.statistics import number, spread
 
 METHODS = cube.SHOWN
 CASES = {"shear_x": "press_shear_x", "shear_y": "press_shear"}

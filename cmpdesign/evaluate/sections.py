@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import plots
-from cmpdesign.evaluate.page import Plot, Section, Table
 from cmpdesign.evaluate.reliability import METHODS
+from cmpdesign.evaluate.report import plots
+from cmpdesign.evaluate.report.page import Plot, Section, Table
 
 Document = Mapping[str, Any]
 

@@ -12,8 +12,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.graphs import Graph
-from cmpdesign.numbering import Ints
+from cmpdesign.patterns.graphs import Graph
+from cmpdesign.patterns.numbering import Ints
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.graphs import TRIANGULAR
-from cmpdesign.numbering import Ints, axial_from_layer
 from cmpdesign.patterns import Shape, register
+from cmpdesign.patterns.graphs import TRIANGULAR
+from cmpdesign.patterns.numbering import Ints, axial_from_layer
 
 
 @register("honeycomb", TRIANGULAR)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.graphs import SQUARE
-from cmpdesign.numbering import Ints
 from cmpdesign.patterns import Shape, register
+from cmpdesign.patterns.graphs import SQUARE
+from cmpdesign.patterns.numbering import Ints
 
 
 @register("square", SQUARE)

@@ -7,24 +7,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cmpdesign.scene.background import Busy, Gradient, Paper, Picture, Plain
-from cmpdesign.scene.bound import cramer_rao
-from cmpdesign.scene.camera import Camera
-from cmpdesign.scene.damage import Blob, Damage, Glare, Scratch
+from cmpdesign.scene.bounds.bound import cramer_rao
+from cmpdesign.scene.camera.pinhole import Pinhole
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.drawing.render import Rendered, render
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.light import Led, Light, colored_leds
-from cmpdesign.scene.optics import Optics
-from cmpdesign.scene.pinhole import Pinhole
-from cmpdesign.scene.render import Rendered, render
+from cmpdesign.scene.parts.background import Busy, Gradient, Paper, Picture, Plain
+from cmpdesign.scene.parts.damage import Blob, Damage, Glare, Scratch
+from cmpdesign.scene.parts.light import Led, Light, colored_leds
+from cmpdesign.scene.parts.optics import Optics
+from cmpdesign.scene.parts.sensor import Sensor
+from cmpdesign.scene.parts.surface import Dent, Press, Shear, Surface, Twist, composed
 from cmpdesign.scene.scene import Scene
-from cmpdesign.scene.sensor import Sensor
 from cmpdesign.scene.standard import STANDARD_SIZE, standard_layout, standard_scene
-from cmpdesign.scene.surface import Dent, Press, Shear, Surface, Twist, composed
 from cmpdesign.scene.truth import Truth, load_truth, load_truths, save_truth, save_truths
 
 if TYPE_CHECKING:
-    from cmpdesign.scene.file import SceneFile as SceneFile
-    from cmpdesign.scene.file import load_scene as load_scene
+    from cmpdesign.scene.files.scene_file import SceneFile as SceneFile
+    from cmpdesign.scene.files.scene_file import load_scene as load_scene
 
 
 __all__ = [
@@ -72,6 +72,6 @@ def __getattr__(name: str) -> Any:
     """Scene files need pydantic, which scenes made in Python do not."""
     if name not in ("SceneFile", "load_scene"):
         raise AttributeError(f"module 'cmpdesign.scene' has no attribute {name!r}")
-    from cmpdesign.scene import file
+    from cmpdesign.scene.files import scene_file as file
 
     return getattr(file, name)

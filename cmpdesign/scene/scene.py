@@ -9,16 +9,17 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.layout import COLORS, Layout
-from cmpdesign.scene.background import Background, Plain
-from cmpdesign.scene.camera import Camera
-from cmpdesign.scene.damage import Damage
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.scene.camera.pinhole import Pinhole
+from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.light import Light
-from cmpdesign.scene.optics import Optics
-from cmpdesign.scene.pinhole import Pinhole
-from cmpdesign.scene.sensor import Sensor
-from cmpdesign.scene.surface import Surface
+from cmpdesign.scene.parts.background import Background, Plain
+from cmpdesign.scene.parts.damage import Damage
+from cmpdesign.scene.parts.light import Light
+from cmpdesign.scene.parts.optics import Optics
+from cmpdesign.scene.parts.sensor import Sensor
+from cmpdesign.scene.parts.surface import Surface
 
 RGB = tuple[float, float, float]
 Points = NDArray[np.float64]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from cmpdesign.layout import Layout
-from cmpdesign.scene.background import Plain
-from cmpdesign.scene.camera import Camera
-from cmpdesign.scene.optics import Optics
+from cmpdesign.layout.layout import Layout
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.parts.background import Plain
+from cmpdesign.scene.parts.optics import Optics
+from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
-from cmpdesign.scene.sensor import Sensor
 
 BLACK_RGB = (20.0, 20.0, 20.0)
 INKS = {
@@ -23,8 +23,8 @@ STANDARD_LAYERS = 11
 
 def standard_layout(pattern: str = "honeycomb", layers: int = STANDARD_LAYERS) -> Layout:
     """The pattern of the standard scene."""
-    from cmpdesign.build import build_layout
-    from cmpdesign.design import load_design
+    from cmpdesign.design.design import load_design
+    from cmpdesign.layout.build import build_layout
 
     return build_layout(load_design(pattern, {"layers": str(layers), "pitch_mm": "1.0"}))
 

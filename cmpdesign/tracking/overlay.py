@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.video import CODECS, Video
+from cmpdesign.files.video import CODECS, Video
 
 if TYPE_CHECKING:
-    from extractor.displacement import Rest
-    from extractor.reference import Reference
-    from extractor.tracking import Tracked
+    from extractor.layout.reference import Reference
+    from extractor.track.displacement import Rest
+    from extractor.track.tracker import Tracked
 
 Picture = NDArray[np.uint8]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from extractor.displacement import Rest
-    from extractor.reference import Reference
-    from extractor.tracking import Tracked
+    from extractor.layout.reference import Reference
+    from extractor.track.displacement import Rest
+    from extractor.track.tracker import Tracked
 
 Picture = NDArray[np.uint8]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.images import read_image
+from cmpdesign.files.images import read_image
 from cmpdesign.tracking.overlay import Overlay
 from cmpdesign.tracking.sinks import Sink
 from cmpdesign.tracking.sources import Source, open_source

@@ -10,8 +10,8 @@ import numpy as np
 from cmpdesign.tracking.summary import percentiles
 
 if TYPE_CHECKING:
-    from extractor.stereo import Reconstructor
-    from extractor.views import ShapeFrame
+    from extractor.space.reconstruction import Reconstructor
+    from extractor.space.views import ShapeFrame
 
 
 class ShapeTally:

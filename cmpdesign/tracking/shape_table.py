@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.table import HEAD, Columns, head, long_head
+from cmpdesign.tracking.columns import HEAD, Columns, head, long_head
 
 if TYPE_CHECKING:
-    from extractor.stereo import Reconstructor, Shape
-    from extractor.views import ShapeFrame
+    from extractor.space.reconstruction import Reconstructor, Shape
+    from extractor.space.views import ShapeFrame
 
 TRIPLES = {
     "3D_Positions": ("x_mm", "y_mm", "z_mm"),

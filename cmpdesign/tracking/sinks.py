@@ -17,7 +17,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.tracking.table import HEAD, Columns, Table, long_form_of
+from cmpdesign.tracking.columns import HEAD, Columns, Table
+from cmpdesign.tracking.table import long_form_of
 
 CHUNK_FRAMES = 256
 CHUNK_S = 5.0  # what a crash can cost

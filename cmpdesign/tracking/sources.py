@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.images import ImageFileError, read_image
+from cmpdesign.files.images import ImageFileError, read_image
 
 IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0

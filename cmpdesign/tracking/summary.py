@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from extractor.displacement import Rest
-    from extractor.reference import Reference
-    from extractor.tracking import Tracked
+    from extractor.layout.reference import Reference
+    from extractor.track.displacement import Rest
+    from extractor.track.tracker import Tracked
 
 AT_REST_PX = 0.2  # median displacement below which the pattern counts as resting
 MIN_REST_PAIRS = 10  # resting frames after resting frames, below which no jitter is stated

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmpdesign.writers.atomic import write_file
+from cmpdesign.files.atomic import write_file
 
 from .everything import IMAGES, pages, pictures
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import Design
-from cmpdesign.layout import BLACK, Layout
+from cmpdesign.design.design import Design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK
 
 from .sketch import ACCENT, FAINT, INK, Sketch
 

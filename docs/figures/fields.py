@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from cmpdesign.design import Design, Palette, design_schema
+from cmpdesign.design.design import Design, Palette, design_schema
 from cmpdesign.patterns import patterns
 from cmpdesign.units import ANGLES_DEG, LENGTHS_MM
 

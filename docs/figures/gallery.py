@@ -5,12 +5,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
+from cmpdesign.design.design import load_design
+from cmpdesign.design.templates import templates
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.report import report
 from cmpdesign.patterns import patterns
-from cmpdesign.report import report
-from cmpdesign.templates import templates
-from cmpdesign.writers.preview import MARGIN_PX, TITLE_PX, draw_preview
+from cmpdesign.products.drawing.preview import MARGIN_PX, TITLE_PX, draw_preview
 
 WIDTH_PX = 520
 PATTERN_LAYERS = 4  # few enough that ids can be read

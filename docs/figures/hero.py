@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.layout import BLACK, COLORS, Layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, COLORS
 
 from .sample import Sample, sample
 

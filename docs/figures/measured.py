@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
-from benchmarks.comparison.measure import Result
-from benchmarks.comparison.report import markdown, picture
-from benchmarks.machine import sentence
-from benchmarks.published import measured, pages_with
+from benchmarks.suites.comparison.measure import Result
+from benchmarks.suites.comparison.report import markdown, picture
+from benchmarks.support.machine import sentence
+from benchmarks.support.published import measured, pages_with
 
 
 def _compared() -> list[Result]:

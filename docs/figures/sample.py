@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
-from cmpdesign.layout import Layout
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Gradient, Optics, Press, Scene, Sensor, Shear, composed, render
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Extractor, Markers, Reference, parse_layout
 
 SIZE = (640, 480)

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.build import build_layout
-from cmpdesign.design import load_design
+from cmpdesign.design.design import load_design
+from cmpdesign.design.templates import scene_templates
+from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import Scene, load_scene, render
-from cmpdesign.templates import scene_templates
 
 ORDER = ("flat-print", "pressed-ball", "tac3d-binocular", "press-and-twist")
 TILE_PX = (400, 300)
@@ -21,7 +21,7 @@ STEP = 8  # of the colors: what PNG packs better
 
 def figures() -> dict[str, bytes]:
     """File name -> PNG."""
-    from cmpdesign.images import to_png
+    from cmpdesign.files.images import to_png
 
     tiles = dict(_tiles())
     rows = [np.hstack([_framed(tiles[name]) for name in pair]) for pair in (ORDER[:2], ORDER[2:])]

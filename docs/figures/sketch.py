@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.layout import BLACK, COLORS, Layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, COLORS
 
 INK, FAINT, ACCENT, PAPER = "#2b2f36", "#8a9099", "#d9480f", "#ffffff"
 FONT = "Helvetica, Arial, sans-serif"

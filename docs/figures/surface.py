@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.build import build_layout
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
-from cmpdesign.design import load_design
-from cmpdesign.layout import Layout
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Scene, load_scene, render
-from cmpdesign.writers.layout_file import layout_to_json
 from extractor import Reconstructor, Shape, ViewExtractor, load_rig, parse_layout
 
 RIG = Path(__file__).parent.parent.parent / "templates" / "scenes" / "tac3d-binocular.toml"

@@ -1,0 +1,113 @@
+"""The stress suite: how much is read, and how much of it wrong, in every condition of ``stress_suite``.
+
+    python -m benchmarks.stress [--quick] [--table] [--json FILE] [--plot FILE]
+    python -m benchmarks.stress --only "blur=3/round" --save DIR     some cases: their images and overlays
+
+Times are of the processor, one core, the best of some runs. Each run follows one of the plain frame: the ratio to it
+is the median of these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from benchmarks.suites.scoring.reading import Result, notable_lines, overlay, read, warm_up
+from benchmarks.suites.scoring.report import failures, one_line, plot, rows_of, summary, table, write_json
+from benchmarks.suites.stress.conditions import BY_NAME, KINDS, cases, matching
+from benchmarks.suites.stress.kinds import Case
+
+RUNS, FEW_RUNS = 15, 5  # of an image, and of one of many alike; a median of five is off by 0.03
+
+
+def _job(job: tuple[Case, int]) -> Result:
+    return read(*job)[0]
+
+
+def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
+    """Results as they come, the large images first."""
+    last = [case for case in chosen if BY_NAME[case.kind].group != "view"]
+    first = [case for case in chosen if BY_NAME[case.kind].group == "view"]
+    # Conditions of many images need fewer runs of each.
+    jobs = [
+        (case, min(runs, FEW_RUNS) if BY_NAME[case.kind].group == "nothing" else runs)
+        for case in [*first[::-1], *last]
+    ]
+    with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
+        yield from pool.imap_unordered(_job, jobs)
+
+
+def with_progress(chosen: list[Case], processes: int, runs: int) -> list[Result]:
+    results, started = [], time.perf_counter()
+    for result in run(chosen, processes, runs):
+        results.append(result)
+        if sys.stderr.isatty() or len(results) % 200 == 0:
+            text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
+            print(text, end="\r" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
+    return results
+
+
+def one_by_one(chosen: list[Case], save: Path | None) -> list[Result]:
+    """Read here, printing a line a case; write its image and overlay."""
+    import cv2
+
+    warm_up()
+    results = []
+    for case in chosen:
+        result, shot, markers = read(case, 1)
+        results.append(result)
+        print(one_line(result))
+        for line in notable_lines(shot, markers):
+            print(f"    {line}")
+        if save is not None:
+            save.mkdir(parents=True, exist_ok=True)
+            stem = case.name.replace("/", "-").replace(" ", "_")
+            cv2.imwrite(str(save / f"{stem}.png"), shot.image)
+            if markers is not None:
+                cv2.imwrite(str(save / f"{stem}.overlay.png"), overlay(shot, case, markers))
+    return results
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print the failures, the severest first, and the totals; 1 when a marker is wrong or an image raised."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.stress", description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="the patterns take turns, no large images")
+    parser.add_argument(
+        "--only", metavar="NAME", help="one kind, condition or case: blur, blur=3, blur=3/round"
+    )
+    parser.add_argument(
+        "--save", type=Path, metavar="DIR", help="with --only: write images and overlays here"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw every kind (png, svg or pdf)")
+    parser.add_argument("--table", action="store_true", help="print every row, also in a quick run")
+    parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
+    asked = parser.parse_args(arguments)
+
+    started = time.perf_counter()
+    if asked.only:
+        chosen = matching(asked.only)
+        if not chosen:
+            parser.error(f"no case is named {asked.only!r}; the kinds are {', '.join(BY_NAME)}")
+        results = one_by_one(chosen, asked.save)
+    else:
+        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else RUNS)
+    rows = rows_of(results, KINDS)
+    if asked.table or not asked.quick:
+        print(table(rows))
+    print("\n".join(failures(rows)))
+    print(f"{summary(rows)}; {len(BY_NAME)} kinds; {time.perf_counter() - started:.0f} s")
+    if asked.json:
+        write_json(rows, asked.json)
+    if asked.plot:
+        plot(rows, KINDS, asked.plot)
+    return int(any(row.wrong or row.raised for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

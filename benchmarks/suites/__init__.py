@@ -1,0 +1,1 @@
+"""Sets of images and methods that the commands measure on."""

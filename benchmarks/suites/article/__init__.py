@@ -1,0 +1,1 @@
+"""The article's own algorithms, from its text, to compare with."""

@@ -1,0 +1,1 @@
+"""Our extractor and other detectors on the same scenes."""

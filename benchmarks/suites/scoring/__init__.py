@@ -1,0 +1,1 @@
+"""How the stress suite is read, scored and reported."""

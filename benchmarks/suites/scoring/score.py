@@ -1,0 +1,153 @@
+"""An extraction against the truth: what was found, what is wrong, and whether the promise applies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.suites.stress.frames import Shot
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, WHITE
+from cmpdesign.scene import Scene, Truth
+from cmpdesign.scene.parts.light import gain
+from extractor.result import Markers, Status
+
+WRONG_SHARE = 0.3  # of the shortest edge at a marker: farther off, it carries another's id or none's
+PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10
+RIM_PX = 2.0  # nearer to the image's rim a corner is not seen from all sides
+ROUNDING = 1e-6  # so that a pitch of 8 px is one
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Counts of markers.
+
+    Attributes:
+        visible: as the truth says; measured, repaired, fitted, lost are among them.
+        reported: visible or not.
+        wrong: reported and farther from its true place than 0.3 of the shortest edge there.
+        outside: reported, its true place outside the image. hidden: inside, but not visible.
+        sure: see ``sure_markers``; kept: measured or repaired of these.
+        promised: at least 99 % of the sure ones must be kept.
+        rms_px, repaired_rms_px: per axis, of the measured / repaired and fitted ones that are not wrong.
+    """
+
+    visible: int
+    measured: int
+    repaired: int
+    fitted: int
+    lost: int
+    reported: int
+    wrong: int
+    outside: int
+    hidden: int
+    sure: int
+    kept: int
+    promised: bool
+    rms_px: float
+    repaired_rms_px: float
+
+
+def score(markers: Markers, shot: Shot, *, promised: bool) -> Score:
+    """The best score over the patterns in the image; without a pattern every reported marker is wrong."""
+    if shot.scene is None:
+        reported = int((markers.status != Status.LOST).sum())
+        nan = float("nan")
+        return Score(0, 0, 0, 0, 0, reported, reported, 0, 0, 0, 0, False, nan, nan)
+    scene = shot.scene
+    one = promised and len(shot.truths) == 1
+    scores = [_against(markers, truth, scene, shot.image.shape, promised=one) for truth in shot.truths]
+    return min(scores, key=lambda result: (result.wrong, -result.reported))
+
+
+def wrong_markers(markers: Markers, layout: Layout, truth: Truth) -> Bools:
+    """(M,) bool."""
+    error = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
+    near = error <= WRONG_SHARE * shortest_edges(layout, truth)
+    return np.asarray((markers.status != Status.LOST) & ~near)
+
+
+def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
+    """(M,) px: the distance from every marker to its nearest neighbour."""
+    ends = truth.marker_xy_px[layout.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    shortest = np.full(len(truth.marker_xy_px), np.inf)
+    for side in (0, 1):
+        np.minimum.at(shortest, layout.edges[:, side], length)
+    return shortest
+
+
+def sure_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
+    """(M,) bool: visible, off the image's rim, and a corner of a colored or white cell that is visible itself."""
+    touching = np.zeros(len(truth.visible), dtype=np.bool_)
+    touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
+    from_rim = np.minimum(truth.marker_xy_px, np.array(shape[1::-1]) - 1 - truth.marker_xy_px).min(axis=1)
+    return np.asarray(touching & truth.visible & (from_rim >= RIM_PX))
+
+
+def _against(
+    markers: Markers, truth: Truth, scene: Scene, shape: tuple[int, ...], *, promised: bool
+) -> Score:
+    status, layout, visible = markers.status, scene.layout, truth.visible
+    wrong = wrong_markers(markers, layout, truth)
+    reported = status != Status.LOST
+    true_px = truth.marker_xy_px
+    inside = np.all((true_px >= -0.5) & (true_px < np.array(shape[1::-1]) - 0.5), axis=1)
+    sure = sure_markers(layout, truth, shape)
+    seen = {name: int((status[visible] == name).sum()) for name in Status}
+    return Score(
+        visible=int(visible.sum()),
+        measured=seen[Status.MEASURED],
+        repaired=seen[Status.REPAIRED],
+        fitted=seen[Status.FITTED],
+        lost=seen[Status.LOST],
+        reported=int(reported.sum()),
+        wrong=int(wrong.sum()),
+        outside=int((reported & ~inside).sum()),
+        hidden=int((reported & inside & ~visible).sum()),
+        sure=int(sure.sum()),
+        kept=int((sure & ~wrong & np.isin(status, (Status.MEASURED, Status.REPAIRED))).sum()),
+        promised=promised and bool(sure.any()) and _keeps_conditions(scene, truth, sure, shape),
+        rms_px=_rms(markers, truth, (status == Status.MEASURED) & ~wrong),
+        repaired_rms_px=_rms(markers, truth, (status > Status.MEASURED) & ~wrong),
+    )
+
+
+def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
+    error = markers.xy_px[chosen] - truth.marker_xy_px[chosen]
+    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+
+
+def _keeps_conditions(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]) -> bool:
+    """The white cell in view, edges of 8 px, blur to a fifth of the edge, noise to a tenth of the contrast."""
+    edge_px = float(shortest_edges(scene.layout, truth)[sure].min()) * (1 + ROUNDING)
+    noise = scene.sensor.noise if scene.sensor else 0.0
+    return (
+        bool(truth.cell_visible[scene.layout.reference_cell])
+        and edge_px >= PROMISED_EDGE_PX
+        and scene.blur_px <= PROMISED_BLUR * edge_px
+        and noise <= PROMISED_NOISE * smallest_contrast(scene, truth, (shape[1], shape[0]))
+    )
+
+
+def smallest_contrast(scene: Scene, truth: Truth, size: tuple[int, int]) -> float:
+    """Over the visible colored cells: the largest channel's step to black, under the light there, 8-bit units."""
+    layout = scene.layout
+    cells = np.flatnonzero(truth.cell_visible & (layout.cell_color != BLACK) & (layout.cell_color != WHITE))
+    if not len(cells):
+        return 0.0
+    black = np.array(scene.ink(BLACK)[::-1])
+    ink = np.array([scene.ink(int(color))[::-1] for color in layout.cell_color[cells]])
+    light = np.ones((len(cells), 3))
+    if scene.light:
+        centre = truth.marker_xy_px[layout.cell_corners[cells]].mean(axis=1)
+        x, y = np.clip(np.rint(centre), 0, np.asarray(size) - 1).astype(int).T
+        light = gain(scene.light, size)[:, y, x].T.astype(np.float64)
+    step = np.minimum(light * ink, 255) - np.minimum(light * black, 255)
+    return float(step.max(axis=1).min())
+
+
+NOTHING = Score(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))

@@ -1,0 +1,173 @@
+"""Damage drawn at random, of any color and size, on surfaces formed and lit at random: what no table thinks of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks.suites.stress.damage import clusters, places
+from benchmarks.suites.stress.frames import RGB, Frame
+from benchmarks.suites.stress.kinds import Change, Kind, grouped
+from cmpdesign.scene import Blob, Glare, Light, Press, Scratch, Shear, Twist, colored_leds
+from cmpdesign.scene.parts.surface import Deformation
+
+Rng = np.random.Generator
+Parts = dict[str, Any]  # fields of a Damage
+Draw = Callable[[Frame, Rng], Parts]
+
+
+def color(rng: Rng) -> RGB:
+    red, green, blue = rng.uniform(0, 230, 3).tolist()
+    return red, green, blue
+
+
+def long_scratches(frame: Frame, rng: Rng) -> Parts:
+    """Bands across the whole pattern, each of its own width, some over the white cell."""
+    reach, bands = max(frame.layout.size_mm), []
+    for turn in rng.uniform(0, 2 * np.pi, rng.integers(1, 7)):
+        along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+        middle = normal * rng.uniform(0.5, 7)
+        bands.append(_band(middle - reach * along, middle + reach * along, rng.uniform(0.1, 1.4), color(rng)))
+    return {"scratches": tuple(bands)}
+
+
+def short_scratches(frame: Frame, rng: Rng) -> Parts:
+    """Many thin ones of all lengths, which leave fragments of cells."""
+    common, bands = color(rng), []
+    own_colors = rng.random() < 0.5
+    for start in places(frame, int(rng.integers(5, 40)), 0.5):
+        turn, length = rng.uniform(0, 2 * np.pi), rng.uniform(1, 8)
+        end = start + length * np.array([np.cos(turn), np.sin(turn)])
+        bands.append(_band(start, end, rng.uniform(0.1, 0.6), color(rng) if own_colors else common))
+    return {"scratches": tuple(bands)}
+
+
+def _band(start: Any, end: Any, width_mm: float, rgb: RGB) -> Scratch:
+    return Scratch((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), float(width_mm), rgb)
+
+
+def spots(frame: Frame, rng: Rng) -> Parts:
+    """Drops of one color or of many."""
+    common, own_colors, largest = color(rng), rng.random() < 0.5, rng.uniform(0.3, 1.6)
+    return {
+        "blobs": tuple(
+            Blob((float(x), float(y)), float(rng.uniform(0.2, largest)), color(rng) if own_colors else common)
+            for x, y in places(frame, int(rng.integers(2, 25)), 0.8)
+        )
+    }
+
+
+def reflections(frame: Frame, rng: Rng) -> Parts:
+    """Anywhere on the pattern, small and sharp or wide and faint."""
+    width, height = frame.size
+    return {
+        "glare": tuple(
+            Glare((float(x), float(y)), float(rng.uniform(4, 35)), float(rng.uniform(80, 400)))
+            for x, y in rng.uniform(
+                (0.2 * width, 0.1 * height), (0.8 * width, 0.9 * height), (rng.integers(1, 9), 2)
+            )
+        )
+    }
+
+
+def missing(frame: Frame, rng: Rng) -> Parts:
+    """Cells here and there."""
+    return {"missing_share": float(rng.uniform(0.05, 0.4))}
+
+
+def missing_clusters(frame: Frame, rng: Rng) -> Parts:
+    """Groups of neighbours."""
+    damage = clusters(frame, float(rng.uniform(0.05, 0.4))).scene.damage
+    assert damage is not None
+    return {"missing_cells": damage.missing_cells}
+
+
+def bleeding(frame: Frame, rng: Rng) -> Parts:
+    return {"bleed_mm": float(rng.uniform(0.02, 0.12))}
+
+
+def several(frame: Frame, rng: Rng) -> Parts:
+    """Two or three of the others."""
+    chosen = rng.choice(len(SINGLE), rng.integers(2, 4), replace=False)
+    parts: Parts = {}
+    for number in chosen:
+        for name, value in SINGLE[number](frame, rng).items():
+            parts[name] = parts[name] + value if isinstance(parts.get(name), tuple) else value
+    return parts
+
+
+SINGLE: tuple[Draw, ...] = (
+    long_scratches,
+    short_scratches,
+    spots,
+    reflections,
+    missing,
+    missing_clusters,
+    bleeding,
+)
+
+
+def formed(frame: Frame, rng: Rng) -> Frame:
+    """None, one or two of press, twist and shear; tilted or not."""
+    if rng.random() < 0.35:
+        frame = frame.seen(tilt_deg=float(rng.uniform(5, 55)), tilt_axis_deg=float(rng.uniform(0, 180)))
+    return frame.formed(*_deformations(rng))
+
+
+def _deformations(rng: Rng) -> Iterator[Deformation]:
+    def centre(reach_mm: float) -> tuple[float, float]:
+        x, y = rng.uniform(-reach_mm, reach_mm, 2).tolist()
+        return x, y
+
+    kinds = rng.choice(3, rng.choice(3, p=(0.3, 0.5, 0.2)), replace=False)
+    gentler = 0.6 if len(kinds) > 1 else 1.0
+    sign = float(rng.choice((-1, 1)))
+    if 0 in kinds:
+        radius_mm = float(rng.uniform(3, 5))
+        yield Press(radius_mm, sign * gentler * radius_mm * float(rng.uniform(0.08, 0.45)), centre(4))
+    if 1 in kinds:
+        yield Twist(float(rng.uniform(3.5, 5.5)), sign * gentler * float(rng.uniform(5, 28)), centre(3))
+    if 2 in kinds:
+        size, turn = gentler * rng.uniform(0.2, 1.4), rng.uniform(0, 2 * np.pi)
+        yield Shear(4.0, (float(size * np.cos(turn)), float(size * np.sin(turn))), centre(2))
+
+
+def lit(frame: Frame, rng: Rng) -> Frame:
+    """As it is, by colored LEDs, from aside, darker at the rim, or in another color."""
+    choice = rng.integers(6)
+    if choice == 0:
+        return frame.having(light=colored_leds(int(rng.integers(2, 4)), 0.7, float(rng.uniform(0.3, 0.7))))
+    if choice == 1:
+        return frame.having(light=Light(gradient=(float(rng.uniform(0.1, 0.6)), 0.0)))
+    if choice == 2:
+        red, green, blue = rng.uniform(0.5, 1.0, 3).tolist()
+        return frame.having(light=Light(rgb=(red, green, blue), vignetting=float(rng.uniform(0, 0.6))))
+    return frame
+
+
+def _change(draw: Draw) -> Change:
+    def change(frame: Frame, _: float) -> Frame:
+        rng = np.random.default_rng([frame.scene.seed, 91])
+        return lit(formed(frame, rng), rng).damaged(**draw(frame, rng))
+
+    return change
+
+
+# What may be hidden here is the white cell, too: no share is promised.
+DRAWN = grouped(
+    "drawn at random",
+    *(
+        Kind(f"random {name}", "", (0,), _change(draw), promised=False)
+        for name, draw in (
+            ("scratches", long_scratches),
+            ("fragments", short_scratches),
+            ("blobs", spots),
+            ("glare", reflections),
+            ("cells missing", missing),
+            ("clusters missing", missing_clusters),
+            ("damage", several),
+        )
+    ),
+)

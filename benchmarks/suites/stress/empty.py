@@ -1,0 +1,120 @@
+"""Images without a pattern, or with one that is not ours: nothing may be reported on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.suites.stress.frames import Empty, Frame, Size, layout_of
+from benchmarks.suites.stress.kinds import Kind, grouped
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, WHITE
+from cmpdesign.scene import Busy, Plain, Sensor, render, standard_scene
+
+Pixels = NDArray[np.float32]
+Draw = Callable[[np.random.Generator, Size], Pixels]
+
+
+def noise(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:
+    """Colored noise of a grain."""
+    grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
+    if sigma_px:
+        grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), sigma_px))
+    return np.asarray(127 + 70 * grain / grain.std(), dtype=np.float32)
+
+
+def one_color(rng: np.random.Generator, size: Size, sigma: float) -> Pixels:
+    """One color, with the sensor's noise."""
+    grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
+    return np.asarray(rng.uniform(0, 255, 3) + sigma * grain, dtype=np.float32)
+
+
+def clutter(rng: np.random.Generator, size: Size, shapes: float, *, triangles: bool) -> Pixels:
+    planes = Busy(int(shapes), triangles).planes(size, rng)
+    return np.asarray(cv2.GaussianBlur(planes.transpose(1, 2, 0), (0, 0), 0.8), dtype=np.float32)
+
+
+def photo_like(rng: np.random.Generator, size: Size, steps: float) -> Pixels:
+    """Smooth areas with sharp rims, as in a photograph: quantised noise of two grains."""
+    coarse, fine = noise(rng, size, 30), noise(rng, size, 2)
+    return np.asarray(np.round(coarse / (255 / steps)) * (255 / steps) + 0.2 * (fine - 127), dtype=np.float32)
+
+
+def checkerboard(rng: np.random.Generator, size: Size, pitch_px: float) -> Pixels:
+    """Squares in red, green, blue, white and black, turned."""
+    turn = rng.uniform(0, np.pi)
+    y, x = np.mgrid[: size[1], : size[0]]
+    u = np.floor((np.cos(turn) * x - np.sin(turn) * y) / pitch_px).astype(int)
+    v = np.floor((np.sin(turn) * x + np.cos(turn) * y) / pitch_px).astype(int)
+    color = rng.integers(0, 4, (512, 512))[u % 512, v % 512] + 1
+    palette = np.array(_inks(), dtype=np.float32)
+    image = palette[np.where((u + v) % 2 == 0, color, 0)]
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8), dtype=np.float32)
+
+
+def _inks() -> list[tuple[float, float, float]]:
+    inks = standard_scene(layout_of("honeycomb", 2)).inks
+    return [inks[name][::-1] for name in ("black", "red", "green", "blue", "white")]
+
+
+def recolored(
+    rng: np.random.Generator, size: Size, pitch_px: float, recolor: Callable[..., Layout]
+) -> Pixels:
+    """A lattice of triangles as ours, in colors that are not."""
+    layout = recolor(layout_of("honeycomb", 11), rng)
+    scene = standard_scene(layout, seed=int(rng.integers(1 << 30)))
+    camera = replace(scene.camera, pitch_px=pitch_px, rotation_deg=float(rng.uniform(0, 360)))
+    scene = replace(scene, camera=camera, sensor=Sensor(2), background=Plain(tuple(rng.uniform(0, 255, 3))))
+    return np.asarray(render(scene, size=size).image, dtype=np.float32)
+
+
+def shuffled(layout: Layout, rng: np.random.Generator) -> Layout:
+    """The colored cells and the white one in random order."""
+    color = layout.cell_color.copy()
+    up = color != BLACK
+    color[up] = rng.permuted(color[up])
+    return replace(layout, cell_color=color)
+
+
+def one_inked(layout: Layout, rng: np.random.Generator) -> Layout:
+    """All colored cells alike, with the white one."""
+    color = layout.cell_color.copy()
+    color[(color != BLACK) & (color != WHITE)] = rng.integers(3)
+    return replace(layout, cell_color=color)
+
+
+def _empty(draw: Callable[..., Pixels], **fixed: object) -> Callable[[Frame, float], Empty]:
+    """A kind's change: the image is drawn from the frame's seed, small and standard in turn."""
+
+    def change(frame: Frame, step: float) -> Empty:
+        seed = frame.scene.seed
+        size = (320, 240) if seed % 2 else (640, 480)
+        return Empty(partial(_drawn, draw, step, fixed), size, seed)
+
+    return change
+
+
+def _drawn(
+    draw: Callable[..., Pixels], step: float, fixed: dict[str, object], rng: np.random.Generator, size: Size
+) -> Pixels:
+    return draw(rng, size, step, **fixed)
+
+
+REPEATS = 12  # for each of the three patterns; 28 steps: more than 1,000 images
+
+EMPTY = grouped(
+    "nothing",
+    Kind("nothing: noise", "grain px", (0, 1, 3, 8), _empty(noise), False, REPEATS),
+    Kind("nothing: one color", "noise", (0, 2, 10), _empty(one_color), False, REPEATS),
+    Kind("nothing: clutter", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=False), False, REPEATS),
+    Kind("nothing: triangles", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=True), False, REPEATS),
+    Kind("nothing: smooth areas", "levels", (2, 3, 4, 6), _empty(photo_like), False, REPEATS),
+    Kind("nothing: colored squares", "px", (8, 14, 24), _empty(checkerboard), False, REPEATS),
+    Kind("nothing: shuffled colors", "px", (10, 16, 24), _empty(recolored, recolor=shuffled), False, REPEATS),
+    Kind("nothing: one ink", "px", (10, 16, 24), _empty(recolored, recolor=one_inked), False, REPEATS),
+)

@@ -1,0 +1,59 @@
+"""A kind of condition, and the single cases that a run is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from benchmarks.suites.stress.frames import Empty, Frame, plain
+
+Change = Callable[[Frame, float], "Frame | Empty"]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One way to make reading harder, in graded steps.
+
+    Attributes:
+        name: of the kind.
+        unit: of its steps.
+        steps: from mild to hard.
+        change: from the plain frame and a step to the condition's frame.
+        promised: False where a share of read markers can not be asked for (ambiguous, or no white cell).
+        repeats: seeds for each pattern in a full run.
+        group: set by ``grouped``.
+    """
+
+    name: str
+    unit: str
+    steps: tuple[float, ...]
+    change: Change
+    promised: bool = True
+    repeats: int = 1
+    group: str = ""
+
+
+def grouped(group: str, *kinds: Kind) -> tuple[Kind, ...]:
+    return tuple(replace(kind, group=group) for kind in kinds)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One image of the suite: ``kind=step/pattern/seed``."""
+
+    kind: str
+    step: float
+    pattern: str
+    seed: int
+
+    @property
+    def condition(self) -> str:
+        return f"{self.kind}={self.step:g}"
+
+    @property
+    def name(self) -> str:
+        return f"{self.condition}/{self.pattern}/{self.seed}"
+
+
+def frame_of(case: Case, kind: Kind) -> Frame | Empty:
+    return kind.change(plain(case.pattern, case.seed), case.step)

@@ -1,0 +1,182 @@
+"""A picture of a scene by another way than the renderer's, and how far the renderer is from it.
+
+Every cell's sides are followed by ``POINTS`` points each and cut with ``LINES`` scan lines a pixel; what a pixel's box
+and the blur make of each crossing is a closed form. No splines, no contour integrals, no adaptive chords: nothing of
+``cmpdesign.scene.coverage`` and ``paths``. It is poor where a side runs along the scan lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.special import ndtr
+
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK
+from cmpdesign.scene import Optics, Scene, Sensor, render
+from cmpdesign.scene.drawing.view import View, views
+
+Points = NDArray[np.float64]
+
+POINTS, LINES = 512, 48
+REACH_SIGMA = 7.0
+BAND_ROWS = 30  # at once, for the memory's sake
+MIDDLE_PX = 3.5  # around a gridline's middle: the pixels that tell where it lies
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of the image: first column and row, width and height."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class Error:
+    """Of one picture in a window: 8-bit steps and px."""
+
+    name: str
+    blur_px: float
+    grey_rms: float
+    grey_largest: float
+    edge_rms_px: float
+    edge_largest_px: float
+    edges: int
+
+
+def reference(scene: Scene, view: View, window: Window) -> Points:
+    """(height, width, 3) BGR in 8-bit steps: the inks over black, seen by every pixel of the window."""
+    bands = []
+    for top in range(0, window.height, BAND_ROWS):
+        rows = min(BAND_ROWS, window.height - top)
+        bands.append(_band(scene, view, Window(window.x, window.y + top, window.width, rows)))
+    return np.concatenate(bands)
+
+
+def _band(scene: Scene, view: View, window: Window) -> Points:
+    layout, blur = scene.layout, scene.blur_px
+    cells = np.flatnonzero(layout.cell_color != BLACK)
+    black = np.asarray(scene.ink(BLACK)[::-1], dtype=np.float64)
+    over = np.array([np.subtract(scene.ink(int(c))[::-1], black) for c in layout.cell_color[cells]])
+    start, end, owner = _sides(layout, cells, view, window, blur)
+    reach = REACH_SIGMA * blur + 1
+    first = window.y - reach
+    count = int(np.ceil((window.height - 1 + 2 * reach) * LINES))
+    crossing, line = _crossings(start, end, first, count)
+    x = start[crossing, 0] + (first + (line + 0.5) / LINES - start[crossing, 1]) * (
+        (end - start)[crossing, 0] / (end - start)[crossing, 1]
+    )
+    sign = np.sign((end - start)[crossing, 1]) * -_orientation(layout, view)
+    columns = window.x + np.arange(window.width)
+    seen = _step(columns[None, :] - x[:, None], blur)
+    rows = window.y + np.arange(window.height)
+    down = _box(rows[:, None] - (first + (np.arange(count) + 0.5) / LINES), blur) / LINES
+    image = np.empty((window.height, window.width, 3))
+    for channel in range(3):
+        weight = sign * over[owner[crossing], channel]
+        gathered = csr_array((weight, (line, np.arange(len(line)))), shape=(count, len(line)))
+        image[..., channel] = black[channel] + down @ (gathered @ seen)
+    return image
+
+
+def _sides(
+    layout: Layout, cells: NDArray[np.int64], view: View, window: Window, blur_px: float
+) -> tuple[Points, Points, NDArray[np.int64]]:
+    """Straight pieces (N, 2) px of the sides of cells that the window can see; ``owner`` counts ``cells``."""
+    corners = layout.marker_xy_mm[layout.cell_corners[cells]]
+    share = (np.arange(POINTS) / POINTS)[:, None]
+    ahead = np.roll(corners, -1, axis=1)
+    around = corners[:, :, None] * (1 - share) + ahead[:, :, None] * share
+    px = view.image_from_layout(around.reshape(-1, 2)).reshape(len(cells), -1, 2)
+    reach = REACH_SIGMA * blur_px + 2
+    near = (px[..., 1].max(axis=1) > window.y - reach) & (
+        px[..., 1].min(axis=1) < window.y + window.height + reach
+    )
+    px, owner = px[near], np.flatnonzero(near)
+    return (
+        px.reshape(-1, 2),
+        np.roll(px, -1, axis=1).reshape(-1, 2),
+        np.repeat(owner, px.shape[1]),
+    )
+
+
+def _crossings(
+    start: Points, end: Points, first: float, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which piece crosses which scan line; the lines lie at first + (i + 0.5) / LINES."""
+    low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
+    begin = np.clip(np.ceil((low - first) * LINES - 0.5), 0, count).astype(np.int64)
+    stop = np.clip(np.ceil((high - first) * LINES - 0.5), 0, count).astype(np.int64)
+    number = stop - begin
+    piece = np.repeat(np.arange(len(start)), number)
+    return piece, np.arange(len(piece)) - np.repeat(np.cumsum(number) - number, number) + begin[piece]
+
+
+def _orientation(layout: Layout, view: View) -> float:
+    """1 where the cells' corners, counter-clockwise in the layout, go from x to y in the image."""
+    a, b, c = view.image_from_layout(layout.marker_xy_mm[layout.cell_corners[0, :3]])
+    return float(np.sign((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]))
+
+
+def _step(distance: Points, blur_px: float) -> Points:
+    """What a pixel ``distance`` inside a half plane shows: the integral of ``_box``."""
+    if blur_px == 0:
+        return np.clip(distance + 0.5, 0, 1)
+
+    def ramp(z: Points) -> Points:
+        return np.asarray(z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi))
+
+    return blur_px * (ramp((distance + 0.5) / blur_px) - ramp((distance - 0.5) / blur_px))
+
+
+def _box(distance: Points, blur_px: float) -> Points:
+    """A pixel's box, blurred by a Gaussian, along one axis."""
+    if blur_px == 0:
+        return (np.abs(distance) < 0.5).astype(np.float64)
+    return np.asarray(ndtr((distance + 0.5) / blur_px) - ndtr((distance - 0.5) / blur_px))
+
+
+def error(name: str, scene: Scene, blur_px: float, window: Window, size: tuple[int, int]) -> Error:
+    """The renderer's own error in a window; of several views the first one's."""
+    clean = replace(scene, sensor=Sensor(bits=16), optics=Optics(blur_px))
+    view = views(clean, size)[0]
+    rows, columns = slice(window.y, window.y + window.height), slice(window.x, window.x + window.width)
+    drawn = render(clean, size=size).image[rows, columns] / 257
+    true = reference(clean, view, window)
+    shifts = edge_shifts(drawn - true, true, clean.layout, view, window)
+    difference = drawn - true
+    return Error(
+        name,
+        blur_px,
+        grey_rms=float(np.sqrt((difference**2).mean())),
+        grey_largest=float(np.abs(difference).max()),
+        edge_rms_px=float(np.sqrt((shifts**2).mean())),
+        edge_largest_px=float(np.abs(shifts).max()),
+        edges=len(shifts),
+    )
+
+
+def edge_shifts(difference: Points, true: Points, layout: Layout, view: View, window: Window) -> Points:
+    """How far, in px along its normal, every gridline inside the window has moved, by least squares."""
+    ends = layout.marker_xy_mm[layout.edges]
+    middle = view.image_from_layout(ends.mean(axis=1)) - (window.x, window.y)
+    ahead = view.image_from_layout(0.45 * ends[:, 0] + 0.55 * ends[:, 1]) - (window.x, window.y) - middle
+    slope_y, slope_x = np.gradient(true, axis=(0, 1))
+    shifts = []
+    for (x, y), (along_x, along_y) in zip(middle, ahead, strict=True):
+        left, top = int(np.ceil(x - MIDDLE_PX)), int(np.ceil(y - MIDDLE_PX))
+        right, bottom = int(np.floor(x + MIDDLE_PX)) + 1, int(np.floor(y + MIDDLE_PX)) + 1
+        if left < 1 or top < 1 or right >= window.width or bottom >= window.height:
+            continue
+        box = slice(top, bottom), slice(left, right)
+        length = np.hypot(along_x, along_y)
+        slope = (slope_x[box] * -along_y + slope_y[box] * along_x) / length
+        if (slope**2).sum() > 100.0:  # the outermost gridlines have black on both sides
+            shifts.append(-(difference[box] * slope).sum() / (slope**2).sum())
+    return np.array(shifts)

@@ -1,0 +1,112 @@
+"""The scenes that figures of accuracy are stated for, and the checkerboard that the rivals read in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import RED, WHITE
+from cmpdesign.scene import Camera, Optics, Plain, Press, Scene, Sensor, Twist, composed, standard_scene
+from cmpdesign.scene import standard_layout as built_layout
+from cmpdesign.scene.bounds.exact_bound import exact_bound
+from cmpdesign.scene.standard import INKS, STANDARD_LAYERS, STANDARD_SIZE
+from extractor import Extractor, Reference, parse_layout
+from extractor.presets import Preset
+
+WRONG_SHARE = 0.3  # of the shortest edge: farther from the truth a marker is wrong, not imprecise
+TILT_DEG = 35.0
+KINDS = ("flat", "tilt", "bulge", "twist")
+SURFACES = {
+    "bulge": composed(Press(radius_mm=5.0, depth_mm=1.2)),
+    "twist": composed(Twist(radius_mm=5.0, angle_deg=18.0)),
+}
+BOARD_LAYERS = 10  # 21 x 21 squares
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pattern and how it is seen. Lengths in px of the image, noise in grey levels."""
+
+    pattern: str = "honeycomb"
+    kind: str = "flat"
+    blur_px: float = 1.0
+    noise: float = 2.0
+    pitch_px: float = 20.0
+    layers: int = STANDARD_LAYERS
+
+    @property
+    def name(self) -> str:
+        return self.pattern if self.pattern != "honeycomb" else self.kind
+
+    def scene(self, layout: Layout | None = None) -> Scene:
+        """The case's scene, of its own pattern or of another layout."""
+        tilt_deg = TILT_DEG if self.kind == "tilt" else 0.0
+        return replace(
+            standard_scene(layout or standard_layout(self.pattern, self.layers)),
+            camera=Camera(self.pitch_px, rotation_deg=7.3, tilt_deg=tilt_deg, tilt_axis_deg=30.0),
+            surface=SURFACES.get(self.kind),
+            optics=Optics(self.blur_px),
+            sensor=Sensor(noise=self.noise),
+        )
+
+    def board(self, plain: bool = True) -> Scene:
+        """A checkerboard of the same edge length seen in the same way, in white surroundings.
+
+        ``plain``: in black and white only; else with the square pattern's red cell.
+        """
+        return replace(self.scene(checkerboard(plain)), background=Plain(INKS["white"]))
+
+
+standard_layout = cache(built_layout)
+
+
+@cache
+def reference_of(pattern: str, layers: int) -> Reference:
+    return parse_layout(layout_to_json(standard_layout(pattern, layers)))
+
+
+def extractor_of(case: Case, preset: Preset = "balanced") -> Extractor:
+    return Extractor(reference_of(case.pattern, case.layers), preset)
+
+
+@cache
+def checkerboard(plain: bool) -> Layout:
+    """The square pattern without its black border, as detectors of checkerboards need white around the board."""
+    layout = build_layout(load_design("square", {"layers": str(BOARD_LAYERS), "pitch_mm": "1.0"}))
+    color = layout.cell_color.copy()
+    if plain:
+        color[color == RED] = WHITE
+    low, high = layout.marker_xy_mm.min(axis=0), layout.marker_xy_mm.max(axis=0)
+    outline = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    return replace(layout, cell_color=color, outline_mm=outline, border_mm=0.0)
+
+
+def inner_markers(layout: Layout) -> NDArray[np.bool_]:
+    """(M,) the markers with all their gridlines: six within a triangular pattern, four within the board."""
+    row, column = layout.marker_layer, layout.marker_index
+    if layout.cell_corners.shape[1] == 3:
+        return np.asarray(row < row.max())
+    return np.asarray((row > 0) & (row < row.max()) & (column > 0) & (column < column.max()))
+
+
+def shortest_edges(layout: Layout, true_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(M,) px: the shortest edge at each marker."""
+    ends = true_px[layout.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    shortest = np.full(len(true_px), np.inf)
+    for side in (0, 1):
+        np.minimum.at(shortest, layout.edges[:, side], length)
+    return shortest
+
+
+def bounds_px(scene: Scene, *choices: NDArray[np.bool_]) -> list[float]:
+    """The exact Cramer-Rao bound of choices of markers: RMS per axis, px; those that are not visible are left out."""
+    trace = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
+    return [float(np.sqrt(np.nanmean(trace[chosen]) / 2)) for chosen in choices]

@@ -1,0 +1,49 @@
+"""``cmpdesign check``: what of a design cannot be made or read."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+import typer
+
+from cmpdesign.cli.commands.build import DesignArgument, SetOption, overrides
+from cmpdesign.cli.terminal import console
+from cmpdesign.errors import CmpDesignError
+
+NOT_PASSED = 1
+
+
+def check(
+    design: DesignArgument,
+    override: SetOption = None,
+    camera: Annotated[
+        str, typer.Option(metavar="WxH", help="Pixels of the camera whose picture the pattern fills.")
+    ] = "640x480",
+) -> None:
+    """List what cannot be made or read. Exit code 1 when something will not work."""
+    from rich.table import Table
+
+    from cmpdesign.design.design import load_design
+    from cmpdesign.layout.checks import check_design
+
+    findings = check_design(load_design(design, overrides(override)), camera_px=_pixels(camera))
+    if not findings:
+        console().print("nothing to report: it can be made and read")
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("severity", "what", "value", "limit", "unit", "remedy"):
+        table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+    for finding in findings:
+        numbers = (f"{finding.value:.3g}", f"{finding.limit:.3g}")
+        table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
+    console().print(table, soft_wrap=False)
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(NOT_PASSED)
+
+
+def _pixels(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"([1-9]\d{1,4})x([1-9]\d{1,4})", text)
+    if not match:
+        raise CmpDesignError(f"--camera {text}: expected WIDTHxHEIGHT in pixels, as in 640x480")
+    return int(match[1]), int(match[2])

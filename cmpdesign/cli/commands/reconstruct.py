@@ -1,0 +1,165 @@
+"""``cmpdesign reconstruct``: the surface in space, from two views or more, through a sequence."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cmpdesign.cli.running import finish, go, require_positive
+from cmpdesign.cli.terminal import console, printable
+from cmpdesign.errors import CmpDesignError, OutputError
+
+if TYPE_CHECKING:
+    from cmpdesign.tracking.run import Run
+
+
+def reconstruct(
+    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help="The views: a TOML file with [[view]] tables.")],
+    rest: Annotated[
+        str,
+        typer.Argument(metavar="REST", help="The pattern at rest: an image, or a frame's number in SOURCE."),
+    ],
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A video, a folder of images, or a camera's number; one for each view with commas between.",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
+    ],
+    from_rest: Annotated[
+        bool, typer.Option("--from-rest", help="Place all views by REST, also those whose pose RIG gives.")
+    ] = False,
+    flatness_mm: Annotated[
+        float, typer.Option(metavar="MM", help="How far the markers may lie off the plane at rest.")
+    ] = 0.0,
+    model_px: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PX", help="What the camera model leaves open. [default: as the rest frame says]"
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+    ] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    recover: Annotated[
+        bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
+    ] = False,
+) -> None:
+    """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
+    if recover:
+        from cmpdesign.tracking.sinks import recover as recover_file
+
+        console().print(f"wrote {printable(output)}: {recover_file(output)} frames recovered")
+        return
+    require_positive("--fps", fps)
+    for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
+        if value is not None and not 0 <= value < float("inf"):
+            raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
+    run = _prepared(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
+    run.limit = frames
+    try:
+        go(run, "reconstructing")
+    except OutputError:  # what could be done is told all the same
+        with suppress(OutputError):
+            _report(run, source, output)
+        raise
+    _report(run, source, output)
+    finish(run)
+
+
+def _prepared(
+    layout: Path,
+    rig: Path,
+    rest: str,
+    source: str,
+    output: Path,
+    from_rest: bool,
+    flatness_mm: float,
+    model_px: float | None,
+    fps: float | None,
+    cold: bool,
+) -> Run:
+    """Everything that can be refused is refused here, before a file is made."""
+    from cmpdesign.tracking.run import Run
+    from cmpdesign.tracking.shape_summary import ShapeTally
+    from cmpdesign.tracking.shape_table import ShapeTable
+    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sources import open_sources
+    from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
+
+    known = load_rig(rig)
+    views = ViewExtractor(load_layout(layout), known.without_poses() if from_rest else known, "accurate")
+    at_rest = views.extract(_at_rest(rest, source, fps))
+    reconstructor = Reconstructor(
+        views.layout, views.rig, at_rest, flatness_mm=(0.0, 0.0, flatness_mm), model_px=model_px
+    )
+    sink = open_sink(output, ShapeTable(reconstructor))
+    tracker = ShapeTracker(reconstructor, warm=not cold)
+    return Run(open_sources(source, fps), tracker, sink, ShapeTally(reconstructor))
+
+
+def _at_rest(rest: str, source: str, fps: float | None) -> Any:
+    """The picture at rest; a list of one for each view where there are several sources."""
+    from cmpdesign.tracking.run import rest_image
+    from cmpdesign.tracking.sources import split_list
+
+    sources, rests = split_list(source), split_list(rest)
+    if len(rests) == 1:
+        rests = rests * len(sources)
+    if len(rests) != len(sources):
+        raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
+    pictures = [rest_image(name, of, fps) for name, of in zip(rests, sources, strict=True)]
+    return pictures if len(pictures) > 1 else pictures[0]
+
+
+def _report(run: Run, source: str, output: Path) -> None:
+    """The summary beside the table, and on the terminal; also after a failure."""
+    if not run.tally.frames:
+        return
+    from cmpdesign.files.atomic import write_file
+
+    summary = run.tally.to_json(source, run.source.total, run.ended_early)
+    _print_summary(summary)
+    text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+    write_file(output.with_suffix(".summary.json"), text)
+
+
+def _print_summary(summary: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    frames, sigma, largest = summary["frames"], summary["sigma_um"], summary["largest_displacement"]
+    others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
+    said = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
+    rows = {
+        "frames": f"{frames['read']} read, {frames['tracked']} tracked{said}",
+        "views": "; ".join(f"{view['name']} {view['rms_px']:.3f} px at rest" for view in summary["views"]),
+        "markers": ", ".join(f"{share:.2%} {name}" for name, share in summary["marker_shares"].items()),
+    }
+    if summary["lost_markers"]:
+        lost = summary["lost_markers"].items()
+        rows["not reported"] = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in lost)
+    if summary["reasons"]:
+        rows["notes"] = ", ".join(f"{count} x {reason}" for reason, count in summary["reasons"].items())
+    if sigma is not None:
+        rows["standard deviation"] = ", ".join(
+            f"{axis} {value:.2f} um" for axis, value in zip("xyz", sigma, strict=True)
+        )
+    if largest is not None:
+        rows["largest displacement"] = (
+            f"{largest['mm']:.4f} mm, marker {largest['marker']} in frame {largest['frame']}"
+        )
+    rows["time a frame"] = ", ".join(f"{name} {value:.1f} ms" for name, value in summary["time_ms"].items())
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console().print(table)

@@ -1,0 +1,120 @@
+"""``cmpdesign render --scene``: a scene file to an image, or a sequence to a video with the truth of every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from cmpdesign.scene.files.scene_file import SceneFile
+    from cmpdesign.scene.truth import Truth
+
+PICTURE = ".png"
+
+
+def render_file(
+    layout: Path,
+    scene: Path,
+    output: Path,
+    truth: Path | None,
+    size: tuple[int, int] | None,
+    seed: int | None,
+) -> None:
+    """Draw what a scene file says; size and seed come before the file's own.
+
+    Raises:
+        CmpDesignError: a value that cannot be drawn, or an ending that does not fit.
+    """
+    from cmpdesign.design.templates import find_scene
+    from cmpdesign.reading.read_layout import read_layout
+    from cmpdesign.scene.files.scene_file import load_scene
+
+    file = load_scene(find_scene(scene), read_layout(layout), size_px=size, seed=seed)
+    if file.fps is None:
+        _draw_one(file, output, truth)
+    else:
+        _draw_all(file, output, truth)
+
+
+def _draw_one(file: SceneFile, output: Path, truth: Path | None) -> None:
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.files.images import to_png
+    from cmpdesign.scene import render, save_truth
+
+    if output.suffix != PICTURE:
+        raise CmpDesignError(f"{output}: unknown ending; expected {PICTURE} (the scene has no [sequence])")
+    rendered = render(file.scene(), size=file.size_px)
+    for warning in rendered.warnings:
+        print_warning(warning)
+    if truth is not None:
+        save_truth(rendered.truth, truth)
+        console().print(f"wrote {printable(truth)}")
+    write_file(output, to_png(rendered.image))
+    console().print(f"wrote {printable(output)}: {_size(file)}, {_visible(rendered.truth)}")
+
+
+def _draw_all(file: SceneFile, output: Path, truth: Path | None) -> None:
+    from cmpdesign.scene import render, save_truths
+    from cmpdesign.scene.files.film import open_film
+
+    film = open_film(output, file.fps or 1.0, file.size_px, file.bits)
+    truths: list[Truth] = []
+    warnings: dict[str, int] = {}
+    try:
+        with _progress(file.frames) as advance:
+            for scene in file.scenes():
+                rendered = render(scene, size=file.size_px)
+                film.add(rendered.image)
+                truths.append(rendered.truth)
+                for warning in rendered.warnings:
+                    warnings.setdefault(warning, scene.frame)
+                advance()
+        if truth is not None:
+            save_truths(truths, [file.time_s(frame) for frame in range(file.frames)], truth)
+            console().print(f"wrote {printable(truth)}")
+        film.close()
+    except BaseException:
+        film.discard()
+        raise
+    _warn(warnings, file)
+    console().print(f"wrote {printable(output)}: {file.frames} frames of {_size(file)} at {file.fps:g} fps")
+
+
+def _warn(warnings: dict[str, int], file: SceneFile) -> None:
+    """The first frame that has each kind of warning, told by its words without numbers."""
+    kinds: dict[str, str] = {}
+    for text, frame in warnings.items():
+        kind = "".join(letter for letter in text if letter.isalpha())
+        kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
+    for text in kinds.values():
+        print_warning(text)
+
+
+def _size(file: SceneFile) -> str:
+    return f"{file.size_px[0]} x {file.size_px[1]} px"
+
+
+def _visible(truth: Truth) -> str:
+    if truth.visible.ndim == 1:
+        return f"{truth.visible.sum()} markers visible"
+    return f"{' + '.join(str(n) for n in truth.visible.sum(axis=1))} markers visible in {len(truth.visible)} views"
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[], None]]:
+    """A bar on stderr where a terminal shows it."""
+    terminal = console(stderr=True)
+    if not terminal.is_terminal:
+        yield lambda: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("rendering"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=terminal, transient=True) as progress:
+        task = progress.add_task("rendering", total=total)
+        yield lambda: progress.update(task, advance=1)

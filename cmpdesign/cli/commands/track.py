@@ -1,0 +1,156 @@
+"""``cmpdesign track``: a pattern through a video, a folder of images or a camera's frames."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cmpdesign.cli.running import finish, go, require_positive
+from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.errors import CmpDesignError, OutputError
+
+if TYPE_CHECKING:
+    from cmpdesign.tracking.run import Run
+    from extractor.layout.reference import Reference
+
+
+def track(
+    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    source: Annotated[
+        str, typer.Argument(metavar="SOURCE", help="A video, a folder of images, or a camera's number.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
+    ],
+    rest: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|IMAGE", help="What displacement is counted from. [default: the first tracked frame]"
+        ),
+    ] = None,
+    mm_per_px: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SCALE", help="Scale for mm along the image's axes. [default: mm in the layout's frame]"
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+    ] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="VIDEO", help="Video of what was found: .mp4, .avi or .mkv.")
+    ] = None,
+    quiver: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
+    ] = None,
+    cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    recover: Annotated[
+        bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
+    ] = False,
+) -> None:
+    """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
+    if recover:
+        from cmpdesign.tracking.sinks import recover as recover_file
+
+        console().print(f"wrote {printable(output)}: {recover_file(output)} frames recovered")
+        return
+    require_positive("--mm-per-px", mm_per_px)
+    require_positive("--fps", fps)
+    _require_png(quiver)
+    from extractor import load_layout
+
+    reference = load_layout(layout)
+    run = _prepared(reference, source, output, rest, mm_per_px, fps, overlay, cold)
+    run.limit = frames
+    try:
+        go(run, "tracking")
+    except OutputError:  # no reason to keep from the user what could be tracked
+        with suppress(OutputError):
+            _report(run, reference, source, output, quiver)
+        raise
+    _report(run, reference, source, output, quiver)
+    finish(run)
+
+
+def _prepared(
+    reference: Reference,
+    source: str,
+    output: Path,
+    rest: str | None,
+    mm_per_px: float | None,
+    fps: float | None,
+    overlay: Path | None,
+    cold: bool,
+) -> Run:
+    """Everything that can be refused is refused here, before a file is made."""
+    from cmpdesign.tracking.overlay import Overlay
+    from cmpdesign.tracking.run import Run, rest_markers
+    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
+    from cmpdesign.tracking.summary import Tally
+    from cmpdesign.tracking.table import TrackTable
+    from extractor.track.tracker import Tracker
+
+    at_rest = None if rest is None else rest_markers(rest, source, reference, fps)
+    tracker = Tracker(reference, rest=at_rest, mm_per_px=mm_per_px, warm=not cold)
+    frames = open_source(source, fps)
+    video = None if overlay is None else Overlay(overlay, reference, frames.fps or DEFAULT_FPS)
+    return Run(frames, tracker, open_sink(output, TrackTable(tracker)), Tally(reference), video)
+
+
+def _report(run: Run, reference: Reference, source: str, output: Path, quiver: Path | None) -> None:
+    """The summary beside the table, the plot, and both on the terminal; also after a failure."""
+    if not run.tally.frames:
+        return
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.files.images import to_png
+    from cmpdesign.tracking.quiver import draw_quiver
+
+    summary = run.tally.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
+    _print_summary(summary)
+    paths = {output.with_suffix(".summary.json"): json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
+    farthest, rest = run.tally.farthest, run.tracker.rest
+    contents: dict[Path, str | bytes] = dict(paths)
+    if quiver is not None and farthest is not None and rest is not None:
+        contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
+    elif quiver is not None:
+        print_warning(f"{printable(quiver)} is not drawn: no frame has a displacement")
+    for path, content in contents.items():
+        write_file(path, content)
+
+
+def _print_summary(summary: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    frames, shares, rate = summary["frames"], summary["marker_shares"], summary["frames_per_s"]
+    others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
+    said = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
+    jitter, largest = summary["jitter_px"], summary["largest_displacement"]
+    rows = {
+        "frames": f"{frames['read']} read, {frames['tracked']} tracked{said}",
+        "starts": ", ".join(f"{count} {start}" for start, count in summary["starts"].items()) or "none",
+        "markers": ", ".join(f"{share:.2%} {name}" for name, share in shares.items()),
+        "frames per second": ", ".join(f"{name} {value:.0f}" for name, value in rate.items() if value),
+        "jitter at rest": "too few resting frames" if jitter is None else f"{jitter:.4f} px per axis",
+    }
+    if summary["reasons"]:
+        rows["not tracked"] = ", ".join(f"{count} x {reason}" for reason, count in summary["reasons"].items())
+    if largest is not None:
+        mm = "" if largest["mm"] is None else f" = {largest['mm']:.4g} mm"
+        rows["largest displacement"] = (
+            f"{largest['px']:.3f} px{mm}, marker {largest['marker']} in frame {largest['frame']}"
+        )
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console().print(table)
+
+
+def _require_png(path: Path | None) -> None:
+    if path is not None and path.suffix != ".png":
+        raise CmpDesignError(f"--quiver {path}: unknown ending; expected .png")

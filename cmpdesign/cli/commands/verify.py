@@ -1,0 +1,187 @@
+"""``cmpdesign verify``: are these pictures the layout's pattern, seen and numbered as designed?
+
+A picture that shows a print sheet's code is judged as a print: whose it is, and how true.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cmpdesign.cli.terminal import BAD_INPUT, console, one_line, print_error, printable
+
+if TYPE_CHECKING:
+    from cmpdesign.files.images import Image
+    from cmpdesign.products.sheet.verdict import SheetVerdict
+    from cmpdesign.reading.verify import Verdict
+    from extractor import Extractor
+    from extractor.layout.reference import Reference
+
+NOT_VERIFIED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One image's name with its verdict, or with the error that says why it could not be read."""
+
+    name: str
+    verdict: Verdict | SheetVerdict | None
+    error: str | None
+
+    @property
+    def exit_code(self) -> int:
+        if self.verdict is None:
+            return BAD_INPUT
+        return 0 if self.verdict.verified else NOT_VERIFIED
+
+    def to_json(self) -> dict[str, Any]:
+        if self.verdict is None:
+            return {"image": self.name, "verified": False, "error": self.error}
+        return {"image": self.name, **self.verdict.to_json()}
+
+
+def verify(
+    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+    debug: Annotated[Path | None, typer.Option(help="Folder for a picture of every stage.")] = None,
+    min_share: Annotated[
+        float, typer.Option(min=0, max=1, help="Share of the visible markers that must be measured.")
+    ] = 0.9,
+    sheet_dpi: Annotated[
+        float | None,
+        typer.Option(
+            min=0, help="The pictures are print sheets of this resolution (0: unknown), whatever files say."
+        ),
+    ] = None,
+) -> None:
+    """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
+    from extractor import Extractor, load_layout
+
+    reference = load_layout(layout)
+    judge = _Judge(reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug)
+    names = _distinct([path.stem for path in images])
+    outcomes = [
+        judge.outcome(path, name) for path, name in _with_progress(list(zip(images, names, strict=True)))
+    ]
+    report = _report(reference, outcomes, min_share)
+    if output is not None:
+        from cmpdesign.files.atomic import write_file
+
+        write_file(output / "verify.json", report)
+    # After the bar: while it stands, it redirects whatever is printed to its own stream.
+    sys.stdout.write(report if as_json else _lines(outcomes))
+    raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """What pictures are judged by; the extractor is made when the first picture needs it."""
+
+    reference: Reference
+    extractor: Callable[[], Extractor]
+    min_share: float
+    sheet_dpi: float | None
+    output: Path | None
+    debug: Path | None
+
+    def outcome(self, path: Path, name: str) -> Outcome:
+        """An image that cannot be read is reported and does not keep the others from being processed."""
+        from cmpdesign.files.images import ImageFileError, read_image
+        from cmpdesign.products.sheet.verdict import judge_sheet
+        from cmpdesign.reading.verify import verify as verify_image
+
+        try:
+            image = read_image(path)
+        except ImageFileError as error:
+            print_error(error)
+            return Outcome(printable(path), None, one_line(error))
+        sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
+        if sheet.is_sheet or self.sheet_dpi is not None:
+            return Outcome(printable(path), sheet, None)
+        verdict = verify_image(self.extractor(), self.reference, image, self.min_share)
+        _write_pictures(image, self.reference, verdict, name, self.output, self.debug)
+        return Outcome(printable(path), verdict, None)
+
+
+def _write_pictures(
+    image: Image, reference: Reference, verdict: Verdict, name: str, output: Path | None, debug: Path | None
+) -> None:
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.files.images import to_png
+
+    if output is not None:
+        from extractor.draw import draw_markers
+
+        write_file(output / f"{name}.overlay.png", to_png(draw_markers(image, reference, verdict.markers)))
+    if debug is not None:
+        from extractor.draw import draw_stages
+
+        pictures = draw_stages(image, reference, verdict.markers)
+        for number, (stage, picture) in enumerate(pictures.items(), start=1):
+            write_file(debug / f"{name}.{number}-{stage}.png", to_png(picture))
+
+
+def _lines(outcomes: list[Outcome]) -> str:
+    """A line for every image that was read; what could not be read has been reported on stderr."""
+    return "".join(f"{item.name}: {_line(item.verdict)}\n" for item in outcomes if item.verdict is not None)
+
+
+def _line(verdict: Verdict | SheetVerdict) -> str:
+    from cmpdesign.reading.verify import Verdict
+
+    if not isinstance(verdict, Verdict):
+        return verdict.line()
+    repaired = verdict.repaired + verdict.fitted
+    counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
+    head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
+    return f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
+
+
+def _report(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
+    document = {
+        "format": "cmp-verification",
+        "version": 1,
+        "pattern": reference.pattern,
+        "digest": reference.digest,
+        "min_share": min_share,
+        "verified": all(outcome.exit_code == 0 for outcome in outcomes),
+        "images": [outcome.to_json() for outcome in outcomes],
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _distinct(stems: list[str]) -> list[str]:
+    """Names for the written files: stems, numbered where several images share one."""
+    names: list[str] = []
+    for stem in stems:
+        name, number = stem, 1
+        while name in names:
+            number += 1
+            name = f"{stem}-{number}"
+        names.append(name)
+    return names
+
+
+def _with_progress(items: list[tuple[Path, str]]) -> Iterable[tuple[Path, str]]:
+    """The items; with a bar on stderr where there are several and a terminal shows it."""
+    terminal = console(stderr=True)
+    if len(items) < 2 or not terminal.is_terminal:
+        return items
+    return _tracked(items)
+
+
+def _tracked(items: list[tuple[Path, str]]) -> Iterator[tuple[Path, str]]:
+    from rich.progress import track
+
+    yield from track(items, description="verifying", console=console(stderr=True), transient=True)

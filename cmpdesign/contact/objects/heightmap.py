@@ -1,0 +1,108 @@
+"""Objects of any shape, from a picture or an array of heights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.contact.errors import ContactError, require
+from cmpdesign.contact.objects.objects import Indenter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap(Indenter):
+    """A stamp: how far its face sticks out towards the layer, on square pixels.
+
+    Attributes:
+        heights_mm: (rows, columns), seen from the front as it lies on the pattern, first row at the largest y. The
+            largest height touches first. NaN: there is nothing.
+        pixel_mm: the side of a pixel. Between pixel centres, heights are interpolated linearly.
+    """
+
+    heights_mm: Array = field(repr=False)
+    pixel_mm: float
+    positive: ClassVar[tuple[str, ...]] = ("pixel_mm",)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        heights = np.array(self.heights_mm, dtype=np.float64)
+        good = heights.ndim == 2 and min(heights.shape) >= 2
+        require(good, "heights_mm", f"of shape {heights.shape}", "two-dimensional, at least 2 x 2 pixels")
+        require(bool(np.isfinite(heights).any()), "heights_mm", "nowhere finite", "finite where something is")
+        require(not np.isinf(heights).any(), "heights_mm", "infinite somewhere", "finite, or NaN for nothing")
+        heights.setflags(write=False)
+        object.__setattr__(self, "heights_mm", heights)
+
+    @classmethod
+    def read(
+        cls, path: str | Path, pixel_mm: float, depth_mm: float | None = None, **placed: Any
+    ) -> HeightMap:
+        """A grayscale PNG (8 or 16 bits: white sticks out by ``depth_mm`` over black) or an NPY file in mm.
+
+        Raises:
+            ContactError: the file is neither, or ``depth_mm`` is missing for a picture or given for an NPY file.
+        """
+        path = Path(path)
+        if path.suffix.lower() == ".npy":
+            require(depth_mm is None, "depth_mm", depth_mm, f"left out, as {path.name} holds heights in mm")
+            return cls(_read_npy(path), pixel_mm, **placed)
+        require(
+            depth_mm is not None and depth_mm > 0, "depth_mm", depth_mm, "above 0: from black to white, in mm"
+        )
+        return cls(_read_gray(path) * float(depth_mm or 0), pixel_mm, **placed)
+
+    def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
+        from scipy.ndimage import map_coordinates
+
+        rows, columns = self.heights_mm.shape
+        row = (rows - 1) / 2 - np.asarray(y_mm) / self.pixel_mm
+        column = (columns - 1) / 2 + np.asarray(x_mm) / self.pixel_mm
+        below = np.nanmax(self.heights_mm) - self.heights_mm
+        there = np.isfinite(below)
+        # Half a pixel around the outermost centres belongs to them.
+        inside = (row >= -0.5) & (row <= rows - 0.5) & (column >= -0.5) & (column <= columns - 0.5)
+        places = np.stack([row, column])
+        height = map_coordinates(np.where(there, below, 0.0), places, order=1, mode="nearest")
+        inside &= map_coordinates(there.astype(np.float64), places, order=1, mode="nearest") > 1 - 1e-9
+        return np.where(inside, height, np.inf)
+
+    @property
+    def smallest_radius_mm(self) -> float:
+        return self.pixel_mm
+
+
+def _read_npy(path: Path) -> Array:
+    try:
+        heights = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise ContactError(f"{path}: cannot be read as an NPY file ({error})") from None
+    if not isinstance(heights, np.ndarray) or heights.dtype.kind not in "fiu":
+        raise ContactError(f"{path}: holds no array of numbers; save heights in mm with numpy.save")
+    return heights.astype(np.float64)
+
+
+def _read_gray(path: Path) -> Array:
+    """Brightness from 0 to 1."""
+    import cv2
+
+    try:
+        data = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as error:
+        raise ContactError(f"{path}: cannot be read ({error.strerror})") from None
+    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
+    if pixels is None:
+        raise ContactError(f"{path}: is no image; expected a grayscale PNG, or an NPY file of heights in mm")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise ContactError(f"{path}: has pixels of type {pixels.dtype}; expected 8 or 16 bits")
+    if pixels.ndim == 3:
+        gray = pixels[:, :, 0]
+        if any((pixels[:, :, i] != gray).any() for i in range(1, min(3, pixels.shape[2]))):
+            raise ContactError(f"{path}: is a color image; a height map is grayscale")
+        pixels = gray
+    return np.asarray(pixels, dtype=np.float64) / (255 if pixels.dtype == np.uint8 else 65535)

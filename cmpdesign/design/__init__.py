@@ -1,0 +1,4 @@
+"""A design: the few parameters from which everything else is derived, with their units and templates.
+
+In: a template's name or a TOML file, and overrides. Out: a frozen, validated ``Design``.
+"""

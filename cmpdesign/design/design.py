@@ -1,0 +1,303 @@
+"""A design: the few parameters from which everything else is derived."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from cmpdesign.design.fiducials import Fiducials
+from cmpdesign.design.laser_options import LaserOptions
+from cmpdesign.design.mold_options import MoldOptions
+from cmpdesign.design.quantities import Angle, Color, Length, LengthOrZero
+from cmpdesign.design.sheet_options import SheetOptions
+from cmpdesign.errors import DesignError
+from cmpdesign.patterns import patterns
+from cmpdesign.patterns.graphs import MAX_LAYERS
+
+# An ellipse flatter than 4 : 1 brings cells with corners below 15 degrees, which neither print nor read.
+ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
+SMALLEST_PITCH_MM = 0.001
+MAX_VIRTUAL_PER_EDGE = 100
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise DesignError(_one_line(error, type(self))) from None
+
+
+class Palette(BaseModel):
+    """The inks, as "#rrggbb"."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    red: Color = "#c8322d"
+    green: Color = "#28963c"
+    blue: Color = "#2d3cbe"
+    black: Color = "#141414"
+    white: Color = "#f5f5f5"
+
+
+class Design(_Strict):
+    """Validated parameters of a pattern. Lengths in mm; texts such as "60mil" are converted.
+
+    A size is given in one of these ways; every other combination is refused with the way to mend it:
+
+    * ``pitch_mm`` and ``layers``;
+    * ``width_mm`` and/or ``height_mm`` (overall) and ``layers``: the largest pitch that fits;
+    * ``width_mm`` and/or ``height_mm`` and ``pitch_mm``: as many layers as fit;
+    * ``pitch_mm`` and a clip outline: as many layers as cover it.
+
+    Raises:
+        DesignError: an unknown, missing, impossible or contradictory parameter.
+    """
+
+    name: str = Field("", description="The design's name, for captions and reports.")
+    description: str = Field("", description="One sentence about the design.")
+    source: str = Field(
+        "", description='Where the dimensions come from; "assumed" where nobody published them.'
+    )
+
+    pattern: str = Field(description="The registered pattern to draw.")
+    layers: int | None = Field(
+        None, ge=1, le=MAX_LAYERS, strict=True, description="Layers around the centre."
+    )
+    pitch_mm: Length | None = Field(None, description="Distance between neighbouring markers (layers).")
+    width_mm: Length | None = Field(
+        None, description="Overall width with border and rotation, before clipping."
+    )
+    height_mm: Length | None = Field(
+        None, description="Overall height with border and rotation, before clipping."
+    )
+    aspect: float | None = Field(
+        None, ge=ASPECT_MIN, le=ASPECT_MAX, description="Elliptical: height over width of a layer, b / a."
+    )
+    spacing: Literal["angle", "arc"] | None = Field(
+        None, description="Elliptical: equal steps of the parameter angle, or of arc length."
+    )
+    border_mm: LengthOrZero = Field(1.0, description="Width of the black border around the pattern.")
+    rotation_deg: Angle = Field(
+        0.0, description="Counter-clockwise turn of the pattern, seen from the front."
+    )
+    mirrored: bool = Field(False, strict=True, description="The camera looks at the pattern's back.")
+    virtual_per_edge: int = Field(
+        5, ge=0, le=MAX_VIRTUAL_PER_EDGE, strict=True, description="Virtual markers on every edge."
+    )
+
+    clip: Literal["none", "rectangle", "circle"] = Field(
+        "none",
+        description="Outline around the centre; only cells wholly inside it (less the border) stay.",
+    )
+    clip_width_mm: Length | None = Field(None, description="Width of a rectangular clip outline.")
+    clip_height_mm: Length | None = Field(None, description="Height of a rectangular clip outline.")
+    clip_diameter_mm: Length | None = Field(None, description="Diameter of a circular clip outline.")
+
+    palette: Palette = Field(default_factory=Palette, description="The inks.")
+    fiducials: Fiducials = Field(
+        default_factory=lambda: Fiducials.model_validate({}),
+        description="Marks around the pattern by which jobs, prints and molds agree.",
+    )
+    laser: LaserOptions = Field(
+        default_factory=lambda: LaserOptions.model_validate({}),
+        description="How a laser carves the cells; for --only laser.",
+    )
+    mold: MoldOptions = Field(
+        default_factory=lambda: MoldOptions.model_validate({}),
+        description="How the elastomer is cast in layers; for --only mold,mesh.",
+    )
+    sheet: SheetOptions = Field(
+        default_factory=lambda: SheetOptions.model_validate({}),
+        description="The page that pads are printed on; for --only print.",
+    )
+
+    print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")
+    print_scale: bool = Field(
+        False, strict=True, description="SVG: a scale bar and a caption below the pattern."
+    )
+    print_mirror: bool = Field(False, strict=True, description="SVG: mirror the drawing, for transfer film.")
+
+    @field_validator("pattern")
+    @classmethod
+    def _known_pattern(cls, value: str) -> str:
+        if value not in patterns():
+            raise ValueError(
+                f"{value!r} is no pattern{_nearest(value, patterns())}; there are {', '.join(patterns())}"
+            )
+        return value
+
+    @field_validator("name")
+    @classmethod
+    def _one_printable_line(cls, value: str) -> str:
+        # It goes into captions and XML, which has no way to write control characters.
+        if not value.isprintable():
+            raise ValueError(f"{value!r} has line breaks or control characters; write it on one line")
+        return value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Design:
+        for problem in (self._size_problem(), self._clip_problem(), self._option_problem()):
+            if problem:
+                raise ValueError(problem)
+        return self
+
+    def _size_problem(self) -> str:
+        overall = self.width_mm is not None or self.height_mm is not None
+        given = (self.pitch_mm is not None, self.layers is not None, overall)
+        if self.pitch_mm is not None and self.pitch_mm < SMALLEST_PITCH_MM:
+            return f"pitch_mm = {self.pitch_mm:g} mm is below {SMALLEST_PITCH_MM} mm; is the unit right?"
+        if all(given):
+            return (
+                "pitch_mm, layers and an overall size (width_mm, height_mm) fix the size twice; "
+                "leave one of the three out (a template's by --set layers=none)"
+            )
+        if sum(given) == 2 or (self.pitch_mm is not None and self.clip != "none"):
+            return ""
+        missing = "pitch_mm or width_mm" if self.layers is not None else "layers"
+        if not any(given):
+            missing = "pitch_mm and layers"
+        elif overall:
+            missing = "layers or pitch_mm"
+        return (
+            f"the size is not fixed; add {missing} "
+            "(a size is pitch_mm + layers, overall size + layers, or overall size + pitch_mm)"
+        )
+
+    def _clip_problem(self) -> str:
+        needed = {"rectangle": ("clip_width_mm", "clip_height_mm"), "circle": ("clip_diameter_mm",)}
+        for field in ("clip_width_mm", "clip_height_mm", "clip_diameter_mm"):
+            wanted, value = field in needed.get(self.clip, ()), getattr(self, field)
+            if wanted and value is None:
+                return f'clip = "{self.clip}" needs {field}'
+            if not wanted and value is not None:
+                owner = next(clip for clip, fields in needed.items() if field in fields)
+                return f'{field} needs clip = "{owner}", but clip is "{self.clip}"'
+            if value is not None and value <= 2 * self.border_mm:
+                return (
+                    f"{field} = {value:g} mm leaves nothing inside a border of {self.border_mm:g} mm "
+                    f"on both sides; make it larger than {2 * self.border_mm:g} mm or the border smaller"
+                )
+        return ""
+
+    def _option_problem(self) -> str:
+        for option in ("aspect", "spacing"):
+            if getattr(self, option) is None or option in patterns()[self.pattern].options:
+                continue
+            takers = ", ".join(name for name, pattern in patterns().items() if option in pattern.options)
+            return f"{option} is an option of the pattern {takers}, not of {self.pattern}; leave it out"
+        return ""
+
+
+def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> Design:
+    """A design from a template's name or a TOML file, with values overridden.
+
+    Args:
+        name_or_path: a template's name ("tac3d") or the path of a TOML file.
+        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette, and the text
+            "none" takes the field out.
+
+    Raises:
+        DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.
+
+    >>> design = load_design("honeycomb", {"pitch_mm": "60mil", "layers": "3"})
+    >>> design.pitch_mm, design.layers
+    (1.524, 3)
+    """
+    from cmpdesign.design.templates import find_design
+
+    path = find_design(name_or_path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise DesignError(f"{path}: is no UTF-8 text, so no TOML design") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DesignError(f"{path}: is no valid TOML: {error}") from None
+    try:
+        _override(data, overrides or {})
+        data.setdefault("name", path.stem)
+        return Design(**data)
+    except DesignError as error:
+        raise DesignError(f"{name_or_path}: {error}") from None
+
+
+def design_schema() -> dict[str, Any]:
+    """The JSON Schema of a design's TOML, for editors; ``cmpdesign/design.schema.json`` holds it."""
+    schema = Design.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["title"] = "cmpdesign design"
+    schema["properties"]["pattern"]["enum"] = list(patterns())
+    return schema
+
+
+def design_schema_text() -> str:
+    """``design_schema`` as the file's text."""
+    return json.dumps(design_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _override(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
+    for dotted, text in overrides.items():
+        *tables, field = dotted.split(".")
+        target = data
+        for table in tables:
+            target = target.setdefault(table, {})
+            if not isinstance(target, dict):
+                raise DesignError(f"{dotted}: {table} is not a table{_nearest(dotted, Design.model_fields)}")
+        if text == "none":
+            target.pop(field, None)
+        else:
+            target[field] = _plain(text)
+
+
+def _plain(text: str) -> object:
+    """The TOML value that the text spells, or the text itself: "3" is a number, "60mil" is a text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _nearest(word: str, known: Mapping[str, object]) -> str:
+    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {found[0]}?)" if found else ""
+
+
+def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
+    """What pydantic found, in one line that names each field, its value and what it takes."""
+    parts = []
+    for item in error.errors():
+        path = ".".join(str(part) for part in item["loc"])
+        message = item["msg"].removeprefix("Value error, ")
+        if item["type"] == "extra_forbidden":
+            fields = _fields_at(model, item["loc"][:-1])
+            parts.append(f"{path} is unknown{_nearest(str(item['loc'][-1]), fields)}")
+        elif item["type"] == "missing":
+            parts.append(f"{path} is missing")
+        elif item["type"] == "value_error":
+            parts.append(f"{path}: {message}" if path else message)
+        elif item["type"] == "string_pattern_mismatch":
+            parts.append(f'{path} = {item["input"]!r} is no color; write it as "#c8322d"')
+        else:
+            unit = next((f" {unit}" for unit in ("mm", "deg") if path.endswith(f"_{unit}")), "")
+            message = message.removeprefix("Input should be ")
+            parts.append(f"{path} = {item['input']!r} must be {message}{unit}")
+    return "; ".join(parts)
+
+
+def _fields_at(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
+    """The fields of the table that a path of names leads to."""
+    for name in path:
+        table = model.model_fields[str(name)].annotation
+        assert isinstance(table, type) and issubclass(table, BaseModel)
+        model = table
+    return model.model_fields

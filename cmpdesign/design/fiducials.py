@@ -1,0 +1,44 @@
+"""Fiducials: marks outside the pattern by which all passes, prints and molds of a design agree.
+
++------------------------+
+| o                      |      Three marks in four corners: a pad taken out for filling cannot be put
+|        /\\  /\\          |      back turned. A fourth (count = 4) lets a photo be rectified; it lies a
+|       pattern          |      diameter further out, so that the four still tell the corners apart.
+|        \\/  \\/          |
+| o                    o |
++------------------------+
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from cmpdesign.design.quantities import Length, LengthOrZero
+
+
+class Fiducials(BaseModel):
+    """The [fiducials] table of a design."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    count: Literal[0, 3, 4] = Field(3, description="How many: 0, 3 or 4.")
+    diameter_mm: Length = Field(2.0, description="Diameter of a mark; a hole of it takes a pin.")
+    gap_mm: LengthOrZero = Field(2.0, description="Between the pattern's bounding box and a mark's rim.")
+
+
+def fiducial_positions(fiducials: Fiducials, outline_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(F, 2) centres in the layout frame: lower left, lower right, upper left, then upper right.
+
+    Args:
+        outline_mm: (K, 2), the ground's outline.
+    """
+    away = fiducials.gap_mm + fiducials.diameter_mm / 2
+    left, bottom = outline_mm.min(axis=0) - away
+    right, top = outline_mm.max(axis=0) + away
+    fourth = right + fiducials.diameter_mm, top
+    corners = np.array([(left, bottom), (right, bottom), (left, top), fourth])
+    return corners[: fiducials.count]

@@ -1,0 +1,23 @@
+"""The [sheet] table of a design: the page that pads are printed on."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from cmpdesign.design.quantities import LengthOrZero
+
+PAGES_MM = {"a4": (210.0, 297.0), "a3": (297.0, 420.0), "letter": (215.9, 279.4)}
+
+
+class SheetOptions(BaseModel):
+    """How pads are laid out for printing."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    page: Literal["a4", "a3", "letter"] = Field("a4", description="Paper size.")
+    pads: Annotated[int, Field(ge=1, le=10_000, strict=True)] | None = Field(
+        None, description="How many pads; else as many as fit."
+    )
+    bleed_mm: LengthOrZero = Field(2.0, description="How far the black ground is printed beyond the cut.")

@@ -1,0 +1,64 @@
+"""Where templates are found: beside the package in a checkout, inside it when installed."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from cmpdesign.errors import DesignError
+
+
+def templates_folder() -> Path:
+    """The folder that holds the templates.
+
+    Raises:
+        DesignError: the installation has lost them.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "templates", package.parent / "templates"):
+        if folder.is_dir():
+            return folder
+    raise DesignError(f"no templates beside {package}; install cmpdesign again")
+
+
+def templates() -> dict[str, Path]:
+    """Every design template by name, in alphabetical order."""
+    return {path.stem: path for path in sorted(templates_folder().glob("*.toml"))}
+
+
+def scene_templates() -> dict[str, Path]:
+    """Every scene template by name, in alphabetical order."""
+    return {path.stem: path for path in sorted((templates_folder() / "scenes").glob("*.toml"))}
+
+
+def find_design(name_or_path: str | Path) -> Path:
+    """The TOML file of a template's name or of a path.
+
+    Raises:
+        DesignError: neither a template nor a file.
+    """
+    return _found(name_or_path, templates())
+
+
+def find_scene(name_or_path: str | Path) -> Path:
+    """The TOML file of a scene template's name or of a path.
+
+    Raises:
+        DesignError: neither a template nor a file.
+    """
+    return _found(name_or_path, scene_templates())
+
+
+def _found(name_or_path: str | Path, known: dict[str, Path]) -> Path:
+    if str(name_or_path) in known:
+        return known[str(name_or_path)]
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if path.suffix or len(path.parts) > 1:
+        raise DesignError(f"{name_or_path}: no such file")
+    near = difflib.get_close_matches(str(name_or_path), known, n=1, cutoff=0.5)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    raise DesignError(
+        f"{name_or_path}: no such template{hint}; there are {', '.join(known)}, or give a TOML file"
+    )

@@ -1,0 +1,4 @@
+"""How figures are shown: statistics, plots and an HTML page.
+
+In: figures. Out: texts.
+"""

@@ -1,0 +1,108 @@
+"""The contacts of the experiments, solved once and then moved about: the layer is the same everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.evaluate.simulated.sensor import parse_sensor
+
+if TYPE_CHECKING:
+    from cmpdesign.contact import Contact, Indenter, Motion
+
+Points = NDArray[np.float64]
+REST = "rest"  # no object at all
+
+
+@dataclass(frozen=True)
+class Load:
+    """An object and what it does.
+
+    Attributes:
+        object: a name that ``indenter`` knows, or ``REST``.
+        press_mm, shear_mm, twist_deg: as ``contact.Motion``; a positive twist is counter-clockwise from the front.
+    """
+
+    object: str
+    press_mm: float
+    shear_mm: tuple[float, float] = (0.0, 0.0)
+    twist_deg: float = 0.0
+
+
+def indenter(name: str) -> Indenter:
+    """An object of the experiments. Sizes: the article where it gives one (cube 15 mm, ball 20 mm); else assumed."""
+    from cmpdesign.contact import Ball, Cube, Cylinder, Rib, Ring, Wedge
+
+    made: dict[str, Callable[[], Indenter]] = {
+        "ball": lambda: Ball(10.0),
+        "ring": lambda: Ring(6.0, 2.0),
+        "cylinder": lambda: Cylinder(5.0, 14.0, axis_deg=30.0),
+        "rib": lambda: Rib(2.0, 14.0, 0.2, turn_deg=20.0),
+        "wedge": lambda: Wedge(90.0, 14.0, 0.2, turn_deg=-35.0),
+        "large_ball": lambda: Ball(20.0),
+        "cube": lambda: Cube(15.0, 0.2),
+    }
+    return made[name]()
+
+
+def motion(load: Load) -> Motion:
+    from cmpdesign.contact import Motion
+
+    return Motion(load.press_mm, load.shear_mm, load.twist_deg)
+
+
+@lru_cache(maxsize=16)
+def solved(sensor_text: str, load: Load) -> Contact:
+    """The contact at the middle of the sensor's layer."""
+    from cmpdesign.contact import solve
+
+    sensor = parse_sensor(sensor_text)
+    table = sensor.table.contact
+    return solve(
+        sensor.elastomer,
+        indenter(load.object),
+        motion(load),
+        friction=table.friction,
+        size_mm=table.size_mm,
+        grid=table.grid,
+        steps=table.steps,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A surface whose contact has its centre at ``centre_mm``: (N, 2) mm to (N, 3) mm."""
+
+    relief: Callable[[Points], Points]
+    centre_mm: tuple[float, float]
+
+    def __call__(self, xy_mm: Points, /) -> Points:
+        offset = np.asarray(self.centre_mm)
+        found = self.relief(np.asarray(xy_mm) - offset)
+        found[:, :2] += offset
+        return found
+
+    def displacement_mm(self, xy_mm: Points) -> Points:
+        """(N, 3) how the points (N, 2) of the flat surface have moved."""
+        moved = self(xy_mm)
+        moved[:, :2] -= xy_mm
+        return moved
+
+
+def _flat(xy_mm: Points) -> Points:
+    return np.column_stack([xy_mm, np.zeros(len(xy_mm))])
+
+
+@lru_cache(maxsize=16)
+def _relief(sensor_text: str, load: Load) -> Callable[[Points], Points]:
+    return solved(sensor_text, load).surface() if load.object != REST else _flat
+
+
+def surface(sensor_text: str, load: Load, centre_mm: tuple[float, float]) -> Moved:
+    """The surface under a load at a place."""
+    return Moved(_relief(sensor_text, load), centre_mm)

@@ -1,0 +1,221 @@
+"""A simulated sensor: its views, its patterns, its elastomer, and what differs from trial to trial. One TOML file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from cmpdesign.contact import Elastomer
+    from cmpdesign.scene import Pinhole
+    from extractor.space.rig import Rig
+
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+Pixels = Annotated[int, Field(ge=16, le=20_000)]
+Counts = tuple[Annotated[int, Field(ge=0, le=100)], Annotated[int, Field(ge=0, le=100)]]
+METHODS = ("square", "multicolor")
+OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge", "large_ball", "cube")
+
+
+class SensorError(CmpDesignError, ValueError):
+    """A sensor file that cannot be used."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class ElastomerTable(_Table):
+    """The soft layer, bonded to the sensor's window."""
+
+    thickness_mm: Positive
+    young_mpa: Positive
+    poisson: float = Field(0.5, ge=0, le=0.5)
+
+
+class ContactTable(_Table):
+    """How contacts are solved."""
+
+    friction: float = Field(ge=0)
+    size_mm: tuple[Positive, Positive]
+    grid: int = Field(256, ge=16, le=2048)
+    steps: int = Field(8, ge=1, le=1000)
+
+
+class LoadTable(_Table):
+    """One contact of the set that designs are compared with; a positive twist is counter-clockwise from the front."""
+
+    object: str
+    press_mm: float = Field(ge=0)
+    shear_mm: tuple[float, float] = (0.0, 0.0)
+    twist_deg: float = Field(0.0, ge=-180, le=180)
+
+    @field_validator("object")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in OBJECTS:
+            raise ValueError(f"{value!r} is no object; there are {', '.join(OBJECTS)}")
+        return value
+
+
+class Conditions(_Table):
+    """What differs from trial to trial; ranges are drawn from evenly."""
+
+    level: tuple[Positive, Positive] = (1.0, 1.0)
+    tint: Share = 0.0
+    gradient: Share = 0.0
+    vignetting: tuple[Share, Share] = (0.0, 0.0)
+    lamps: Counts = (0, 0)
+    lamp_level: Annotated[float, Field(ge=0)] = 0.0
+    blur_px: tuple[Annotated[float, Field(ge=0.1, le=20)], Annotated[float, Field(ge=0.1, le=20)]] = (1, 1)
+    noise: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] = (2.0, 2.0)
+    specks: Counts = (0, 0)
+    speck_radius_mm: tuple[Positive, Positive] = (0.1, 0.1)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Conditions:
+        for name in ("level", "vignetting", "lamps", "blur_px", "noise", "specks", "speck_radius_mm"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"{name} is [{low:g}, {high:g}]; give the smaller limit first")
+        return self
+
+
+class SensorTable(_Table):
+    """The file but for its [[view]] tables, which the extractor's own reader checks."""
+
+    name: str = ""
+    description: str = ""
+    source: str = ""
+    size_px: tuple[Pixels, Pixels]
+    patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    elastomer: ElastomerTable
+    contact: ContactTable
+    load: tuple[LoadTable, ...] = ()
+    conditions: Conditions = Conditions()
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedSensor:
+    """A sensor file, read.
+
+    Attributes:
+        table: its tables.
+        rig: its views, with their poses.
+        text: the file's content.
+    """
+
+    table: SensorTable
+    rig: Rig
+    text: str
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        return self.table.size_px
+
+    @cached_property
+    def cameras(self) -> tuple[Pinhole, ...]:
+        """The views as the renderer takes them."""
+        from cmpdesign.scene import Pinhole
+
+        return tuple(
+            Pinhole(
+                focal_px=(view.focal_px[0], view.focal_px[1]),
+                centre_px=(view.centre_px[0], view.centre_px[1]),
+                distortion=(*view.distortion,),  # type: ignore[arg-type]
+                R_camera_from_layout=view.R_camera_from_layout,
+                t_camera_from_layout_mm=view.t_camera_from_layout_mm,
+                area_px=view.area_px,
+                name=view.name,
+            )
+            for view in self.rig.views
+        )
+
+    @cached_property
+    def elastomer(self) -> Elastomer:
+        from cmpdesign.contact import Elastomer
+
+        layer = self.table.elastomer
+        return Elastomer(layer.thickness_mm, layer.young_mpa, layer.poisson)
+
+    def pattern(self, method: str) -> Mapping[str, Any]:
+        """The design of ``square`` or ``multicolor``.
+
+        Raises:
+            SensorError: the file has no such pattern.
+        """
+        if method not in self.table.patterns:
+            raise SensorError(
+                f"the sensor has no [patterns.{method}]; give one to compare {', '.join(METHODS)}"
+            )
+        return self.table.patterns[method]
+
+
+def find_sensor(name_or_path: str | Path) -> Path:
+    """The file of a sensor that is shipped, or of a path.
+
+    Raises:
+        SensorError: neither.
+    """
+    from cmpdesign.design.templates import templates_folder
+
+    shipped = {path.stem: path for path in sorted((templates_folder() / "sensors").glob("*.toml"))}
+    if str(name_or_path) in shipped:
+        return shipped[str(name_or_path)]
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    raise SensorError(f"{name_or_path}: no such sensor; there are {', '.join(shipped)}, or give a TOML file")
+
+
+def load_sensor(name_or_path: str | Path = "tac3d") -> SimulatedSensor:
+    """Read a sensor file.
+
+    Raises:
+        SensorError: no such file, or a value in it that cannot be used; one line that names it.
+    """
+    path = find_sensor(name_or_path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SensorError(f"{path}: cannot be read ({error})") from error
+    return parse_sensor(text, str(path))
+
+
+def parse_sensor(text: str, where: str = "sensor") -> SimulatedSensor:
+    """The sensor in a TOML text; ``where`` opens every error's message.
+
+    Raises:
+        SensorError: see ``load_sensor``.
+    """
+    from extractor.errors import ExtractorError
+    from extractor.space.rig import parse_rig
+
+    try:
+        document = tomllib.loads(text)
+        rig = parse_rig(text, where)
+        document.pop("view", None)
+        table = SensorTable.model_validate(document)
+    except tomllib.TOMLDecodeError as error:
+        raise SensorError(f"{where}: not TOML: {error}") from None
+    except ExtractorError as error:
+        raise SensorError(str(error)) from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise SensorError(f"{where}: {field}: {first['msg']} (it is {first['input']!r})") from None
+    for view in rig.views:
+        if not view.placed:
+            raise SensorError(
+                f"{where}: view {view.name!r} has no pose; give R_camera_from_layout and t_camera_from_layout_mm"
+            )
+    return SimulatedSensor(table, rig, text)

@@ -1,0 +1,74 @@
+"""layout.json, version 1: columns, mm, UTF-8, the same bytes for the same layout. The format is in docs/."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cmpdesign import __version__
+from cmpdesign.files.atomic import write_file
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import COLORS
+
+FORMAT, VERSION = "cmp-layout", 1
+
+
+def write_layout(layout: Layout, path: str | Path) -> None:
+    """Write ``layout_to_json`` to a file.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    write_file(path, layout_to_json(layout))
+
+
+def layout_to_json(layout: Layout) -> str:
+    """The layout file's text, one column a line; numbers are the shortest that read back exactly."""
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "units": "mm",
+        "pattern": layout.pattern,
+        "parameters": dict(layout.parameters),
+        "markers": {
+            "layer": layout.marker_layer.tolist(),
+            "index": layout.marker_index.tolist(),
+            "x": layout.marker_xy_mm[:, 0].tolist(),
+            "y": layout.marker_xy_mm[:, 1].tolist(),
+        },
+        "cells": {
+            "corners": layout.cell_corners.tolist(),
+            "color": [COLORS[color] for color in layout.cell_color.tolist()],
+        },
+        "edges": layout.edges.tolist(),
+        "virtual_per_edge": layout.virtual_per_edge,
+        "reference": {"cell": layout.reference_cell, "marker": layout.reference_marker},
+        "palette": dict(layout.palette),
+        "border_mm": layout.border_mm,
+        "outline": layout.outline_mm.tolist(),
+        "generator": f"cmpdesign {__version__}",
+        "digest": layout.digest,
+    }
+    if len(layout.fiducials_mm):
+        document["fiducials"] = {
+            "x": layout.fiducials_mm[:, 0].tolist(),
+            "y": layout.fiducials_mm[:, 1].tolist(),
+            "diameter_mm": layout.fiducial_diameter_mm,
+        }
+    return _members(document, "") + "\n"
+
+
+def _members(value: Mapping[str, Any], indent: str) -> str:
+    """An object with one member a line; lists stay on theirs."""
+    inner = indent + "  "
+    lines = [
+        f"{inner}{_compact(key)}: {_members(item, inner) if isinstance(item, Mapping) else _compact(item)}"
+        for key, item in value.items()
+    ]
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,217 @@
+"""What of a design cannot be made or read: each finding with its value, limit, unit and remedy."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from cmpdesign.design.design import Design
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
+from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
+
+# A desktop CO2 laser removes a kerf of 0.1 to 0.2 mm and an inkjet dot on film spreads to about 0.1 mm: a
+# cell whose inscribed circle is no wider comes out as a dot, and up to three times that with round corners.
+CELL_ERROR_MM, CELL_WARNING_MM = 0.1, 0.3
+# A corner rounded to the radius r is missing over r / sin(angle / 2): 2 r at 60 degrees, 6 r at 20 degrees.
+CORNER_WARNING_DEG = 20.0
+# The three inks are told apart by hue alone, at best 120 degrees apart. LEDs and white balance shift each by
+# some 20 degrees, so that two inks less than 45 degrees apart may change places.
+HUE_ERROR_DEG = 45.0
+# Below this saturation, noise of 2/255 turns the hue of a mid-bright ink by several degrees.
+SATURATION_ERROR = 0.35
+# The error of a corner goes with the inverse contrast between ink and black; in steps of 255.
+CONTRAST_ERROR, CONTRAST_WARNING = 40, 80
+# White must be brighter than the inks' dark channels and without a hue of its own.
+WHITE_SATURATION_ERROR, WHITE_VALUE_ERROR = 0.2, 0.6
+# A triangle of 6 px edge covers 16 px, most of them blurred by its border; 12 px is the least that is
+# tested at every rotation and tilt.
+CAMERA_PX = (640, 480)
+EDGE_ERROR_PX, EDGE_WARNING_PX = 6.0, 12.0
+# Without a black frame the rim's gridlines have whatever lies behind the pattern as their other side.
+BORDER_WARNING_PITCHES = 0.25
+# Markers that the clip outline took away still fill every array. A hexagon around a rectangle loses half.
+PRESENT_WARNING = 0.33
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that cannot be made or read.
+
+    Attributes:
+        subject: what was checked.
+        value, limit: the measured value and the one that it should not pass.
+        unit: of both; "" for a plain number.
+        remedy: what to change.
+        severity: "error" (will not work) or "warning" (works under good conditions only).
+    """
+
+    subject: str
+    value: float
+    limit: float
+    unit: str
+    remedy: str
+    severity: Literal["error", "warning"]
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{self.subject}: {self.value:.3g}{unit}, limit {self.limit:.3g}{unit}; {self.remedy}"
+
+
+def check_design(
+    design: Design, layout: Layout | None = None, camera_px: tuple[int, int] = CAMERA_PX
+) -> list[Finding]:
+    """Findings, errors first; an empty list when there is nothing to say.
+
+    Args:
+        design: the design.
+        layout: its layout, if it is at hand.
+        camera_px: width and height of a camera whose picture the pattern just fills.
+
+    Raises:
+        DesignError: the design has no layout.
+
+    >>> from cmpdesign import load_design
+    >>> [str(finding) for finding in check_design(load_design("honeycomb", {"pitch_mm": "0.3mm"}))]
+    ['smallest cell (inscribed circle): 0.173 mm, limit 0.3 mm; make pitch_mm larger or layers fewer']
+    """
+    layout = layout or build_layout(design)
+    findings = [*_sizes(layout), *_camera(layout, camera_px), *_structure(design, layout), *_colors(layout)]
+    return sorted(findings, key=lambda finding: finding.severity)
+
+
+def _sizes(layout: Layout) -> Iterator[Finding]:
+    width_mm = float(cell_widths_mm(layout).min())
+    yield from _below(
+        "smallest cell (inscribed circle)",
+        width_mm,
+        CELL_ERROR_MM,
+        CELL_WARNING_MM,
+        "mm",
+        "make pitch_mm larger or layers fewer",
+    )
+    angle_deg = float(cell_angles_deg(layout).min())
+    yield from _below(
+        "sharpest corner of a cell",
+        angle_deg,
+        None,
+        CORNER_WARNING_DEG,
+        "deg",
+        'bring aspect nearer to 1, or choose spacing = "arc"',
+    )
+
+
+def _camera(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:
+    width_mm, height_mm = layout.size_mm
+    # The picture may lie across the pattern.
+    scale = max(
+        min(camera_px[0] / width_mm, camera_px[1] / height_mm),
+        min(camera_px[1] / width_mm, camera_px[0] / height_mm),
+    )
+    yield from _below(
+        f"shortest edge in a {camera_px[0]}x{camera_px[1]} picture filled by the pattern",
+        scale * float(edge_lengths_mm(layout).min()),
+        EDGE_ERROR_PX,
+        EDGE_WARNING_PX,
+        "px",
+        "use fewer layers or a camera with more pixels",
+    )
+
+
+def _structure(design: Design, layout: Layout) -> Iterator[Finding]:
+    layers, pitch_mm = int(layout.parameters["layers"]), float(layout.parameters["pitch_mm"])
+    triangular = layout.cell_corners.shape[1] == 3
+    if triangular and layers < 2:
+        yield Finding(
+            "layers (the white cell's third neighbour lies in layer 2)",
+            layers,
+            2,
+            "",
+            "use two layers or more, or orientation rests on two cells",
+            "warning",
+        )
+    yield from _below(
+        "black border",
+        layout.border_mm,
+        None,
+        BORDER_WARNING_PITCHES * pitch_mm,
+        "mm",
+        "make border_mm larger, or the rim's gridlines lack contrast",
+    )
+    yield from _below(
+        "share of markers inside the clip outline",
+        float(layout.present.mean()),
+        None,
+        PRESENT_WARNING,
+        "",
+        "use fewer layers: the others are numbered but never seen",
+    )
+
+
+def _colors(layout: Layout) -> Iterator[Finding]:
+    inks = [RED, GREEN, BLUE] if layout.cell_corners.shape[1] == 3 else [RED]
+    hsv = {color: _hsv(layout, color) for color in range(len(COLORS))}
+    for first, second in combinations(inks, 2):
+        apart = abs(hsv[first][0] - hsv[second][0])
+        yield from _below(
+            f"hue distance of {COLORS[first]} and {COLORS[second]}",
+            min(apart, 360 - apart),
+            HUE_ERROR_DEG,
+            None,
+            "deg",
+            "choose inks further apart",
+        )
+    for color in inks:
+        yield from _below(
+            f"saturation of {COLORS[color]}", hsv[color][1], SATURATION_ERROR, None, "", "choose a purer ink"
+        )
+    black = _rgb(layout, BLACK)
+    for color in [*inks, WHITE]:
+        contrast = float((_rgb(layout, color) - black).max())
+        yield from _below(
+            f"contrast of {COLORS[color]} against black",
+            contrast,
+            CONTRAST_ERROR,
+            CONTRAST_WARNING,
+            "of 255",
+            "choose a brighter ink or a darker black",
+        )
+    yield from _below(
+        "brightness of white", hsv[WHITE][2], WHITE_VALUE_ERROR, None, "", "choose a brighter white"
+    )
+    if hsv[WHITE][1] > WHITE_SATURATION_ERROR:
+        yield Finding(
+            "saturation of white",
+            hsv[WHITE][1],
+            WHITE_SATURATION_ERROR,
+            "",
+            "choose a white without a tint",
+            "error",
+        )
+
+
+def _below(
+    subject: str, value: float, error: float | None, warning: float | None, unit: str, remedy: str
+) -> Iterator[Finding]:
+    """A finding when the value lies below a limit; the stricter limit that it passes is the one named."""
+    if error is not None and value < error:
+        yield Finding(subject, value, error, unit, remedy, "error")
+    elif warning is not None and value < warning:
+        yield Finding(subject, value, warning, unit, remedy, "warning")
+
+
+def _rgb(layout: Layout, color: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    text = layout.palette[COLORS[color]]
+    return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64)
+
+
+def _hsv(layout: Layout, color: int) -> tuple[float, float, float]:
+    """Hue in degrees, saturation and value from 0 to 1."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*(_rgb(layout, color) / 255))
+    return 360 * hue, saturation, value

@@ -1,0 +1,120 @@
+"""The layout: every marker, cell and edge of a pattern, in frozen arrays. It knows no file format."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.patterns.colors import BLACK
+
+# Coordinates are held to a picometre, so that every machine writes the same digits.
+DECIMALS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A pattern's geometry in the layout frame (mm, origin at marker 0, x right, y up, seen from the front).
+
+    Attributes:
+        pattern: the registered pattern's name.
+        parameters: the design's parameters, resolved; ``mirrored`` says from which side the camera looks.
+        marker_layer, marker_index: (M,) int32; a marker's position in the arrays is its id.
+        marker_xy_mm: (M, 2) float64, rounded to 1e-9 mm.
+        cell_corners: (C, 3) int32 (square: (C, 4)), marker ids counter-clockwise from the front.
+        cell_color: (C,) uint8, an index into ``COLORS``.
+        edges: (E, 2) int32, each from its smaller to its larger marker id, in ascending order.
+        virtual_per_edge: virtual markers on every edge.
+        reference_cell, reference_marker: the reference cell and the marker where numbering starts.
+        palette: color name -> "#rrggbb".
+        border_mm: width of the black border around the pattern.
+        outline_mm: (K, 2) float64, the ground's closed outline (border included), counter-clockwise, the
+            first point not repeated.
+        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
+        fiducial_diameter_mm: their diameter.
+    """
+
+    pattern: str
+    parameters: Mapping[str, Any]
+    marker_layer: NDArray[np.int32]
+    marker_index: NDArray[np.int32]
+    marker_xy_mm: NDArray[np.float64]
+    cell_corners: NDArray[np.int32]
+    cell_color: NDArray[np.uint8]
+    edges: NDArray[np.int32]
+    virtual_per_edge: int
+    reference_cell: int
+    reference_marker: int
+    palette: Mapping[str, str]
+    border_mm: float
+    outline_mm: NDArray[np.float64]
+    fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    fiducial_diameter_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        columns: tuple[NDArray[Any], ...] = (
+            self.marker_layer,
+            self.marker_index,
+            self.marker_xy_mm,
+            self.cell_corners,
+            self.cell_color,
+            self.edges,
+            self.outline_mm,
+        )
+        for column in columns:
+            column.setflags(write=False)
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
+
+    @property
+    def mirrored(self) -> bool:
+        """True when the camera looks at the pattern's back."""
+        return bool(self.parameters.get("mirrored", False))
+
+    @cached_property
+    def size_mm(self) -> tuple[float, float]:
+        """Width and height of the outline, border included."""
+        width, height = np.ptp(self.outline_mm, axis=0)
+        return float(width), float(height)
+
+    @cached_property
+    def present(self) -> NDArray[np.bool_]:
+        """(M,) True where a marker touches a colored or white cell; the others cannot be seen."""
+        seen = np.zeros(len(self.marker_xy_mm), dtype=np.bool_)
+        seen[self.cell_corners[self.cell_color != BLACK]] = True
+        seen.setflags(write=False)
+        return seen
+
+    @cached_property
+    def virtual_xy_mm(self) -> NDArray[np.float64]:
+        """(E, m, 2) virtual markers: j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""
+        start, end = self.marker_xy_mm[self.edges[:, 0]], self.marker_xy_mm[self.edges[:, 1]]
+        share = (np.arange(self.virtual_per_edge) + 1) / (self.virtual_per_edge + 1)
+        points = start[:, None] + share[:, None] * (end - start)[:, None]
+        points.setflags(write=False)
+        return points
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 (hex) of the geometry: int32 layer, index, corners, color, edges, then float64 x, y.
+
+        All little-endian, in C order.
+        """
+        digest = hashlib.sha256()
+        for column, dtype in (
+            (self.marker_layer, "<i4"),
+            (self.marker_index, "<i4"),
+            (self.cell_corners, "<i4"),
+            (self.cell_color, "<i4"),
+            (self.edges, "<i4"),
+            (self.marker_xy_mm[:, 0], "<f8"),
+            (self.marker_xy_mm[:, 1], "<f8"),
+        ):
+            digest.update(np.ascontiguousarray(column, dtype=dtype).tobytes())
+        return digest.hexdigest()

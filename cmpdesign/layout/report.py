@@ -1,0 +1,100 @@
+"""Key figures of a design, and report.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from cmpdesign import __version__
+from cmpdesign.design.design import Design
+from cmpdesign.layout.checks import Finding, check_design
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
+from cmpdesign.patterns.colors import COLORS
+
+
+@dataclass(frozen=True)
+class Report:
+    """Key figures.
+
+    Attributes:
+        name, pattern, source: of the design.
+        layers, pitch_mm: as resolved.
+        markers: ids in the layout.
+        present_markers: those that touch a colored or white cell.
+        cells: color -> number of cells.
+        edges, virtual_markers: edges, and virtual markers on all of them.
+        points: present and virtual markers together.
+        size_mm: overall width and height, border included.
+        shortest_edge_mm: the shortest edge.
+        smallest_feature_mm: diameter of the largest circle that the narrowest cell holds.
+        sharpest_corner_deg: the sharpest corner of any cell.
+        digest: the layout's.
+        findings: what ``check_design`` found.
+    """
+
+    name: str
+    pattern: str
+    source: str
+    layers: int
+    pitch_mm: float
+    markers: int
+    present_markers: int
+    cells: Mapping[str, int]
+    edges: int
+    virtual_markers: int
+    points: int
+    size_mm: tuple[float, float]
+    shortest_edge_mm: float
+    smallest_feature_mm: float
+    sharpest_corner_deg: float
+    digest: str
+    findings: tuple[Finding, ...]
+
+
+def report(design: Design, layout: Layout) -> Report:
+    """The key figures of a design and its layout.
+
+    >>> from cmpdesign import build_layout, load_design
+    >>> design = load_design("tac3d")
+    >>> report(design, build_layout(design)).points
+    4981
+    """
+    counts = np.bincount(layout.cell_color, minlength=len(COLORS)).tolist()
+    present = int(layout.present.sum())
+    virtual = len(layout.edges) * layout.virtual_per_edge
+    return Report(
+        name=design.name,
+        pattern=layout.pattern,
+        source=design.source,
+        layers=int(layout.parameters["layers"]),
+        pitch_mm=float(layout.parameters["pitch_mm"]),
+        markers=len(layout.marker_xy_mm),
+        present_markers=present,
+        cells=dict(zip(COLORS, counts, strict=True)),
+        edges=len(layout.edges),
+        virtual_markers=virtual,
+        points=present + virtual,
+        size_mm=layout.size_mm,
+        shortest_edge_mm=round(float(edge_lengths_mm(layout).min()), 6),
+        smallest_feature_mm=round(float(cell_widths_mm(layout).min()), 6),
+        sharpest_corner_deg=round(float(cell_angles_deg(layout).min()), 6),
+        digest=layout.digest,
+        findings=tuple(check_design(design, layout)),
+    )
+
+
+def report_to_json(figures: Report, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+    """report.json's text; ``products`` (name -> figures) are what the products measured of themselves."""
+    document = {
+        "format": "cmp-report",
+        "version": 1,
+        **asdict(figures),
+        **(products or {}),
+        "generator": f"cmpdesign {__version__}",
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"

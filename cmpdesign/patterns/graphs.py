@@ -1,0 +1,115 @@
+"""What is connected to what, before anything has a position: markers, cells, colors, the rim.
+
+A pattern embeds one of these graphs; ``TRIANGULAR`` is the multicolor CMP, ``SQUARE`` the former one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.patterns.colors import BLACK, RED, WHITE
+from cmpdesign.patterns.numbering import Ints, id_from_axial, layer_from_id, marker_count
+
+MAX_LAYERS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The graph of a given number of layers.
+
+    Attributes:
+        layer, index: (M,) int64, by marker id.
+        corners: (C, 3) or (C, 4) int64, marker ids counter-clockwise from the front.
+        color: (C,) uint8, an index into ``layout.COLORS``.
+        reference_cell, reference_marker: where numbering starts.
+    """
+
+    layer: Ints
+    index: Ints
+    corners: Ints
+    color: NDArray[np.uint8]
+    reference_cell: int
+    reference_marker: int
+
+
+@dataclass(frozen=True)
+class Graph:
+    """A family of meshes, one for every number of layers.
+
+    Attributes:
+        name: "triangular" or "square".
+        mesh: layers -> ``Mesh``.
+        rim: layers -> (layer, index) arrays of the outermost markers, counter-clockwise, each once.
+        centre: layers -> (layer, index) arrays of the markers whose mean is the pattern's centre.
+    """
+
+    name: str
+    mesh: Callable[[int], Mesh]
+    rim: Callable[[int], tuple[Ints, Ints]]
+    centre: Callable[[int], tuple[Ints, Ints]]
+
+
+def _triangular(layers: int) -> Mesh:
+    layer, index = layer_from_id(np.arange(marker_count(layers)))
+    span = np.arange(-layers, layers + 1)
+    q, r = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
+    up = np.stack([q, r, q + 1, r, q, r + 1], axis=-1)
+    down = np.stack([q, r, q, r + 1, q - 1, r + 1], axis=-1)
+    # Colors repeat along (q - r) mod 3: every inner marker then meets red, green and blue once each.
+    up_color = RED + (q - r) % 3
+    down_color = np.where((q == 0) & (r == 0), WHITE, BLACK)
+
+    axial = np.concatenate([up, down]).reshape(-1, 3, 2)
+    color = np.concatenate([up_color, down_color]).astype(np.uint8)
+    corner_q, corner_r = axial[..., 0], axial[..., 1]
+    reach = np.maximum(np.maximum(np.abs(corner_q), np.abs(corner_r)), np.abs(corner_q + corner_r))
+    whole = (reach <= layers).all(axis=1)
+    corners, color = id_from_axial(corner_q[whole], corner_r[whole]), color[whole]
+
+    # From the centre outward, so that a cell's number says roughly where it is.
+    order = np.lexsort(np.sort(corners, axis=1).T)
+    corners, color = corners[order], color[order]
+    return Mesh(layer, index, corners, color, int(np.flatnonzero(color == WHITE)[0]), 0)
+
+
+def _triangular_rim(layers: int) -> tuple[Ints, Ints]:
+    index = np.arange(6 * layers)[::-1]
+    return np.full_like(index, layers), index
+
+
+def _triangular_centre(layers: int) -> tuple[Ints, Ints]:
+    return np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+
+
+def _square(layers: int) -> Mesh:
+    side = 2 * layers + 2
+    row, column = (grid.ravel() for grid in np.divmod(np.arange(side * side), side))
+    i, j = (grid.ravel() for grid in np.divmod(np.arange((side - 1) ** 2), side - 1))
+    top_left = i * side + j
+    corners = np.stack([top_left, top_left + side, top_left + side + 1, top_left + 1], axis=-1)
+    # White corners: then every marker of the rim touches a white cell and shows against a black border.
+    color = np.where((i + j) % 2 == 0, WHITE, BLACK).astype(np.uint8)
+    reference = layers * (side - 1) + layers
+    color[reference] = RED
+    return Mesh(row, column, corners, color, reference, int(top_left[reference]))
+
+
+def _square_rim(layers: int) -> tuple[Ints, Ints]:
+    last = 2 * layers + 1
+    step = np.arange(last)
+    zero, full = np.zeros_like(step), np.full_like(step, last)
+    row = np.concatenate([step, full, last - step, zero])
+    column = np.concatenate([zero, step, full, last - step])
+    return row, column
+
+
+def _square_centre(layers: int) -> tuple[Ints, Ints]:
+    return np.array([layers, layers + 1]), np.array([layers, layers + 1])
+
+
+TRIANGULAR = Graph("triangular", _triangular, _triangular_rim, _triangular_centre)
+SQUARE = Graph("square", _square, _square_rim, _square_centre)

@@ -1,0 +1,134 @@
+"""pattern.svg: true to size (1 user unit = 1 mm), one group per color, one closed path per cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.files.atomic import write_file
+from cmpdesign.layout.layout import DECIMALS, Layout
+from cmpdesign.patterns.colors import BLACK, COLORS
+
+SCALE_STRIP_MM = 6.0
+_INK = "#000000"
+_FONT = {"font_family": "sans-serif"}
+# The mean letter of a wide sans-serif face.
+_EM_PER_LETTER = 0.6
+
+ToSheet = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def write_svg(
+    layout: Layout, path: str | Path, *, ids: bool = False, scale: bool = False, mirror: bool = False
+) -> None:
+    """Write ``layout_to_svg`` to a file.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    write_file(path, layout_to_svg(layout, ids=ids, scale=scale, mirror=mirror))
+
+
+def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mirror: bool = False) -> str:
+    """The pattern as SVG text: width and height in mm, the viewBox in mm, y down from the outline's top.
+
+    Coordinates are computed, never transformed, so that any reader finds them in the path data. The ground
+    (group "black") is drawn first; black cells are ground and not drawn again.
+
+    Args:
+        ids: every seen marker's id in small white letters (group "ids").
+        scale: a scale bar and a caption below the pattern (group "scale").
+        mirror: the drawing as in a mirror, for film that is transferred face down.
+    """
+    import svgwrite
+
+    width, height = layout.size_mm
+    sheet_height = round(height + (SCALE_STRIP_MM if scale else 0.0), DECIMALS)
+    to_sheet = _sheet_frame(layout, mirror)
+    drawing = svgwrite.Drawing(
+        size=(f"{width!r}mm", f"{sheet_height!r}mm"),
+        viewBox=f"0 0 {width!r} {sheet_height!r}",
+        debug=False,
+    )
+    drawing.set_desc(title=_caption(layout))
+    ground = drawing.g(id=COLORS[BLACK], fill=layout.palette[COLORS[BLACK]])
+    ground.add(drawing.path(d=_closed(to_sheet(layout.outline_mm).tolist())))
+    drawing.add(ground)
+
+    xy = to_sheet(layout.marker_xy_mm)
+    for color, name in enumerate(COLORS):
+        if color != BLACK:
+            drawing.add(_cells(drawing, layout, xy, color, name))
+    if ids:
+        drawing.add(_ids(drawing, layout, xy, mirror))
+    if scale:
+        drawing.add(_scale(drawing, layout, mirror))
+    return f'<?xml version="1.0" encoding="utf-8" ?>\n{drawing.tostring()}\n'
+
+
+def _sheet_frame(layout: Layout, mirror: bool) -> ToSheet:
+    left = layout.outline_mm[:, 0].min()
+    right, top = layout.outline_mm.max(axis=0)
+
+    def to_sheet(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        x = right - xy_mm[:, 0] if mirror else xy_mm[:, 0] - left
+        return np.round(np.stack([x, top - xy_mm[:, 1]], axis=-1), DECIMALS) + 0.0
+
+    return to_sheet
+
+
+def _closed(points: list[list[float]]) -> str:
+    return "M" + "L".join(f"{x!r} {y!r}" for x, y in points) + "Z"
+
+
+def _cells(drawing: Any, layout: Layout, xy: NDArray[np.float64], color: int, name: str) -> Any:
+    group = drawing.g(id=name, fill=layout.palette[name])
+    for corners in xy[layout.cell_corners[layout.cell_color == color]].tolist():
+        group.add(drawing.path(d=_closed(corners)))
+    return group
+
+
+def _ids(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: bool) -> Any:
+    size = round(0.22 * float(layout.parameters["pitch_mm"]), 3)
+    group = drawing.g(id="ids", fill="#ffffff", font_size=size, **_FONT, text_anchor="middle")
+    for marker in np.flatnonzero(layout.present).tolist():
+        x, y = xy[marker].tolist()
+        group.add(_text(drawing, str(marker), x, round(y + 0.35 * size, DECIMALS), mirror))
+    return group
+
+
+def _scale(drawing: Any, layout: Layout, mirror: bool) -> Any:
+    """A bar with its length beside it, and below them a caption that shrinks until it fits the sheet."""
+    width, height = layout.size_mm
+    length = scale_length_mm(width)
+    caption = _caption(layout)
+    size = round(min(2.0, width / (_EM_PER_LETTER * len(caption))), 3)
+    group = drawing.g(id="scale", fill=_INK, font_size=size, **_FONT)
+    group.add(drawing.rect(insert=(width - length if mirror else 0.0, height + 1.5), size=(length, 0.4)))
+    for text, left, y in ((f"{length:g} mm", length + 0.5, height + 2.2), (caption, 0.0, height + 5.0)):
+        group.add(_text(drawing, text, width - left if mirror else left, y, mirror))
+    return group
+
+
+def scale_length_mm(width_mm: float) -> float:
+    """The longest of 1, 2, 5, 10, ... mm that is at most half the width."""
+    decade = 10.0 ** np.floor(np.log10(width_mm / 2))
+    return float(max(step * decade for step in (1, 2, 5) if step * decade <= width_mm / 2))
+
+
+def _text(drawing: Any, text: str, x: float, y: float, mirror: bool) -> Any:
+    """Text at a place; mirrored with the drawing, so that it reads rightly after the transfer."""
+    if not mirror:
+        return drawing.text(text, insert=(x, y))
+    return drawing.text(text, insert=(0, 0), transform=f"translate({x!r} {y!r}) scale(-1 1)")
+
+
+def _caption(layout: Layout) -> str:
+    width, height = layout.size_mm
+    name = layout.parameters.get("name") or layout.pattern
+    pitch = float(layout.parameters["pitch_mm"])
+    return f"{name}: {int(layout.present.sum())} markers, pitch {pitch:.4g} mm, {width:.4g} x {height:.4g} mm"

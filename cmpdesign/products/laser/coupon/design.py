@@ -1,0 +1,170 @@
+"""The coupon: a test piece whose openings tell the kerf.
+
+o                 o        o: fiducials, cut round; their centres do not depend on the kerf
+  [] |   [] |   [] |       []: a square, |, -: narrow slots; the beam's centre runs along their nominal
+  outline,
+   -      -      -         so each opening is wider than nominal by just one kerf
+  [] |   [] |   [] |       columns: power; rows: times over
+   -      -      -
+  v v v v v v              v: triangles of 1.5 mm, compensated for a range of kerfs: the right one looks right
+o o               o        the fifth mark tells how the piece lies
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.products.laser.setup import Setup
+
+POWER_SHARES = (0.8, 1.0, 1.2)
+REPEAT_FACTORS = (1, 2)
+KERFS_MM = (0.05, 0.09, 0.13, 0.17, 0.21, 0.25)
+SQUARE_MM, SLOT_MM, SLOT_LENGTH_MM = 3.0, 0.3, 4.0
+PATCH_MM, MARGIN_MM = (11.0, 10.0), 5.0
+FIDUCIAL_MM, KEY_MM = 3.0, 7.0
+TRIANGLE_MM = 1.5
+_MAX_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A rectangle, by its centre and the nominal width and height of the beam's path."""
+
+    x_mm: float
+    y_mm: float
+    width_mm: float
+    height_mm: float
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Openings cut with the same settings."""
+
+    name: str
+    power_percent: float
+    speed_mm_s: float
+    passes: int
+    openings: tuple[Opening, ...]
+
+
+@dataclass(frozen=True)
+class Coupon:
+    """A coupon in its own frame: mm, x right, y up, origin at its lower left fiducial.
+
+    ``fiducials_mm``: lower left, lower right, upper left, upper right, and the fifth, right of the first.
+    """
+
+    machine: str
+    material: str
+    fiducial_diameter_mm: float
+    fiducials_mm: tuple[tuple[float, float], ...]
+    patches: tuple[Patch, ...]
+
+
+class CouponError(CmpDesignError, ValueError):
+    """A file that is no coupon."""
+
+
+def design_coupon(setup: Setup) -> Coupon:
+    """The coupon for a machine and material: power and repeats around the settings that the job uses."""
+    width, height = PATCH_MM[0] * len(POWER_SHARES), PATCH_MM[1] * len(REPEAT_FACTORS) + 4 * TRIANGLE_MM
+    right, top = width + 2 * MARGIN_MM, height + 2 * MARGIN_MM
+    patches = []
+    for row, factor in enumerate(REPEAT_FACTORS):
+        for column, share in enumerate(POWER_SHARES):
+            x = MARGIN_MM + (column + 0.5) * PATCH_MM[0]
+            y = MARGIN_MM + 4 * TRIANGLE_MM + (len(REPEAT_FACTORS) - row - 0.5) * PATCH_MM[1]
+            patches.append(
+                Patch(
+                    name=f"{'ABC'[column]}{row + 1}",
+                    power_percent=round(min(share * setup.cut_power_percent, 100.0), 3),
+                    speed_mm_s=setup.cut_speed_mm_s,
+                    passes=factor * setup.cut_repeats,
+                    openings=(
+                        Opening(x - 2.0, y + 1.5, SQUARE_MM, SQUARE_MM),
+                        Opening(x + 2.5, y + 1.5, SLOT_MM, SLOT_LENGTH_MM),
+                        Opening(x - 2.0, y - 2.5, SLOT_LENGTH_MM, SLOT_MM),
+                    ),
+                )
+            )
+    corners = ((0.0, 0.0), (right, 0.0), (0.0, top), (right, top), (KEY_MM, 0.0))
+    return Coupon(setup.machine.name, setup.material.name, FIDUCIAL_MM, corners, tuple(patches))
+
+
+def coupon_to_json(coupon: Coupon) -> str:
+    """coupon.json's text."""
+    document = {"format": "cmp-coupon", "version": 1, "units": "mm", **asdict(coupon)}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def load_coupon(path: str | Path) -> Coupon:
+    """Read a coupon.json.
+
+    Raises:
+        CouponError: the file cannot be read or is none; one line that names the field.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            text = file.read(_MAX_BYTES + 1).decode("utf-8")
+        return _checked(json.loads(text))
+    except OSError as error:
+        raise CouponError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        item = error.errors()[0]
+        where = ".".join(str(part) for part in item["loc"])
+        raise CouponError(
+            f"{path}: {where}: {item['msg']}; expected a coupon.json as build writes it"
+        ) from None
+    except (ValueError, RecursionError):
+        raise CouponError(f"{path}: is no coupon.json; build writes one with --only laser") from None
+
+
+class _Closed(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=False)
+
+
+class _OpeningFile(_Closed):
+    x_mm: float = Field(ge=-1e4, le=1e4)
+    y_mm: float = Field(ge=-1e4, le=1e4)
+    width_mm: float = Field(gt=0, le=1e3)
+    height_mm: float = Field(gt=0, le=1e3)
+
+
+class _PatchFile(_Closed):
+    name: str = Field(min_length=1, max_length=20)
+    power_percent: float = Field(gt=0, le=100)
+    speed_mm_s: float = Field(gt=0, le=1e6)
+    passes: int = Field(ge=1, le=1000)
+    openings: list[_OpeningFile] = Field(min_length=1, max_length=100)
+
+
+class _CouponFile(_Closed):
+    format: str = Field(pattern="^cmp-coupon$")
+    version: int = Field(ge=1, le=1)
+    units: str = Field(pattern="^mm$")
+    machine: str
+    material: str
+    fiducial_diameter_mm: float = Field(gt=0, le=100)
+    fiducials_mm: list[tuple[float, float]] = Field(min_length=5, max_length=5)
+    patches: list[_PatchFile] = Field(min_length=1, max_length=100)
+
+
+def _checked(document: Any) -> Coupon:
+    data = _CouponFile.model_validate(document)
+    patches = tuple(
+        Patch(
+            patch.name,
+            patch.power_percent,
+            patch.speed_mm_s,
+            patch.passes,
+            tuple(Opening(**opening.model_dump()) for opening in patch.openings),
+        )
+        for patch in data.patches
+    )
+    return Coupon(data.machine, data.material, data.fiducial_diameter_mm, tuple(data.fiducials_mm), patches)

@@ -1,0 +1,79 @@
+"""LightBurn projects (.lbrn2): a CutSetting a pass, run in order; fiducials on the tool layer T1, never
+burnt.
+
+The format is XML without a published specification; what is written here is what LightBurn itself writes:
+CutSetting elements with a Value for each setting, Path shapes with a VertList and the PrimList "LineClosed".
+"""
+
+from __future__ import annotations
+
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from cmpdesign.products.laser.formats.drawing import Drawing
+from cmpdesign.products.laser.formats.palette import TOOL, Layer, number
+from cmpdesign.products.laser.job import Pass
+
+APP_VERSION = "1.7.08"
+
+
+def drawing_to_lightburn(drawing: Drawing) -> str:
+    """The passes as a project. A hatched pocket is a Fill + Line layer on its wall: LightBurn draws the
+    lines."""
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<LightBurnProject AppVersion="{APP_VERSION}" FormatVersion="1" MaterialHeight="0" '
+        'MirrorX="False" MirrorY="False">',
+    ]
+    for place, one in enumerate(drawing.passes):
+        lines += _setting(drawing, one, drawing.layers[one.name], place)
+    lines += _tool()
+    vertices = 0
+    for one in drawing.passes:
+        lines += _paths(one, drawing.layers[one.name].index, vertices)
+        vertices += len(one.walls)
+    radius = number(drawing.fiducial_diameter_mm / 2)
+    for x, y in drawing.fiducials_mm.tolist():
+        lines.append(f'<Shape Type="Ellipse" CutIndex="{TOOL.index}" Rx="{radius}" Ry="{radius}">')
+        lines.append(f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm></Shape>")
+    note = f"{drawing.name}: fill and cure after every pass; T1 holds the fiducials, see the job sheet"
+    lines.append(f'<Notes ShowOnLoad="0" Notes={quoteattr(note)}/>')
+    return "\n".join([*lines, "</LightBurnProject>", ""])
+
+
+def _setting(drawing: Drawing, one: Pass, layer: Layer, place: int) -> list[str]:
+    values: dict[str, object] = {
+        "index": layer.index,
+        "name": one.name,
+        "minPower": f"{one.power_percent:g}",
+        "maxPower": f"{one.power_percent:g}",
+        "maxPower2": f"{one.power_percent:g}",
+        "speed": f"{one.speed_mm_s:g}",
+        "numPasses": one.repeats,
+        "kerf": 0,
+        "priority": place,
+    }
+    if one.fills:
+        options = drawing.setup.options
+        values["interval"] = number(drawing.setup.hatch_mm)
+        values["angle"] = f"{options.hatch_deg:g}"
+        values["anglePerPass"] = f"{options.hatch_turn_deg:g}"
+    kind = "Scan+Cut" if one.fills else "Cut"
+    inner = [f"<{name} Value={quoteattr(str(value))}/>" for name, value in values.items()]
+    return [f'<CutSetting type="{kind}">', *inner, "</CutSetting>"]
+
+
+def _tool() -> list[str]:
+    inner = [f'<index Value="{TOOL.index}"/>', '<name Value="T1"/>', '<priority Value="100"/>']
+    return ['<CutSetting type="Tool">', *inner, "</CutSetting>"]
+
+
+def _paths(one: Pass, index: int, first_number: int) -> list[str]:
+    vertices = [f"V{number(x)} {number(y)}c0x1c1x1" for x, y in one.walls.xy_mm.tolist()]
+    bounds = zip(one.walls.first[:-1].tolist(), one.walls.first[1:].tolist(), strict=True)
+    return [
+        f'<Shape Type="Path" CutIndex="{index}" VertID="{n}" PrimID="{n}"><XForm>1 0 0 1 0 0</XForm>'
+        f"<VertList>{''.join(vertices[start:end])}</VertList><PrimList>LineClosed</PrimList></Shape>"
+        for n, (start, end) in zip(np.arange(len(one.walls)) + first_number, bounds, strict=True)
+    ]

@@ -1,0 +1,227 @@
+"""The job sheet: one HTML page to print and take to the machine. No scripts, no fonts, no files besides itself."""
+
+from __future__ import annotations
+
+from html import escape
+
+from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
+from cmpdesign.products.laser.figures import Timing
+from cmpdesign.products.laser.formats.palette import number
+from cmpdesign.products.laser.formats.svg import path_data
+from cmpdesign.products.laser.job import Job, Pass
+
+_STYLE = """
+@page { size: A4; margin: 14mm }
+body { font: 10.5pt/1.4 system-ui, sans-serif; color: #1c1a18; max-width: 182mm; margin: 8mm auto }
+h1 { font-size: 18pt; margin: 0 } h2 { font-size: 12.5pt; margin: 7mm 0 2mm; border-bottom: .3mm solid #1c1a18 }
+p { margin: 1.5mm 0 } table { border-collapse: collapse; width: 100% } .facts td:first-child { width: 42mm }
+td, th { text-align: left; padding: .9mm 2mm; border-bottom: .15mm solid #bbb; vertical-align: top }
+th { font-weight: 600 } td.n, th.n, td b { white-space: nowrap }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums }
+.passes { display: grid; grid-template-columns: 1fr 1fr; gap: 6mm } .pass { break-inside: avoid }
+.pass h3 { margin: 0 0 1mm; font-size: 11pt } .pass svg { width: 100%; max-height: 78mm; background: #f4f2ee }
+.warn { border: .5mm solid #b3261e; padding: 2mm 3mm; margin: 3mm 0 } .box { font-size: 12pt }
+ol { margin: 1mm 0; padding-left: 6mm } small { color: #5c5650 }
+"""
+
+_CORNERS = {
+    "plain": "Plain corners: the beam leaves up to half a kerf of every 60 degree corner; cells come out smaller by "
+    "that (2.05 r² a triangle, r being half the kerf).",
+    "overcut": "Overcut corners: a short spur runs into every corner and burns beside the cell just as much area as "
+    "it leaves at the tip; cells keep their area. Choose plain where the neighbour must not be touched.",
+}
+
+
+def job_sheet(job: Job, figures: tuple[PassFigures, ...], timings: tuple[Timing, ...]) -> str:
+    """The page's HTML."""
+    parts = [
+        "<!doctype html>",
+        f'<html lang="en"><head><meta charset="utf-8"><title>{escape(job.name)}: laser job</title>',
+        f"<style>{_STYLE}</style></head><body>",
+        f"<h1>{escape(job.name)}: laser job</h1>",
+        _warning(job),
+        _facts(job, timings),
+        "<h2>Order of work</h2>",
+        _steps(job, timings),
+        "<h2>Passes</h2>",
+        _pictures(job),
+        "<h2>As made</h2>",
+        f"<p>{_CORNERS[job.setup.options.corner]}</p>",
+        _made(figures),
+        "<h2>Registration</h2>",
+        _registration(job),
+        f"<p><small>Layout {job.layout.digest[:16]}. {escape(job.setup.material.fumes)}</small></p>",
+        "</body></html>",
+        "",
+    ]
+    return "\n".join(parts)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: 48 s, 3 min 20 s, 2 h 05 min."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def _warning(job: Job) -> str:
+    if not job.setup.assumed:
+        return ""
+    names = escape(", ".join(job.setup.assumed))
+    return (
+        f'<div class="warn"><b>Not measured yet:</b> {names}. Cut <code>coupon</code> in this material first, '
+        "photograph it, and let <code>cmpdesign kerf</code> read it.</div>"
+    )
+
+
+def _facts(job: Job, timings: tuple[Timing, ...]) -> str:
+    setup, (left, bottom, right, top) = job.setup, job.extent_mm
+    bed = f"{setup.machine.bed_width_mm.value:g} x {setup.machine.bed_height_mm.value:g} mm"
+    rows = {
+        "Machine": f"{setup.machine.name}, bed {bed}, full power S{setup.machine.s_max.value:g}",
+        "Material": f"{setup.material.name}, {setup.material.thickness_mm.value:g} mm",
+        "Cavities": f"{setup.options.mode}, {setup.depth_mm:g} mm deep, {setup.options.corner} corners, "
+        f"nominal size at the {setup.options.face}",
+        "Kerf": f"front {_widths(job.front.kerf_mm)}, back {_widths(job.back.kerf_mm)} (cuts along y, along x); "
+        f"walls lean by {setup.taper_deg:g}°",
+        "On the bed": f"{right - left:.2f} x {top - bottom:.2f} mm, lower left corner at X{left:.2f} Y{bottom:.2f}",
+        "Laser time": duration(sum(one.time_s for one in timings)) + f", order: {setup.options.order}",
+    }
+    cells = [f"<tr><td>{name}</td><td>{escape(text)}</td></tr>" for name, text in rows.items()]
+    return f'<table class="facts">{"".join(cells)}</table>'
+
+
+def _steps(job: Job, timings: tuple[Timing, ...]) -> str:
+    head = (
+        "<tr><th></th><th>Pass</th><th class=n>Paths</th><th class=n>Power</th><th class=n>Speed</th>"
+        "<th class=n>Times over</th><th class=n>Laser time</th><th>Then</th></tr>"
+    )
+    rows = []
+    for one, time in zip(job.passes, timings, strict=True):
+        rows.append(
+            f"<tr><td class=box>☐</td><td><b>{one.name}</b></td>"
+            f"<td class=n>{len(one.walls)}</td><td class=n>{one.power_percent:g} %</td>"
+            f"<td class=n>{one.speed_mm_s:g} mm/s</td><td class=n>{one.repeats}</td>"
+            f"<td class=n>{duration(time.time_s)}</td><td>{_then(one)}</td></tr>"
+        )
+    setup = job.setup
+    return (
+        f"<table>{head}{''.join(rows)}</table>"
+        "<p>Each pass is a file of its name for every program: .svg, .dxf, .lbrn2 (LightBurn), .gcode (GRBL); job.* "
+        "holds all passes, one layer each.</p>"
+        f"<p><b>Fill.</b> {escape(setup.material.fill)}</p><p><b>Cure.</b> {escape(setup.material.cure)}</p>"
+        f"{_pocket(job)}"
+    )
+
+
+def _then(one: Pass) -> str:
+    if one.kind == "holes":
+        return "put pins in; they stay to the end"
+    if one.kind == "outline":
+        return "take the pad out, done"
+    assert one.color is not None
+    return f"take out, fill <b>{COLORS[one.color]}</b>, cure, put back on the pins"
+
+
+def _pocket(job: Job) -> str:
+    options = job.setup.options
+    if options.mode != "pocket":
+        return ""
+    text = f"pitch {number(job.setup.hatch_mm)} mm"
+    if options.fill == "hatch":
+        text += f", {options.hatch_deg:g}° and {options.hatch_turn_deg:g}° further at every repeat"
+        text += "; the G-code holds the lines, in SVG and DXF set them as the fill of the outlines"
+    return f"<p><b>Pocket.</b> {options.fill}, {text}.</p>"
+
+
+def _pictures(job: Job) -> str:
+    return f'<div class="passes">{"".join(_picture(job, one) for one in job.passes)}</div>'
+
+
+def _picture(job: Job, one: Pass) -> str:
+    """The pad as it lies there during this pass: cured cells full, this pass' paths in red outlines over its ink."""
+    left, bottom, right, top = job.extent_mm
+    margin = 1.0
+    box = f"{number(left - margin)} {number(-margin)} {number(right - left + 2 * margin)} "
+    box += number(top - bottom + 2 * margin)
+    inks = job.layout.palette
+    shapes = [_polygons([job.outline_mm], top, inks[COLORS[BLACK]], "")]
+    for other in job.passes:
+        drawn = other.color is not None and other.cavities is not None
+        if drawn and job.passes.index(other) <= job.passes.index(one):
+            assert other.cavities is not None and other.color is not None
+            strength = "" if other is one else ' opacity="0.45"'
+            shapes.append(
+                _polygons(list(other.cavities.nominal_mm), top, inks[COLORS[other.color]], strength)
+            )
+    line = 0.004 * max(right - left, top - bottom)
+    style = f'fill="none" stroke="#e0a100" stroke-width="{number(line / 2)}"'
+    shapes.append(f'<path {style} d="{"".join(path_data(one.walls, top))}"/>')
+    radius = number(job.layout.fiducial_diameter_mm / 2)
+    for x, y in job.fiducials_mm.tolist():
+        place = f'cx="{number(x)}" cy="{number(top - y)}" r="{radius}"'
+        shapes.append(f'<circle {place} fill="none" stroke="#1c1a18" stroke-width="{number(line)}"/>')
+    return (
+        f'<div class="pass"><h3>{one.name}</h3><svg viewBox="{box}" role="img" '
+        f'aria-label="{one.name}">{"".join(shapes)}</svg></div>'
+    )
+
+
+def _polygons(polygons: list, top: float, fill: str, extra: str) -> str:  # type: ignore[type-arg]
+    data = []
+    for polygon in polygons:
+        points = [f"{x:.2f} {top - y:.2f}" for x, y in polygon.tolist()]
+        data.append(f"M{'L'.join(points)}Z")
+    return f'<path fill="{fill}"{extra} d="{"".join(data)}"/>'
+
+
+def _made(figures: tuple[PassFigures, ...]) -> str:
+    head = (
+        "<tr><th>Pass</th><th>Face</th><th class=n>Area</th><th class=n>Worst cell</th><th class=n>Corner lost</th>"
+        "<th class=n>Burnt beside</th><th class=n>Web in the pass</th><th class=n>Web to filled cells</th></tr>"
+    )
+    rows = []
+    for one in figures:
+        faces = [("front", one.front)] + ([("back", one.back)] if one.back else [])
+        rows += [_made_row(one.name if name == "front" else "", name, face) for name, face in faces]
+    return (
+        f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to "
+        "filled cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
+    )
+
+
+def _made_row(name: str, where: str, face: FaceFigures) -> str:
+    lengths = [face.corner_loss_mm, face.burnt_beside_mm, face.web_mm, face.web_to_filled_mm]
+    texts = ["-" if value is None else f"{value:.3f}" for value in lengths]
+    areas = [f"{face.area_error_percent:+.2f} %", f"{face.area_error_worst_percent:+.2f} %"]
+    cells = "".join(f"<td class=n>{text}</td>" for text in [*areas, *texts])
+    return f"<tr><td>{name}</td><td>{where}</td>{cells}</tr>"
+
+
+def _registration(job: Job) -> str:
+    if not len(job.fiducials_mm):
+        text = "This design has no fiducials (fiducials.count = 0): do not move the pad between passes."
+        return f'<div class="warn">{text}</div>'
+    diameter = f"{job.layout.fiducial_diameter_mm:g} mm"
+    rows = "".join(
+        f"<tr><td>{number}</td><td class=n>{x:.3f}</td><td class=n>{y:.3f}</td></tr>"
+        for number, (x, y) in enumerate(job.fiducials_mm.tolist(), start=1)
+    )
+    holes = (
+        f"Pass 0 cuts them as pin holes of {diameter}."
+        if job.setup.options.holes
+        else f"They are marks of {diameter} that the pad must carry already (laser.holes = false)."
+    )
+    return (
+        f"<p>{holes} They stand in layout.json and in every file (LightBurn: tool layer T1, never burnt), at the same "
+        f"place on the bed in every pass. They lie in three corners, so that a turned pad does not fit.</p>"
+        f"<table><tr><th>Fiducial</th><th class=n>X mm</th><th class=n>Y mm</th></tr>{rows}</table>"
+    )
+
+
+def _widths(kerf_mm: tuple[float, float]) -> str:
+    return f"{kerf_mm[0]:.3f} / {kerf_mm[1]:.3f} mm"

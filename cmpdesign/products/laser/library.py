@@ -1,0 +1,148 @@
+"""Machines and materials: TOML files in which every value has its source, or the word "assumed"."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Generic, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmpdesign.design.quantities import Length, LengthOrZero
+from cmpdesign.design.templates import templates_folder
+from cmpdesign.errors import DesignError
+
+Value = TypeVar("Value")
+Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+Percent = Annotated[float, Field(gt=0, le=100)]
+Lean = Annotated[float, Field(gt=-45, lt=45)]
+Count = Annotated[int, Field(ge=1, le=200, strict=True)]
+
+
+class _Closed(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Sourced(_Closed, Generic[Value]):
+    """A value and where it comes from: a reference, a measurement, or "assumed"."""
+
+    value: Value
+    source: str = Field(min_length=3)
+
+
+class Machine(_Closed):
+    """A laser. Speeds in mm/s; ``s_max`` is the S word of full power (GRBL's $30)."""
+
+    name: str
+    kind: Literal["co2", "diode", "fibre", "uv"]
+    power_w: Sourced[Positive]
+    bed_width_mm: Sourced[Length]
+    bed_height_mm: Sourced[Length]
+    spot_mm: Sourced[Length]
+    s_max: Sourced[Positive]
+    speed_max_mm_s: Sourced[Positive]
+    travel_mm_s: Sourced[Positive]
+    acceleration_mm_s2: Sourced[Positive]
+
+
+class Settings(_Closed):
+    """How one machine carves one material. Kerf: full width at the front, of cuts that run in y (x) and in
+    x (y)."""
+
+    kerf_x_mm: Sourced[Length]
+    kerf_y_mm: Sourced[Length]
+    taper_deg: Sourced[Lean]
+    cut_power_percent: Sourced[Percent]
+    cut_speed_mm_s: Sourced[Positive]
+    cut_passes: Sourced[Count]
+    pocket_power_percent: Sourced[Percent]
+    pocket_speed_mm_s: Sourced[Positive]
+    pocket_depth_per_pass_mm: Sourced[Length]
+
+
+class Material(_Closed):
+    """A sheet of silicone, and its settings on each machine that can carve it."""
+
+    name: str
+    thickness_mm: Sourced[Length]
+    minimum_web_mm: Sourced[LengthOrZero]
+    fill: str
+    cure: str
+    fumes: str
+    on: Mapping[str, Settings]
+
+
+def machines() -> dict[str, Path]:
+    """Every shipped machine by name."""
+    return {path.stem: path for path in sorted((templates_folder() / "machines").glob("*.toml"))}
+
+
+def materials() -> dict[str, Path]:
+    """Every shipped material by name."""
+    return {path.stem: path for path in sorted((templates_folder() / "materials").glob("*.toml"))}
+
+
+def load_machine(name_or_path: str) -> Machine:
+    """A shipped machine, or one from a TOML file.
+
+    Raises:
+        DesignError: no such machine, or a file that does not describe one.
+    """
+    return _load(Machine, name_or_path, machines(), "machine")
+
+
+def load_material(name_or_path: str) -> Material:
+    """A shipped material, or one from a TOML file.
+
+    Raises:
+        DesignError: no such material, or a file that does not describe one.
+    """
+    return _load(Material, name_or_path, materials(), "material")
+
+
+def settings_on(material: Material, machine_name: str) -> Settings:
+    """The material's settings on a machine; a machine's file goes by its stem.
+
+    Raises:
+        DesignError: this machine does not carve this material.
+    """
+    name = Path(machine_name).stem if machine_name.endswith(".toml") else machine_name
+    if name not in material.on:
+        raise DesignError(
+            f"laser.machine = {name!r}: the material {material.name!r} has no settings for it, only for "
+            f"{', '.join(material.on)}; choose one of these, another material, or add [on.{name}] to its file"
+        )
+    return material.on[name]
+
+
+def _load(model: type[Model], name_or_path: str, known: Mapping[str, Path], kind: str) -> Model:
+    path = known.get(name_or_path, Path(name_or_path))
+    if not path.is_file():
+        near = difflib.get_close_matches(name_or_path, known, n=1, cutoff=0.5)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise DesignError(
+            f"laser.{kind} = {name_or_path!r}: no such {kind}{hint}; there are {', '.join(known)}, "
+            "or give a TOML file"
+        )
+    try:
+        return model.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DesignError(f"laser.{kind}: {path}: is no TOML file of a {kind} ({error})") from None
+    except ValidationError as error:
+        raise DesignError(f"laser.{kind}: {path}: {_problem(error, model)}") from None
+
+
+def _problem(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first thing wrong, in one line."""
+    item = error.errors()[0]
+    where = ".".join(str(part) for part in item["loc"])
+    if item["type"] == "extra_forbidden":
+        fields = [*model.model_fields, *Settings.model_fields, "value", "source"]
+        near = difflib.get_close_matches(str(item["loc"][-1]), fields, n=1, cutoff=0.5)
+        return f"{where} is unknown" + (f" (did you mean {near[0]}?)" if near else "")
+    if item["type"] == "missing":
+        return f"{where} is missing"
+    return f"{where} = {item['input']!r}: {item['msg'].removeprefix('Value error, ')}"

@@ -1,0 +1,62 @@
+"""Pockets: the strokes that clear what lies inside a cell's wall path, by parallel lines or by rings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmpdesign.products.laser.paths.beam import Beam, Points
+from cmpdesign.products.laser.paths.kerf import inset, polygon_areas
+from cmpdesign.products.laser.paths.strokes import Strokes, joined, loops, rounded
+
+# The last ring of a cell may be so small that it is a point for any machine: then it is left out.
+SPECK_SHARE = 0.01
+
+
+def hatch(paths_mm: Points, spacing_mm: float, angle_deg: float) -> Strokes:
+    """Parallel lines inside convex wall paths, to and fro, all on one grid so that every cell is cut alike.
+
+    Args:
+        paths_mm: (N, K, 2) wall paths: where the beam's centre may go.
+        spacing_mm: distance of the lines.
+        angle_deg: their direction, counter-clockwise from x.
+    """
+    turn = np.radians(angle_deg)
+    along = paths_mm @ (np.cos(turn), np.sin(turn))
+    across = paths_mm @ (-np.sin(turn), np.cos(turn)) / spacing_mm - 0.5
+    lowest = np.ceil(across.min(axis=1)).astype(np.int64)
+    counts = np.maximum(np.floor(across.max(axis=1)).astype(np.int64) - lowest + 1, 0)
+    owner = np.repeat(np.arange(len(paths_mm)), counts)
+    row = lowest[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+    start, end = across[owner], np.roll(across, -1, axis=1)[owner]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (row[:, None] - start) / (end - start)
+    crossed = (share >= 0) & (share <= 1)
+    places = along[owner] + share * (np.roll(along, -1, axis=1)[owner] - along[owner])
+    left = np.where(crossed, places, np.inf).min(axis=1)
+    right = np.where(crossed, places, -np.inf).max(axis=1)
+    fro = (row % 2 == 1)[:, None]
+    ends = np.where(fro, np.stack([right, left], axis=-1), np.stack([left, right], axis=-1))
+    height = spacing_mm * (row + 0.5)[:, None]
+    x = ends * np.cos(turn) - height * np.sin(turn)
+    y = ends * np.sin(turn) + height * np.cos(turn)
+    points = rounded(np.stack([x, y], axis=-1).reshape(-1, 2))
+    return Strokes(points, 2 * np.arange(len(owner) + 1), owner, closed=False)
+
+
+def rings(paths_mm: Points, spacing_mm: float) -> Strokes:
+    """Rings inside convex wall paths, the innermost first, the wall path itself left out."""
+    step = Beam(spacing_mm, spacing_mm)
+    parts: list[Strokes] = []
+    inner, owner = paths_mm, np.arange(len(paths_mm))
+    while len(inner):
+        inner, exists = inset(inner, step)
+        exists &= polygon_areas(inner) > SPECK_SHARE * spacing_mm**2
+        inner, owner = inner[exists], owner[exists]
+        parts.append(loops(inner, owner))
+    # Opened, joined by owner from the inside out, closed again.
+    ordered = joined([part.opened() for part in reversed(parts)])
+    keep = np.ones(len(ordered.xy_mm), dtype=np.bool_)
+    keep[ordered.first[1:] - 1] = False
+    first = ordered.first - np.arange(len(ordered.first))
+    return Strokes(ordered.xy_mm[keep], first, ordered.owner, closed=True)

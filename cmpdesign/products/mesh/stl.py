@@ -1,0 +1,25 @@
+"""Binary STL, mm: one mesh a file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmpdesign.products.mesh.triangles import Mesh
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEADER_BYTES = 80
+
+
+def mesh_to_stl(mesh: Mesh) -> bytes:
+    """The file's bytes; the header holds the name."""
+    corners = mesh.points[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets = np.zeros(len(corners), dtype=_FACET)
+    facets["normal"] = normals / np.where(lengths > 0, lengths, 1)
+    facets["corners"] = corners
+    # A header that starts with "solid" would be taken for the text format.
+    header = f"cmpdesign {mesh.name}, mm".encode("ascii", "replace")[:_HEADER_BYTES].ljust(
+        _HEADER_BYTES, b"\0"
+    )
+    return header + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -1,0 +1,94 @@
+"""3MF through the consortium's lib3mf: one object a mesh, each with its own base material, in mm."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import uuid
+import zipfile
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cmpdesign.products.mesh.triangles import Mesh
+
+# The library's identifiers and the package's dates are random by default; these follow from the names.
+_NAMESPACE = uuid.UUID("6f9a3c1e-6f0e-5f5b-9d54-6d6f6c64cafe")
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def meshes_to_3mf(meshes: Sequence[Mesh], title: str) -> bytes:
+    """The package's bytes, the same for the same meshes.
+
+    Raises:
+        RuntimeError: lib3mf finds a mesh that is not closed and consistently wound.
+    """
+    import lib3mf
+
+    model = lib3mf.get_wrapper().CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.MilliMeter)
+    model.SetBuildUUID(_uuid(f"{title}/build"))
+    model.GetMetaDataGroup().AddMetaData("", "Title", title, "xs:string", True)
+    materials = model.AddBaseMaterialGroup()
+    for number, mesh in enumerate(meshes):
+        item = _add_object(lib3mf, model, materials, mesh)
+        item.SetUUID(_uuid(f"{title}/item/{number}"))
+    writer = model.QueryWriter("3mf")
+    writer.SetStrictModeActive(True)
+    return _canonical(bytes(writer.WriteToBuffer()))
+
+
+def _add_object(lib3mf: Any, model: Any, materials: Any, mesh: Mesh) -> Any:
+    red, green, blue = (int(mesh.color[i : i + 2], 16) for i in (1, 3, 5))
+    material = materials.AddMaterial(mesh.name, lib3mf.Color(red, green, blue, 255))
+    part = model.AddMeshObject()
+    part.SetName(mesh.name)
+    part.SetUUID(_uuid(f"object/{mesh.name}"))
+    points = np.ascontiguousarray(mesh.points, dtype=np.float32)
+    corners = np.ascontiguousarray(mesh.triangles, dtype=np.uint32)
+    vertices = (lib3mf.Position * len(points))()
+    triangles = (lib3mf.Triangle * len(corners))()
+    ctypes.memmove(vertices, points.ctypes.data, points.nbytes)
+    ctypes.memmove(triangles, corners.ctypes.data, corners.nbytes)
+    part.SetGeometry(vertices, triangles)
+    part.SetObjectLevelProperty(materials.GetResourceID(), material)
+    if not part.IsManifoldAndOriented():
+        raise RuntimeError(f"{mesh.name}: the mesh is not closed or its triangles disagree about outside")
+    return model.AddBuildItem(part, lib3mf.get_wrapper().GetIdentityTransform())
+
+
+def _uuid(name: str) -> str:
+    return str(uuid.uuid5(_NAMESPACE, name))
+
+
+def _canonical(package: bytes) -> bytes:
+    """The same entries in the same order with a fixed date."""
+    result = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(package)) as old, zipfile.ZipFile(result, "w") as new:
+        for name in old.namelist():
+            info = zipfile.ZipInfo(name, _DATE)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            new.writestr(info, old.read(name))
+    return result.getvalue()
+
+
+def read_3mf(package: bytes) -> list[tuple[str, int, int]]:
+    """Name, vertices and triangles of every object, read by lib3mf in strict mode.
+
+    Raises:
+        RuntimeError: strict mode has a complaint.
+    """
+    import lib3mf
+
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromBuffer(package)
+    if reader.GetWarningCount():
+        raise RuntimeError(f"lib3mf: {reader.GetWarning(0)}")
+    objects, found = model.GetMeshObjects(), []
+    while objects.MoveNext():
+        part = objects.GetCurrentMeshObject()
+        found.append((part.GetName(), part.GetVertexCount(), part.GetTriangleCount()))
+    return found

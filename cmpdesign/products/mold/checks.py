@@ -1,0 +1,305 @@
+"""What of a mold cannot be made or cast: found from numbers alone, before any solid is built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cmpdesign.errors import DesignError
+from cmpdesign.layout.checks import Finding
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.mold.shapes.bosses import bosses
+from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3, inset_cells
+from cmpdesign.products.mold.stack.crown import Crown
+from cmpdesign.products.mold.stack.stack import LAYERS, Stack, crown_edge_mm
+
+
+@dataclass(frozen=True)
+class ToolLimits:
+    """What a way of making parts allows: smallest boss or slot, and thinnest sheet, in mm."""
+
+    feature_mm: float
+    sheet_mm: float
+
+
+# Usual values of makers' design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm a nozzle's
+# line, 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
+TOOLS = {
+    "sla-resin": ToolLimits(0.2, 0.4),
+    "fdm-pla": ToolLimits(0.4, 0.6),
+    "fdm-petg": ToolLimits(0.4, 0.6),
+    "aluminium": ToolLimits(0.5, 0.3),
+    "steel": ToolLimits(0.3, 0.1),
+}
+# Printed pins break when pulled above three times their width, and bend above 1.5.
+SLENDER_ERROR, SLENDER_WARNING = 3.0, 1.5
+DRAFT_MAX_DEG = 15.0
+DRAFT_WARNING_DEG = 0.5
+# Thinner webs of soft silicone tear when the plate is lifted.
+WEB_WARNING_MM = 0.05
+# Layers that differ more than this at the pad's edge wrinkle.
+MISMATCH_WARNING_MM = 0.1
+# Flat tips of bosses press the crowned base layer by this share of the black layer at most, before it bulges.
+SAG_WARNING = 0.1
+# A dome's layers, measured across, may thin to this share of their thickness at the apex.
+THIN_WARNING = 0.85
+LEAST_WALL_MM = 0.3
+
+
+def check_mold(stack: Stack) -> list[Finding]:
+    """Findings, errors first."""
+    found = [*_bosses(stack), *_draft(stack), *_sheets(stack), *_curing(stack), *_shapes(stack)]
+    found += _unused(stack)
+    return sorted(found, key=lambda finding: finding.severity)
+
+
+def refuse_impossible(findings: list[Finding]) -> None:
+    """Raise ``DesignError`` for the first finding that is an error."""
+    for finding in findings:
+        if finding.severity == "error":
+            raise DesignError(f"mold: {finding}")
+
+
+def feature_limit_mm(stack: Stack) -> float:
+    """The nozzle, beam or cutter."""
+    return stack.options.minimum_feature_mm or TOOLS[stack.options.tool].feature_mm
+
+
+def tip_width_mm(stack: Stack) -> float:
+    """Diameter of the circle inside the narrowest boss's tip; negative when nothing is left."""
+    inset = stack.options.gap_mm / 2 + stack.lean * stack.thickness_mm[1]
+    return min(_inscribed_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+
+
+def _inscribed_mm(cells: Points) -> float:
+    side = np.roll(cells, -1, axis=1) - cells
+    area = (
+        np.abs(
+            (cells[..., 0] * np.roll(cells[..., 1], -1, axis=1)).sum(1)
+            - (np.roll(cells[..., 0], -1, axis=1) * cells[..., 1]).sum(1)
+        )
+        / 2
+    )
+    return float((4 * area / np.hypot(side[..., 0], side[..., 1]).sum(axis=1)).min())
+
+
+def _bosses(stack: Stack) -> Iterator[Finding]:
+    option, limit = stack.options, feature_limit_mm(stack)
+    if option.gap_mm == 0:
+        yield Finding(
+            "mold.gap_mm",
+            0.0,
+            WEB_WARNING_MM,
+            "mm",
+            "make it larger, or neighbouring cavities touch",
+            "error",
+        )
+        return
+    if option.gap_mm < WEB_WARNING_MM:
+        remedy = "make mold.gap_mm larger, or the black web tears"
+        yield Finding("mold.gap_mm", option.gap_mm, WEB_WARNING_MM, "mm", remedy, "warning")
+    width, height = tip_width_mm(stack), stack.thickness_mm[1]
+    if width < limit:
+        remedy = "make pitch_mm larger, or mold.gap_mm, draft_deg or marker_mm smaller, or use a finer tool"
+        yield Finding("narrowest boss at its tip", width, limit, "mm", remedy, "error")
+        return
+    if 2 * option.tip_radius_mm >= width:
+        remedy = "make mold.tip_radius_mm smaller"
+        yield Finding("mold.tip_radius_mm", option.tip_radius_mm, width / 2, "mm", remedy, "error")
+    if stencil_width_mm(stack) < limit:
+        remedy = "make pitch_mm larger or mold.clearance_mm smaller"
+        yield Finding("narrowest stencil hole", stencil_width_mm(stack), limit, "mm", remedy, "error")
+    elif 2 * option.tip_radius_mm >= stencil_width_mm(stack):
+        remedy = "make mold.tip_radius_mm smaller"
+        yield Finding(
+            "mold.tip_radius_mm", option.tip_radius_mm, stencil_width_mm(stack) / 2, "mm", remedy, "error"
+        )
+    yield from _slender(height / width)
+    web, name = plate_web_mm(stack)
+    if web < limit:
+        remedy = "use a finer tool, or make pitch_mm or mold.gap_mm larger"
+        yield Finding(f"valley between bosses of boss-{name}", web, limit, "mm", remedy, "warning")
+
+
+def stencil_width_mm(stack: Stack) -> float:
+    """Diameter of the circle inside the narrowest stencil hole's lower face."""
+    inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
+    return min(_inscribed_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+
+
+def _slender(ratio: float) -> Iterator[Finding]:
+    remedy = "make mold.marker_mm smaller or pitch_mm larger"
+    if ratio > SLENDER_ERROR:
+        yield Finding("boss height over width", ratio, SLENDER_ERROR, "", remedy, "error")
+    elif ratio > SLENDER_WARNING:
+        yield Finding("boss height over width", ratio, SLENDER_WARNING, "", remedy, "warning")
+
+
+def plate_web_mm(stack: Stack) -> tuple[float, str]:
+    """The least distance between bosses of one plate, at their roots, and the plate's color."""
+    import shapely
+
+    least, name = float("inf"), ""
+    for color in stack.colors:
+        inset = inset_cells(stack.cells(color), stack.options.gap_mm / 2, 0.0)
+        roots = shapely.polygons([loop.points for loop in inset])
+        if len(roots) < 2:
+            continue
+        _, distances = shapely.STRtree(roots).query_nearest(roots, exclusive=True, return_distance=True)
+        if distances.min() < least:
+            least, name = float(distances.min()), COLORS[color]
+    return least, name
+
+
+def _draft(stack: Stack) -> Iterator[Finding]:
+    draft = stack.options.draft_deg
+    if draft < 0:
+        yield Finding("mold.draft_deg (an undercut)", draft, 0.0, "deg", "make it 0 or larger", "error")
+    elif draft > DRAFT_MAX_DEG:
+        yield Finding("mold.draft_deg", draft, DRAFT_MAX_DEG, "deg", "make it smaller", "error")
+    elif draft < DRAFT_WARNING_DEG:
+        remedy = "lean walls by a degree or two, or the cavities tear when the plate is lifted"
+        yield Finding("mold.draft_deg", draft, DRAFT_WARNING_DEG, "deg", remedy, "warning")
+
+
+def _sheets(stack: Stack) -> Iterator[Finding]:
+    option = stack.options
+    limit = TOOLS[option.tool].sheet_mm
+    sheets = {"frame": stack.thickness_mm[1], "cover": stack.thickness_mm[2], "stencils": option.stencil_mm}
+    for name, thickness in sheets.items():
+        if thickness < limit:
+            remedy = "cut it from shim stock instead: its shape is plain"
+            yield Finding(f"thickness of {name} as {option.tool}", thickness, limit, "mm", remedy, "warning")
+    if option.vents and option.vent_mm < feature_limit_mm(stack):
+        remedy = "make mold.vent_mm larger, or drill the vents"
+        yield Finding("mold.vent_mm", option.vent_mm, feature_limit_mm(stack), "mm", remedy, "error")
+    for field in ("wall_mm", "floor_mm", "plate_mm"):
+        least = 2 * limit if field != "floor_mm" else 1.5
+        if getattr(option, field) < least:
+            yield Finding(
+                f"mold.{field}", getattr(option, field), least, "mm", "make the wall thicker", "error"
+            )
+    if option.vents and stack.crown is None and stack.layout.border_mm < option.vent_mm + 0.2:
+        remedy = "make border_mm larger or mold.vent_mm smaller, or vents leave marks on cells"
+        yield Finding(
+            "border_mm under the vents", stack.layout.border_mm, option.vent_mm + 0.2, "mm", remedy, "warning"
+        )
+
+
+def _curing(stack: Stack) -> Iterator[Finding]:
+    tool = stack.options.tool
+    by_remedy: dict[str, list[str]] = {}
+    for name, silicone in zip(LAYERS, stack.silicones, strict=True):
+        if tool in silicone.inhibited_by.value:
+            by_remedy.setdefault(silicone.remedy, []).append(f"{name}: {silicone.name}")
+    for remedy, names in by_remedy.items():
+        subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
+        yield Finding(subject, len(names), 0, "", remedy, "warning")
+    layers = list(zip(LAYERS, stack.silicones, strict=True))
+    for (below, under), (above, over) in pairwise(layers):
+        # Neither cures against the other, the makers say.
+        if under.cure != over.cure:
+            subject = (
+                f"{under.cure}-cured layers ({below}: {under.name}) under a {over.cure}-cured one "
+                f"({above}: {over.name})"
+            )
+            yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
+    scales = [silicone.scale for silicone in stack.silicones]
+    reach = float(np.hypot(*stack.outline_mm.T).max())
+    mismatch = (max(scales) - min(scales)) * reach
+    if mismatch > MISMATCH_WARNING_MM:
+        remedy = "choose silicones that shrink alike"
+        subject = "difference of the layers' shrinkage at the pad's edge"
+        yield Finding(subject, mismatch, MISMATCH_WARNING_MM, "mm", remedy, "warning")
+
+
+def _shapes(stack: Stack) -> Iterator[Finding]:
+    option = stack.options
+    if stack.crown is not None and stack.layout.cell_corners.shape[1] != 3:
+        remedy = "choose a triangular pattern, or make the pad flat"
+        yield Finding("corners of a cell on a crown (four are in no plane)", 4, 3, "", remedy, "error")
+    wall = moat_to_pin_mm(stack)
+    if wall < LEAST_WALL_MM:
+        remedy = "make fiducials.gap_mm larger, or mold.parting_mm or mold.moat_mm smaller"
+        yield Finding("wall between the moat and a pin hole", wall, LEAST_WALL_MM, "mm", remedy, "error")
+    if option.moat_depth_mm > stack.z_base_mm + option.floor_mm - 1:
+        limit = stack.z_base_mm + option.floor_mm - 1
+        yield Finding("mold.moat_depth_mm", option.moat_depth_mm, limit, "mm", "make it less deep", "error")
+    size = np.ptp(stack.pins_mm, axis=0).min()
+    if 2 * option.fillet_mm > size:
+        yield Finding("mold.fillet_mm", option.fillet_mm, float(size) / 2, "mm", "make it smaller", "error")
+    if stack.crown is None:
+        return
+    yield from _crown(stack, stack.crown)
+
+
+def _crown(stack: Stack, crown: Crown) -> Iterator[Finding]:
+    thin = float(np.cos(np.radians(crown.slope_deg)))
+    if thin < THIN_WARNING:
+        remedy = "make mold.crown_radius_mm larger, or expect thinner layers at the pad's edge"
+        yield Finding(
+            "thickness at the crown's foot over that at its apex", thin, THIN_WARNING, "", remedy, "warning"
+        )
+    if stack.layout.cell_corners.shape[1] != 3:
+        return
+    sag, limit = facet_sag_mm(stack), SAG_WARNING * stack.thickness_mm[1]
+    if sag > limit:
+        remedy = "make pitch_mm smaller or mold.crown_radius_mm larger: tips of bosses are flat"
+        yield Finding("crown over a flat boss's tip", sag, limit, "mm", remedy, "warning")
+
+
+def _unused(stack: Stack) -> Iterator[Finding]:
+    """What was asked for and has no effect, or another one than it says."""
+    option, layout = stack.options, stack.layout
+    if stack.crown is None:
+        remedy = 'not used on a flat pad: set mold.crown = "sphere" or "cylinder", or leave it out'
+        if option.crown_radius_mm is not None:
+            yield Finding("mold.crown_radius_mm", option.crown_radius_mm, 0.0, "mm", remedy, "warning")
+        if "projection" in option.model_fields_set and option.projection != "equidistant":
+            yield Finding(f'mold.projection = "{option.projection}"', 1, 0, "", remedy, "warning")
+        return
+    edge = crown_edge_mm(option, layout)
+    if edge > layout.border_mm:
+        remedy = "taken that wide around the crown, so that vents find room: make it larger, or mold.vent_mm smaller"
+        yield Finding("border_mm", layout.border_mm, edge, "mm", remedy, "warning")
+    if "clip" in layout.parameters:
+        subject = f"clip outlines of a pad whose edge follows its crown ({option.crown})"
+        yield Finding(subject, 1, 0, "", "only cells are clipped; leave it out to keep them all", "warning")
+
+
+def moat_to_pin_mm(stack: Stack) -> float:
+    """The least wall between the moat and a pin hole in the base."""
+    import shapely
+
+    pad = shapely.Polygon(stack.edges(0)[1].points)
+    pins = shapely.points(stack.pins_mm)
+    away = stack.options.parting_mm + stack.options.moat_mm + stack.pin_diameter_mm / 2
+    return float(shapely.distance(pad, pins).min()) - away
+
+
+def facet_sag_mm(stack: Stack) -> float:
+    """How far the crown rises over the flat facets of plates, at most; 0 on a flat pad.
+
+    Over a chord between points of a sphere or cylinder of radius R, the circle rises by R - sqrt(R^2 - a^2), a
+    being half the chord; over a triangle, by the same of its circumcircle's radius. Along z it is the more by
+    the slope.
+    """
+    if stack.crown is None:
+        return 0.0
+    corners = np.concatenate([stack.cells(color) for color in stack.colors])
+    points = np.concatenate([corners, stack.crown.z_mm(corners.reshape(-1, 2)).reshape(-1, 3, 1)], axis=-1)
+    sides = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=-1)
+    double_area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=-1)
+    reach = float((sides.prod(axis=1) / (2 * double_area)).max())
+    radius = stack.crown.radius_mm
+    rise = radius - np.sqrt(max(radius**2 - reach**2, 0.0))
+    return float(rise / np.cos(np.radians(stack.crown.slope_deg)))
+
+
+def boss_volume_mm3(stack: Stack, color: int) -> float:
+    """Silicone that fills a color's cavities: for the job sheet."""
+    pairs = [(feature.root, feature.tip) for feature in bosses(stack, stack.cells(color))]
+    return frusta_volume_mm3(pairs, stack.thickness_mm[1])

@@ -1,0 +1,106 @@
+"""The job sheet of a mold: what to mix, the steps in order, every part from two sides. Plain HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from cmpdesign.layout.checks import Finding
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.mold.make import mold_figures
+from cmpdesign.products.mold.parts import Part
+from cmpdesign.products.mold.stack.stack import LAYERS, Stack
+
+# Silicone that stays in cups and syringes, in percent of what is cast.
+LOSS_PERCENT = 30
+# Less than a gram of either part cannot be weighed to a percent on a scale of 0.01 g.
+LEAST_MIX_G = 2.0
+_STYLE = (
+    "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ddd;text-align:left}"
+    "td.n{text-align:right}figure{display:inline-block;margin:0 1em 1em 0}img{max-width:27em;width:100%}"
+    "img.whole{max-width:46em}"
+    "li{margin:.4em 0}.warning{background:#fff3d6;padding:.5em 1em}"
+)
+
+
+def job_sheet(name: str, stack: Stack, parts: Sequence[Part], findings: Sequence[Finding]) -> str:
+    """The page; it refers to ``pictures/`` beside it."""
+    body = [
+        f"<h1>Casting {escape(name)}</h1>",
+        *(f'<p class="warning">{escape(str(finding))}</p>' for finding in findings),
+        '<img class="whole" src="pictures/exploded.png" alt="all parts above each other, in the order of use">',
+        "<h2>Mix</h2>",
+        _pours(stack),
+        "<h2>Steps</h2>",
+        "<ol>" + "".join(f"<li>{step}</li>" for step in _steps(stack)) + "</ol>",
+        "<h2>Parts</h2>",
+        *(_part(part) for part in parts),
+    ]
+    head = (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Casting {escape(name)}</title>'
+    )
+    return f"{head}<style>{_STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n"
+
+
+def _pours(stack: Stack) -> str:
+    """Volume and mass of each pour, with what stays in the cup."""
+    rows = []
+    base, marker, cover = stack.silicones
+    for name, volume in mold_figures(stack)["pour_mm3"].items():
+        silicone = base if name == LAYERS[0] else cover if name == LAYERS[2] else marker
+        grams = volume * silicone.density_g_cm3.value / 1000
+        cells = (
+            f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume:.1f} mm³</td>"
+            f"<td class=n>{grams:.4f} g</td>"
+            f"<td class=n>{max(grams * (1 + LOSS_PERCENT / 100), LEAST_MIX_G):.2f} g</td>"
+            f"<td class=n>{silicone.pot_life_min.value:g} min</td><td "
+            f"class=n>{silicone.cure_h.value:g} h</td>"
+        )
+        rows.append(f"<tr>{cells}</tr>")
+    mix = f"mix (+{LOSS_PERCENT} %, at least {LEAST_MIX_G:g} g)"
+    head = f"<tr><th>layer<th>silicone<th>cast<th>cast<th>{mix}<th>pot life<th>cure</tr>"
+    return f"<table>{head}{''.join(rows)}</table>"
+
+
+def _steps(stack: Stack) -> list[str]:
+    """The way of working that the parts are made for."""
+    domed = stack.crown is not None
+    spread = "spread it over the dome; the plates shape it" if domed else "draw it off flush with the frame"
+    even = "wipe along the dome with a soft card" if domed else "draw off flush"
+    steps = [
+        "Degrease all parts; try whether a drop of each silicone cures on them; spray release agent "
+        "on everything "
+        "but the pins. Press the four pins into the base: they stand so that no part fits turned.",
+        "Degas the base layer's silicone and pour it. Lower the lid on from one side; what is too "
+        "much leaves "
+        "through the vents and over the land into the moat. Cure level; lift the lid with the two "
+        "jack screws (M3).",
+        "Lay the frame on the base. Mix the black layer with a retarder and a thixotropic agent, so "
+        f"that it stays dough, and {spread}.",
+    ]
+    for color in stack.colors:
+        name = COLORS[color]
+        steps.append(
+            f"<b>{name}</b>: press the plate <i>boss-{name}</i> down until it lies on the frame; its "
+            "bosses then "
+            f"stand on the base layer. Let the dough set, lift the plate straight up by its jack screws. Lay "
+            f"<i>stencil-{name}</i> on, wipe {name} silicone through it, vacuum until bubbles have "
+            "left, wipe again, "
+            f"lift the stencil, {even}."
+        )
+    steps += [
+        "Cure the marker layer fully, wipe it with isopropanol.",
+        "Lay the cover frame on, pour the protective layer, close with the lid, cure.",
+        "Take lid, cover and frame off; peel the pad from the base, starting at a corner; cut the "
+        "vents' plugs off.",
+    ]
+    return steps
+
+
+def _part(part: Part) -> str:
+    pictures = "".join(
+        f'<figure><img src="pictures/{part.name}-{side}.png" alt="{part.name} from {side}"></figure>'
+        for side in ("above", "below")
+    )
+    return f"<h3>{part.name}</h3><p>{escape(part.use)}</p>{pictures}"

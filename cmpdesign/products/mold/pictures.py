@@ -1,0 +1,76 @@
+"""Pictures of the mold: every part from two sides, and the assembly exploded along its pins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, View, draw_meshes, write
+from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mold.parts import Part
+
+Image = NDArray[np.uint8]
+
+SIZE_PX = (560, 400)
+EXPLODED_PX = (860, 1200)
+# Free at the right of the exploded parts, for their names.
+NAMES_PX = 170
+EXPLODED = View(-60.0, 22.0)
+# Free between exploded parts, as a share of their width.
+APART = 0.2
+EXPLODED_NAME = "exploded"
+
+
+def mold_pictures(parts: Sequence[Part], meshes: Sequence[Mesh]) -> dict[str, Image]:
+    """``exploded``, and ``part-above`` and ``part-below`` of every part; BGR."""
+    return {EXPLODED_NAME: exploded_picture(parts, meshes), **part_pictures(meshes)}
+
+
+def part_pictures(meshes: Sequence[Mesh]) -> dict[str, Image]:
+    """Every part from two sides."""
+    views = {"above": ABOVE, "below": BELOW}
+    return {
+        f"{mesh.name}-{side}": draw_meshes([mesh], view, SIZE_PX)
+        for mesh in meshes
+        for side, view in views.items()
+    }
+
+
+def exploded_picture(parts: Sequence[Part], meshes: Sequence[Mesh]) -> Image:
+    """The parts above each other with their names."""
+    groups = exploded(parts, meshes)
+    size = (EXPLODED_PX[0] - NAMES_PX, EXPLODED_PX[1])
+    placed = [mesh for group in groups.values() for mesh in group]
+    framing = Framing.of(placed, EXPLODED, size)
+    picture = np.full((EXPLODED_PX[1], EXPLODED_PX[0], 3), 255, np.uint8)
+    picture[:, : size[0]] = draw_meshes(placed, EXPLODED, size)
+    for name, group in groups.items():
+        points = framing.to_px(np.concatenate([mesh.points for mesh in group]))
+        x, y, _ = points[points[:, 0].argmax()]
+        text = name if len(group) == 1 else f"{name} ({len(group)})"
+        write(picture, text, (x, y), size[0] + 10)
+    return picture
+
+
+def exploded(parts: Sequence[Part], meshes: Sequence[Mesh]) -> Mapping[str, list[Mesh]]:
+    """The parts above each other in the order of use, turned as they are used, the pins over the base."""
+    placed: dict[str, list[Mesh]] = {}
+    apart = APART * float(np.ptp(meshes[0].points[:, :2], axis=0).max())
+    top = 0.0
+    for part, mesh in _in_order(parts, meshes):
+        turned = mesh.moved(0.0, 0.0, 0.0, part.turned)
+        low, high = float(turned.points[:, 2].min()), float(turned.points[:, 2].max())
+        places = part.stack.pins_mm.tolist() if part.name == "pin" else [(0.0, 0.0)]
+        placed[part.name] = [turned.moved(x, y, top - low) for x, y in places]
+        top += high - low + apart
+    return placed
+
+
+def _in_order(parts: Sequence[Part], meshes: Sequence[Mesh]) -> list[tuple[Part, Mesh]]:
+    """Base, pins, then the others."""
+    pairs = list(zip(parts, meshes, strict=True))
+    pins = [pair for pair in pairs if pair[0].name == "pin"]
+    others = [pair for pair in pairs if pair[0].name != "pin"]
+    return [others[0], *pins, *others[1:]]

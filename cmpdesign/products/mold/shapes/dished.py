@@ -1,0 +1,109 @@
+"""Solids with a dish: boss plates and stencils of domed pads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmpdesign.products.mold.shapes.dish import Dish
+from cmpdesign.products.mold.solids.facets import Facets
+from cmpdesign.products.mold.solids.loops import Loop, Points, polygon
+from cmpdesign.products.mold.solids.shells import ShellBuilder, Slab, slab_volume_mm3
+from cmpdesign.products.mold.solids.tiled_faces import plain_sheet
+
+Wires = list[list[int]]
+TURNED = np.array([1.0, -1.0, -1.0])
+
+
+def dished_plate(slab: Slab, dish: Dish) -> Any:
+    """A plate on its back, hollowed by the dish turned over, with bosses standing in it."""
+    surface = _Surface(dish, 0.0)
+    surface.bosses(dish.height_mm * -1.0)
+    foot = dish.points[list(dish.foot)][::-1, :2] * TURNED[:2]
+    builder = ShellBuilder()
+    holes = [below for below, _ in slab.through]
+    bottom = builder.place(plain_sheet(slab.outer, holes), slab.bottom_mm, up=False)
+    top = builder.place(plain_sheet(slab.outer, [*holes, polygon(foot)]), slab.top_mm, up=True)
+    for rim in range(1 + len(holes)):
+        builder.walls(bottom, rim, top, rim, outward=rim == 0)
+    facets = Facets(builder, np.array(surface.points) * TURNED)
+    facets.share(top, 1 + len(holes), dish.foot[::-1])
+    for wires in surface.faces:
+        # Seen from the plate's side every face of the crown runs the other way round.
+        facets.add([wire[::-1] for wire in wires])
+    return builder.solid()
+
+
+def dished_sheet(slab: Slab, dish: Dish) -> Any:
+    """A sheet that follows the dish on both sides, with holes through it."""
+    upper, lower = _Surface(dish, slab.top_mm), _Surface(dish, slab.bottom_mm)
+    lower.open(0)
+    upper.open(1)
+    foot = polygon(dish.points[list(dish.foot), :2])
+    builder = ShellBuilder()
+    holes = [below for below, _ in slab.through]
+    sheet = plain_sheet(slab.outer, [*holes, foot])
+    bottom = builder.place(sheet, slab.bottom_mm, up=False)
+    top = builder.place(plain_sheet(slab.outlines[1], [*holes, foot]), slab.top_mm, up=True)
+    for rim in range(1 + len(holes)):
+        builder.walls(bottom, rim, top, rim, outward=rim == 0)
+    shift = len(lower.points)
+    facets = Facets(builder, np.array([*lower.points, *upper.points]))
+    facets.share(bottom, 1 + len(holes), dish.foot)
+    facets.share(top, 1 + len(holes), [shift + point for point in dish.foot])
+    for wires in lower.faces:
+        facets.add([wire[::-1] for wire in wires])
+    for wires in upper.faces:
+        facets.add([[shift + point for point in wire] for wire in wires])
+    for inner, outer in zip(lower.rims, upper.rims, strict=True):
+        above = [shift + point for point in outer]
+        for side in _walls(inner, above):
+            facets.add([side[::-1]])
+    return builder.solid()
+
+
+def dished_volume_mm3(slab: Slab, dish: Dish, kind: str) -> float:
+    """The plate less the dish plus its bosses; the sheet less its holes (a shear keeps its volume)."""
+    volume = slab_volume_mm3(slab)
+    if kind == "plate":
+        return volume - dish.volume_mm3() + dish.outlines_volume_mm3()
+    return volume - dish.outlines_volume_mm3()
+
+
+class _Surface:
+    """The dish's faces at a height, outward up, in the mold's frame."""
+
+    def __init__(self, dish: Dish, z: float) -> None:
+        self.dish, self.z = dish, z
+        self.points: list[Points] = [point + (0.0, 0.0, z) for point in dish.points]
+        self.faces: list[Wires] = [[list(facet)] for facet in (*dish.facets, *dish.ends)]
+        self.rims: list[list[int]] = []
+
+    def outline(self, facet: int, loop: Loop, lift: float) -> list[int]:
+        """A loop on a facet's plane, lifted; its point numbers."""
+        z = self.dish.z_at(facet, loop.points) + self.z + lift
+        first = len(self.points)
+        self.points += list(np.column_stack([loop.points, z]))
+        return list(range(first, len(self.points)))
+
+    def open(self, end: int) -> None:
+        """Cut the outlines out of their facets."""
+        for facet, outlines in self.dish.outlines.items():
+            rim = self.outline(facet, outlines[end], 0.0)
+            self.faces[facet].append(rim[::-1])
+            self.rims.append(rim)
+
+    def bosses(self, lift: float) -> None:
+        """Bosses towards ``lift``: below the surface, as they hang from a plate."""
+        for facet, (root, tip) in self.dish.outlines.items():
+            at_root, at_tip = self.outline(facet, root, 0.0), self.outline(facet, tip, lift)
+            self.faces[facet].append(at_root[::-1])
+            self.faces.append([at_tip])
+            self.faces += [[side[::-1]] for side in _walls(at_tip, at_root)]
+
+
+def _walls(below: list[int], above: list[int]) -> list[list[int]]:
+    """The quadrilaterals between two outlines, counter-clockwise seen from outside the outlines."""
+    after_below, after_above = [*below[1:], below[0]], [*above[1:], above[0]]
+    return [list(corners) for corners in zip(below, after_below, after_above, above, strict=True)]

@@ -1,0 +1,106 @@
+"""Solids as triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mold.solids.loops import Loop, Points, chorded_pair
+from cmpdesign.products.mold.solids.shells import Feature, Slab
+
+DEFLECTION_MM = 0.01
+DEFLECTION_RAD = 0.1
+# Neighbouring faces evaluate the same point to within the kernel's tolerance; no edge is this short.
+SAME_MM = 1e-5
+
+
+def chorded(slab: Slab) -> Slab:
+    """The slab with every arc as chords: a polyhedron, whose mesh is exact and of a volume in closed form."""
+    bottom, top = chorded_pair(*slab.outlines)
+    return replace(
+        slab,
+        outer=bottom,
+        outer_top=None if slab.outer_top is None else top,
+        through=[chorded_pair(*pair) for pair in slab.through],
+        features=[_chorded_feature(feature) for feature in slab.features],
+        many=[_chorded_feature(feature) for feature in slab.many],
+        many_through=[chorded_pair(*pair) for pair in slab.many_through],
+    )
+
+
+def _chorded_feature(feature: Feature) -> Feature:
+    root, tip = chorded_pair(feature.root, feature.tip)
+    island = None if feature.island is None else chorded_pair(*feature.island)
+    return Feature(root, tip, feature.height_mm, island)
+
+
+def mesh_of_solid(name: str, color: str, solid: Any) -> Mesh:
+    """Triangles of a solid, exact where it is flat; neighbouring faces share their vertices."""
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    from cmpdesign.products.mold.solids.measure import of_kind
+
+    BRepMesh_IncrementalMesh(solid, DEFLECTION_MM, False, DEFLECTION_RAD, False)
+    points: list[tuple[float, float, float]] = []
+    corners: list[tuple[int, int, int]] = []
+    for face in of_kind(solid, TopAbs_ShapeEnum.TopAbs_FACE):
+        _add_face(face, points, corners)
+    return merged(name, color, np.array(points), np.array(corners))
+
+
+def _add_face(
+    face: Any, points: list[tuple[float, float, float]], corners: list[tuple[int, int, int]]
+) -> None:
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    place = TopLoc_Location()
+    triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
+    move = place.Transformation()
+    first = len(points) - 1
+    for number in range(1, triangulation.NbNodes() + 1):
+        node = triangulation.Node(number).Transformed(move)
+        points.append((node.X(), node.Y(), node.Z()))
+    turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+    for number in range(1, triangulation.NbTriangles() + 1):
+        a, b, c = triangulation.Triangle(number).Get()
+        corners.append((first + a, first + c, first + b) if turned else (first + a, first + b, first + c))
+
+
+def merged(name: str, color: str, points: Points, corners: NDArray[np.int64]) -> Mesh:
+    """Points within ``SAME_MM`` are one vertex; triangles that this makes flat are left out."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    a, b = cKDTree(points).query_pairs(SAME_MM, output_type="ndarray").T
+    near = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))
+    _, number = connected_components(near, directed=False)
+    _, first = np.unique(number, return_index=True)
+    triangles = number[corners]
+    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    return Mesh(name, color, points[first], triangles[~flat].astype(np.int64))
+
+
+def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop, Points]]) -> Mesh:
+    """Convex frusta: each a lower outline with its heights (m,), an upper one with its heights."""
+    points, triangles, first = [], [], 0
+    for lower, lower_z, upper, upper_z in frusta:
+        m = len(lower.points)
+        points += [np.column_stack([lower.points, lower_z]), np.column_stack([upper.points, upper_z])]
+        i, after = np.arange(m), (np.arange(m) + 1) % m
+        fan = np.stack([np.zeros(m - 2, dtype=np.int64), i[1:-1], i[2:]], axis=1)
+        sides = np.concatenate(
+            [np.stack([i, after, m + after], axis=1), np.stack([i, m + after, m + i], axis=1)]
+        )
+        triangles += [first + fan[:, ::-1], first + m + fan, first + sides]
+        first += 2 * m
+    return Mesh(name, color, np.concatenate(points), np.concatenate(triangles))

@@ -1,0 +1,75 @@
+"""Silicones: TOML files with shrinkage, cure and what keeps them from curing, each value with its source."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmpdesign.design.mold_options import Tool
+from cmpdesign.design.templates import templates_folder
+from cmpdesign.errors import DesignError
+from cmpdesign.products.laser.library import Sourced
+
+Share = Annotated[float, Field(ge=0, lt=10)]
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class Silicone(BaseModel):
+    """A casting silicone.
+
+    Attributes:
+        cure: the chemistry; tin and platinum silicones do not cure against each other.
+        shrinkage_percent: linear, after full cure.
+        density_g_cm3, pot_life_min, cure_h: at room temperature, for the job sheet.
+        inhibited_by: materials of parts on which its surface stays sticky.
+        remedy: what helps where it is inhibited.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str
+    cure: Literal["platinum", "tin"]
+    shrinkage_percent: Sourced[Share]
+    density_g_cm3: Sourced[Positive]
+    pot_life_min: Sourced[Positive]
+    cure_h: Sourced[Positive]
+    inhibited_by: Sourced[tuple[Tool, ...]]
+    remedy: str
+
+    @property
+    def scale(self) -> float:
+        """Mold over cured part: 1 / (1 - shrinkage)."""
+        return 1 / (1 - self.shrinkage_percent.value / 100)
+
+
+def silicones() -> dict[str, Path]:
+    """Every shipped silicone by name."""
+    return {path.stem: path for path in sorted((templates_folder() / "silicones").glob("*.toml"))}
+
+
+def load_silicone(name_or_path: str) -> Silicone:
+    """A shipped silicone, or one from a TOML file.
+
+    Raises:
+        DesignError: no such silicone, or a file that does not describe one.
+    """
+    known = silicones()
+    path = known.get(name_or_path, Path(name_or_path))
+    if not path.is_file():
+        near = difflib.get_close_matches(name_or_path, known, n=1, cutoff=0.5)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise DesignError(
+            f"mold: {name_or_path!r} is no silicone{hint}; there are {', '.join(known)}, or give a TOML file"
+        )
+    try:
+        return Silicone.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DesignError(f"mold: {path}: is no TOML file of a silicone ({error})") from None
+    except ValidationError as error:
+        item = error.errors()[0]
+        where = ".".join(str(part) for part in item["loc"])
+        raise DesignError(f"mold: {path}: {where}: {item['msg']}") from None

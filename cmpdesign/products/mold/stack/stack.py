@@ -1,0 +1,183 @@
+"""The dimensions that all parts of a mold share: layers, levels, outlines, pins. Numbers only, no solids.
+
+          pin   vent                     z
+    ______|_|____||_______________|_|______   lid
+    ______|_|___           _______|_|______   z_cover_mm    cover (frame of the protective layer)
+    ______|_|___\\_pad_____/_______|_|______   z_marker_mm   frame (of the black layer)
+    |     | |  u\\         /u      | |     |   z_base_mm     rim of the base, with the moat u
+    |     |_|    \\_______/        |_|     |   0             back of the pad
+    |_____________________________________|   -floor        base
+
+Boss plates and stencils lie where the cover lies, one after the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmpdesign.design.design import Design
+from cmpdesign.design.fiducials import fiducial_positions
+from cmpdesign.design.mold_options import MoldOptions
+from cmpdesign.errors import DesignError
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.mold.solids.loops import Loop, Points, circle, polygon, rounded_rectangle
+from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, projected
+from cmpdesign.products.mold.stack.silicones import Silicone, load_silicone
+
+LAYERS = ("base", "marker", "cover")
+# A crown's foot keeps this distance to the pattern and to the pad's edge.
+FOOT_MM = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """A mold's dimensions; lengths of the mold, shrinkage already added.
+
+    Attributes:
+        options: the [mold] table.
+        layout: the pattern.
+        silicones: of the base, the marker and the cover layer.
+        outline_mm: (K, 2) the pad's edge at its back, before shrinkage is added, convex.
+        crown: of a domed pad, as in the mold.
+        pins_mm: (4, 2) the pins; no turn of a part makes its holes fit them.
+        pin_diameter_mm: of the pins.
+    """
+
+    options: MoldOptions
+    layout: Layout
+    silicones: tuple[Silicone, Silicone, Silicone]
+    outline_mm: Points
+    crown: Crown | None
+    pins_mm: Points
+    pin_diameter_mm: float
+
+    @property
+    def lean(self) -> float:
+        """Sideways over upright of a drafted wall."""
+        return float(np.tan(np.radians(self.options.draft_deg)))
+
+    @cached_property
+    def thickness_mm(self) -> tuple[float, float, float]:
+        """Of the base, the marker and the cover layer, as cast."""
+        nominal = (self.options.base_mm, self.options.marker_mm, self.options.cover_mm)
+        base, marker, cover = (t * s.scale for t, s in zip(nominal, self.silicones, strict=True))
+        return base, marker, cover
+
+    @property
+    def z_base_mm(self) -> float:
+        return self.thickness_mm[0]
+
+    @property
+    def z_marker_mm(self) -> float:
+        return self.z_base_mm + self.thickness_mm[1]
+
+    @property
+    def z_cover_mm(self) -> float:
+        return self.z_marker_mm + self.thickness_mm[2]
+
+    def edges(self, layer: int) -> tuple[Loop, Loop]:
+        """The pad's edge at the lower and the upper face of a layer; drafted, so that it opens upwards."""
+        nominal = polygon(self.outline_mm * self.silicones[layer].scale)
+        low = self.lean * sum(self.thickness_mm[:layer])
+        return nominal.moved(low), nominal.moved(low + self.lean * self.thickness_mm[layer])
+
+    @cached_property
+    def marker_xy_mm(self) -> Points:
+        """(M, 2) markers in plan, as cast."""
+        return self.placed(self.layout.marker_xy_mm)
+
+    def placed(self, xy_mm: Points) -> Points:
+        """Points of the layout in plan, as cast: shrinkage added, then projected on the crown."""
+        scaled = xy_mm * self.silicones[1].scale
+        if self.crown is None:
+            return scaled
+        return projected(scaled, self.crown.shape, self.crown.radius_mm, self.options.projection)
+
+    @cached_property
+    def colors(self) -> tuple[int, ...]:
+        """The colors that are filled, each with a plate and a stencil of its own."""
+        return tuple(c for c in range(len(COLORS)) if c != BLACK and (self.layout.cell_color == c).any())
+
+    def cells(self, color: int) -> Points:
+        """(N, 3 or 4, 2) corners of a color's cells in plan, counter-clockwise."""
+        corners: Points = self.marker_xy_mm[self.layout.cell_corners[self.layout.cell_color == color]]
+        return corners
+
+    @cached_property
+    def block(self) -> Loop:
+        """Outer edge of every part: around pins, pad and moat."""
+        option = self.options
+        reach = option.wall_mm + self.pin_diameter_mm / 2
+        pad = self.edges(2)[1].points
+        away = option.parting_mm + option.moat_mm + option.wall_mm
+        low = np.minimum(self.pins_mm.min(axis=0) - reach, pad.min(axis=0) - away)
+        high = np.maximum(self.pins_mm.max(axis=0) + reach, pad.max(axis=0) + away)
+        return rounded_rectangle(low, high, option.fillet_mm)
+
+    def holes(self, clearance: bool = True) -> list[Loop]:
+        """The pin holes; in the base they hold the pins tight, elsewhere they have clearance."""
+        diameter = self.pin_diameter_mm + (self.options.clearance_mm if clearance else 0.0)
+        return [circle(place, diameter) for place in self.pins_mm]
+
+
+def stack_of(design: Design, layout: Layout) -> Stack:
+    """The dimensions of a design's mold.
+
+    Raises:
+        DesignError: an unknown silicone, or a crown that its pattern does not fit on.
+    """
+    option = design.mold
+    base, marker, cover = (
+        load_silicone(n) for n in (option.base_silicone, option.marker_silicone, option.cover_silicone)
+    )
+    four = design.fiducials.model_copy(update={"count": 4})
+    pins = fiducial_positions(four, layout.outline_mm)
+    diameter = option.pin_diameter_mm or design.fiducials.diameter_mm
+    crown, outline = None, layout.outline_mm
+    if option.crown != "none":
+        crown, outline = _crowned(option, layout, marker.scale)
+    return Stack(option, layout, (base, marker, cover), outline, crown, pins, diameter)
+
+
+def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
+    """The crown that just carries the pattern, and the round or rectangular pad around it."""
+    from cmpdesign.layout.outline import circle as round_outline
+    from cmpdesign.layout.outline import rectangle
+
+    if option.crown_radius_mm is None:
+        raise DesignError(f'mold.crown = "{option.crown}" needs mold.crown_radius_mm')
+    radius = option.crown_radius_mm * scale
+    points = layout.marker_xy_mm[np.unique(layout.cell_corners)] * scale
+    away = np.hypot(*points.T) if option.crown == "sphere" else np.abs(points[:, 0])
+    extent = float(away.max())
+    slope = extent / radius if option.projection == "equidistant" else np.arcsin(min(1.0, extent / radius))
+    if np.degrees(slope) > STEEPEST_DEG:
+        raise DesignError(
+            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm: at the pattern's edge, "
+            f"{extent / scale:.3g} mm "
+            f"from the apex, the dome is {np.degrees(slope):.3g} deg steep, limit {STEEPEST_DEG:g} deg; "
+            "make the radius larger or the pattern smaller"
+        )
+    reach = float(radius * np.sin(slope)) + FOOT_MM
+    if reach >= radius * np.sin(np.radians(STEEPEST_DEG + 10)):
+        raise DesignError(
+            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make it larger"
+        )
+    edge = crown_edge_mm(option, layout)
+    if option.crown == "sphere":
+        crown = Crown("sphere", radius, reach, reach)
+        # The inscribed polygon's sides come nearer than its corners.
+        return crown, round_outline(2 * (reach / scale + edge) / np.cos(np.pi / 360))
+    height = Crown("cylinder", radius, reach, np.inf).height_mm
+    length = float(np.abs(points[:, 1]).max()) + FOOT_MM + height / END_SLOPE
+    crown = Crown("cylinder", radius, reach, length)
+    return crown, rectangle(2 * (reach / scale + edge), 2 * (length / scale + edge))
+
+
+def crown_edge_mm(option: MoldOptions, layout: Layout) -> float:
+    """Width of the flat edge around a crown: the border's, or what vents need."""
+    return max(layout.border_mm, option.vent_mm + 2 * FOOT_MM if option.vents else 0.0)

@@ -1,0 +1,145 @@
+"""What a design can be turned into: the registry of products, and their making.
+
+A product is added by one line in ``PRODUCTS``, which names its maker as "module:function"
+so that nothing is imported before it is asked for. The maker takes ``(design, layout)`` and returns a
+``Made``: the files (path relative to the output folder -> content) and, where it has any, figures for
+``report.json`` (they stand there under the product's name) and findings that the user should hear of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from cmpdesign.design.design import Design
+    from cmpdesign.layout.checks import Finding
+    from cmpdesign.layout.layout import Layout
+    from cmpdesign.layout.report import Report
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a product came to.
+
+    Attributes:
+        files: path relative to the output folder, with "/" -> content; the same bytes for the same design.
+        figures: what the product measures of itself, as JSON values; its member in ``report.json``.
+        findings: what will not or may not work.
+        pictures: name -> (H, W, 3) uint8 BGR, of what was made; they are shown in ``preview.png``.
+    """
+
+    files: Mapping[str, str | bytes]
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+
+
+Maker = Callable[["Design", "Layout"], Made]
+
+
+@dataclass(frozen=True)
+class Product:
+    """One entry of the registry.
+
+    Attributes:
+        maker: "module:function" of the ``Maker``.
+        where: the file or folder that appears, for help texts.
+        usual: made by a plain ``build``; the others only when ``--only`` names them.
+    """
+
+    maker: str
+    where: str
+    usual: bool = False
+
+
+PREVIEW, REPORT = "preview", "report"
+PRODUCTS: Mapping[str, Product] = {
+    "svg": Product("cmpdesign.products.registry:_svg", "pattern.svg", usual=True),
+    "layout": Product("cmpdesign.products.registry:_layout", "layout.json", usual=True),
+    # The preview and the report are no ``Maker``s: they show what the others made and measured.
+    PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
+    "laser": Product("cmpdesign.products.laser.product:product", "laser/"),
+    "mold": Product("cmpdesign.products.mold.make:make_mold", "mold/"),
+    "mesh": Product("cmpdesign.products.mold.meshes:make_meshes", "mesh/"),
+    "print": Product("cmpdesign.products.sheet.print_sheet:make_print_sheet", "print/"),
+    REPORT: Product("cmpdesign.layout.report:report_to_json", "report.json", usual=True),
+}
+USUAL = ",".join(name for name, product in PRODUCTS.items() if product.usual)
+
+
+def chosen_products(only: str) -> list[str]:
+    """The names in a text such as "svg, layout", in the registry's order.
+
+    Raises:
+        CmpDesignError: an unknown name, or none.
+    """
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    for name in names:
+        if name not in PRODUCTS:
+            raise CmpDesignError(f"--only {name}: unknown; there are {', '.join(PRODUCTS)}")
+    if not names:
+        raise CmpDesignError(f"--only names no file; there are {', '.join(PRODUCTS)}")
+    return [name for name in PRODUCTS if name in names]
+
+
+def product_folders() -> list[str]:
+    """Folders that products fill, as "mold/"."""
+    return [product.where for product in PRODUCTS.values() if product.where.endswith("/")]
+
+
+def make_products(
+    names: Sequence[str], design: Design, layout: Layout, report: Report
+) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
+    """Make the named products.
+
+    A product that has figures brings ``report.json`` with it, one that has pictures ``preview.png``, named or
+    not.
+
+    Returns:
+        All files by relative path, in the registry's order, and the products' findings.
+
+    Raises:
+        CmpDesignError: one of them cannot be made; nothing has been written.
+    """
+    made = {name: _maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
+    pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}
+    if pictures or PREVIEW in names:
+        from cmpdesign.products.drawing.preview import preview_png
+
+        made[PREVIEW] = Made({PRODUCTS[PREVIEW].where: preview_png(layout, pictures)})
+    in_order = [made[name] for name in PRODUCTS if name in made]
+    files = {path: content for product in in_order for path, content in product.files.items()}
+    figures = {name: product.figures for name, product in made.items() if product.figures}
+    if figures or REPORT in names:
+        from cmpdesign.layout.report import report_to_json
+
+        files[PRODUCTS[REPORT].where] = report_to_json(report, figures)
+    findings = dict.fromkeys(finding for product in made.values() for finding in product.findings)
+    return files, tuple(findings)
+
+
+def _maker(name: str) -> Maker:
+    module, _, function = PRODUCTS[name].maker.partition(":")
+    maker: Maker = getattr(import_module(module), function)
+    return maker
+
+
+def _svg(design: Design, layout: Layout) -> Made:
+    from cmpdesign.products.drawing.svg import layout_to_svg
+
+    text = layout_to_svg(layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror)
+    return Made({PRODUCTS["svg"].where: text})
+
+
+def _layout(design: Design, layout: Layout) -> Made:
+    from cmpdesign.files.layout_json import layout_to_json
+
+    return Made({PRODUCTS["layout"].where: layout_to_json(layout)})

@@ -1,0 +1,206 @@
+"""The product "print": several pads on a page, with all that tells how true the print is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.design.design import Design
+from cmpdesign.design.sheet_options import PAGES_MM, SheetOptions
+from cmpdesign.errors import DesignError
+from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.outline import mitres
+from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.registry import Made
+from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
+from cmpdesign.products.sheet.page import Page, Shapes, Text, box, page_to_pdf, page_to_svg
+
+FOLDER = "print"
+INK, PAPER = "#000000", "#ffffff"
+# Free for the printer's grip, and for the key at the left and the bottom.
+MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
+CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
+# Corners that turn by less than 30 degrees (or more than 150) have no marks of their own.
+SHARP = 0.5 - 1e-9
+PATCH_MM, FRAME_MM = 6.0, 0.2
+Points = NDArray[np.float64]
+
+
+def make_print_sheet(design: Design, layout: Layout) -> Made:
+    """``print/sheet.svg`` and ``print/sheet.pdf``.
+
+    Raises:
+        DesignError: not one pad fits on the page.
+    """
+    page, pads = print_page(design, layout)
+    files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
+    files[f"{FOLDER}/sheet.pdf"] = page_to_pdf(page)
+    return Made(files, {"pads": pads, "page": design.sheet.page, "bleed_mm": design.sheet.bleed_mm})
+
+
+def print_page(design: Design, layout: Layout) -> tuple[Page, int]:
+    """The page, and how many pads are on it."""
+    width, height = PAGES_MM[design.sheet.page]
+    places = _places(design.sheet, layout, width, height)
+    # A transparent page becomes black in many a viewer, and its code unreadable.
+    items: list[Shapes | Text] = [Shapes([box(0, 0, width, height)], PAPER, "paper")]
+    for place in places:
+        items += _pad(layout, place, design)
+    items.append(Shapes([mark for place in places for mark in _marks(layout, place, design)], INK, "crop"))
+    items += _key(layout, height)
+    items += _patches(layout, width, height)
+    return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(
+        places
+    )
+
+
+def _places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
+    """Upper left corner of each pad's bounding box, row by row."""
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    printed = np.concatenate([_bleed(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)])
+    around = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
+    step = np.array(layout.size_mm) + 2 * around
+    left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM
+    room = np.array([width - left - MARGIN_MM, height - MARGIN_MM - bottom])
+    columns, rows = (int(n) for n in np.floor(room / step + 1e-9))
+    if columns < 1 or rows < 1:
+        raise DesignError(
+            f"a pad of {layout.size_mm[0]:.4g} x {layout.size_mm[1]:.4g} mm with bleed and crop marks "
+            "does not fit into "
+            f"{room[0]:.4g} x {room[1]:.4g} mm on {option.page}; choose a larger sheet.page or a "
+            "smaller pattern"
+        )
+    wanted = option.pads or columns * rows
+    if wanted > columns * rows:
+        raise DesignError(
+            f"sheet.pads = {wanted}: only {columns * rows} fit on {option.page}; ask for fewer or "
+            "choose a larger page"
+        )
+    # In the middle of the room across.
+    corner = np.array([left + (room[0] - columns * step[0]) / 2, MARGIN_MM]) + around
+    return [corner + step * (n % columns, n // columns) for n in range(wanted)]
+
+
+def _pad(layout: Layout, place: Points, design: Design) -> list[Shapes | Text]:
+    ground = _on_page(_bleed(layout, design.sheet), layout, place, design)
+    items: list[Shapes | Text] = [Shapes([ground], layout.palette[COLORS[BLACK]])]
+    for color, name in enumerate(COLORS):
+        cells = layout.cell_corners[layout.cell_color == color]
+        if color != BLACK and len(cells):
+            corners = _on_page(layout.marker_xy_mm[cells], layout, place, design)
+            items.append(Shapes(list(corners), layout.palette[name]))
+    return items
+
+
+def _bleed(layout: Layout, option: SheetOptions) -> Points:
+    bleed: Points = layout.outline_mm + option.bleed_mm * mitres(layout.outline_mm)
+    return bleed
+
+
+def _marks(layout: Layout, place: Points, design: Design) -> list[Points]:
+    marks = crop_marks(layout.outline_mm, design.sheet.bleed_mm)
+    return [_on_page(mark, layout, place, design) for mark in marks]
+
+
+def _on_page(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
+    """From the layout to the page, the upper left corner of the pad's bounding box at ``place``."""
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    x = high[0] - xy[..., 0] if design.print_mirror else xy[..., 0] - low[0]
+    return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
+
+
+def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
+    """Hairlines that continue the pad's sides beyond its corners: a ruler laid on two of them shows the cut.
+
+    An outline that is round or not convex has no such sides: it gets the marks of its bounding box.
+
+    Args:
+        outline_mm: (N, 2) counter-clockwise.
+        bleed_mm: the marks begin ``CROP_APART_MM`` outside it.
+
+    Returns:
+        Two (4, 2) outlines for each corner.
+    """
+    corners, sine = outline_mm, _turns(outline_mm)
+    if (sine < SHARP).any():
+        (left, low), (right, high) = outline_mm.min(axis=0), outline_mm.max(axis=0)
+        corners = np.array([(left, low), (right, low), (right, high), (left, high)])
+        sine = np.ones(4)
+    before, after = (
+        _along(np.roll(corners, 1, axis=0), corners),
+        _along(np.roll(corners, -1, axis=0), corners),
+    )
+    marks = []
+    for corner, away, *ways in zip(corners, (bleed_mm + CROP_APART_MM) / sine, before, after, strict=True):
+        # Where a side goes on, it leaves the next one's bleed at this distance from the corner.
+        marks += [_hairline(corner + away * way, way) for way in ways]
+    return marks
+
+
+def _turns(outline: Points) -> Points:
+    """(N,) sine of the angle by which the outline turns to the left at each corner."""
+    first, then = _along(np.roll(outline, 1, axis=0), outline), _along(outline, np.roll(outline, -1, axis=0))
+    turns: Points = first[:, 0] * then[:, 1] - first[:, 1] * then[:, 0]
+    return turns
+
+
+def _along(start: Points, end: Points) -> Points:
+    """(N, 2) directions of length one."""
+    way: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
+    return way
+
+
+def _hairline(start: Points, way: Points) -> Points:
+    half = HAIRLINE_MM / 2 * np.array([-way[1], way[0]])
+    end = start + CROP_MM * way
+    return np.array([start - half, end - half, end + half, start + half])
+
+
+def _key(layout: Layout, height: float) -> list[Shapes | Text]:
+    """QR code, scale bars and text, in the lower left corner."""
+    import segno
+
+    parameters = layout.parameters
+    name = str(parameters.get("name") or layout.pattern)
+    key = SheetKey(
+        layout.digest, name[:40], layout.pattern, int(parameters["layers"]), float(parameters["pitch_mm"])
+    )
+    left, top = MARGIN_MM, height - MARGIN_MM - CODE_MM
+    matrix = np.array([list(row) for row in segno.make_qr(key.text(), error="m").matrix], dtype=bool)
+    module = CODE_MM / len(matrix)
+    modules = [
+        box(left + module * c, top + module * r, module, module) for r, c in np.argwhere(matrix).tolist()
+    ]
+    half = THICK_MM / 2
+    x_bar = box(left + X_BAR[0][0], top + X_BAR[0][1] - half, BAR_MM, THICK_MM)
+    y_bar = box(left + Y_BAR[1][0] - half, top + Y_BAR[1][1], THICK_MM, BAR_MM)
+    text_x = left + X_BAR[0][0]
+    width, tall = layout.size_mm
+    lines = (
+        name,
+        f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, {width:.4g} x {tall:.4g} mm",
+        f"digest {layout.digest[:32]}",
+        f"{layout.digest[32:]}",
+        "print at 100 %, not fitted to the page",
+    )
+    items: list[Shapes | Text] = [Shapes(modules, INK, "code"), Shapes([x_bar, y_bar], INK, "scale")]
+    items += [Text(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
+    items.append(Text(f"{BAR_MM:g} mm", text_x, top + X_BAR[0][1] + 4, 2.6))
+    items.append(Text(f"{BAR_MM:g} mm", left + Y_BAR[0][0] - 2, top + Y_BAR[0][1], 2.6, turned=True))
+    return items
+
+
+def _patches(layout: Layout, width: float, height: float) -> list[Shapes | Text]:
+    """One patch a color, with its name and value, in the lower right corner."""
+    names = [name for number, name in enumerate(COLORS) if (layout.cell_color == number).any()]
+    items: list[Shapes | Text] = []
+    for number, name in enumerate(names):
+        x = width - MARGIN_MM - (len(names) - number) * (PATCH_MM + 8)
+        y = height - MARGIN_MM - PATCH_MM - 6
+        frame = box(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
+        items += [Shapes([frame], INK), Shapes([box(x, y, PATCH_MM, PATCH_MM)], layout.palette[name])]
+        items += [
+            Text(name, x, y + PATCH_MM + 3, 2.2),
+            Text(layout.palette[name], x, y + PATCH_MM + 5.6, 2.2),
+        ]
+    return items

@@ -1,0 +1,44 @@
+"""A written layout file as a ``Layout`` again, so that scenes show what was handed to the printer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cmpdesign.layout.layout import Layout
+
+if TYPE_CHECKING:
+    from extractor.layout.reference import Reference
+
+
+def read_layout(path: str | Path) -> Layout:
+    """The layout in a ``layout.json``, read and checked by the extractor's own reader.
+
+    Raises:
+        extractor.errors.LayoutError: the file cannot be read or contradicts itself.
+    """
+    from extractor.layout.layout_file import load_layout
+
+    return layout_from_reference(load_layout(path))
+
+
+def layout_from_reference(reference: Reference) -> Layout:
+    """The same values under the generator's names; the arrays are shared (both sides hold them read-only)."""
+    return Layout(
+        pattern=reference.pattern,
+        parameters=reference.parameters,
+        marker_layer=reference.layer,
+        marker_index=reference.index,
+        marker_xy_mm=reference.xy_mm,
+        cell_corners=reference.cell_corners,
+        cell_color=reference.cell_color,
+        edges=reference.edges,
+        virtual_per_edge=reference.virtual_per_edge,
+        reference_cell=reference.reference_cell,
+        reference_marker=reference.reference_marker,
+        palette=reference.palette,
+        border_mm=reference.border_mm,
+        outline_mm=reference.outline_mm,
+        fiducials_mm=reference.fiducials_mm,
+        fiducial_diameter_mm=reference.fiducial_diameter_mm,
+    )

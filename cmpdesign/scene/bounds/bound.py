@@ -1,0 +1,154 @@
+"""The Cramer-Rao bound of a scene: how precisely its image can tell the markers' positions at all.
+
+An edge of contrast A (norm over the channels), blur s and pixel noise sigma carries the Fisher information
+A^2 / (2 sqrt(pi) s sigma^2) per pixel of its length about its offset along its normal: the integral of the
+squared derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's own box. A
+gridline is straight between its two markers, so a point at the fraction t moves with the weights 1 - t and
+t. All gridlines together give a sparse information matrix; the diagonal blocks of its inverse bound every
+marker's covariance.
+
+Every edge counts as if it were alone. Near a corner six of them share their pixels and tell less, so the
+true bound lies higher, by the more the fewer pixels an edge has: for a deviation, about 17 % at 20 px and
+blur 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.patterns.colors import BLACK
+from cmpdesign.scene.camera.pinhole import Area
+from cmpdesign.scene.drawing.render import missing_cells, render_truth
+from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.parts.light import gain
+from cmpdesign.scene.scene import Scene
+from cmpdesign.scene.truth import Truth
+
+# A marker that the image says nothing about would make the matrix singular: a prior of 1000 px cures that.
+PRIOR_PER_PX2 = 1e-6
+SOLVED_AT_ONCE = 512
+
+
+def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
+    """The smallest covariance (M, 2, 2) px^2 that an unbiased estimate of the markers can have.
+
+    Uses the scene's inks, light, blur, noise, missing cells and true positions. Gamma, JPEG, quantisation and
+    the bending of gridlines are left out. NaN for markers that are not visible.
+
+    Raises:
+        SceneError: the scene has no noise, so nothing bounds it; or it has several views, each with its own bound.
+    """
+    look(scene, size)  # refuses several views
+    truth = render_truth(scene, size=size)
+    return _inverse_blocks(edge_information(scene, truth, size), truth)
+
+
+def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
+    """The sparse (2M, 2M) information matrix, 1/px^2, rows x0, y0, x1, y1, ... by marker.
+
+    Raises:
+        SceneError: the scene has no noise, or several views.
+    """
+    area = look(scene, size).area
+    noise = scene.sensor.noise if scene.sensor else 0.0
+    if noise <= 0:
+        raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
+    ends = truth.marker_xy_px[scene.layout.edges]
+    spread = np.sqrt(scene.blur_px**2 + 1 / 12)
+    contrast_squared = _contrast_squared(scene, ends.mean(axis=1), size)
+    per_px = contrast_squared / (2 * np.sqrt(np.pi) * spread * noise**2)
+    return _information(scene.layout.edges, ends, per_px, area, len(truth.marker_xy_px))
+
+
+def _contrast_squared(
+    scene: Scene, middle_px: NDArray[np.float64], size: tuple[int, int]
+) -> NDArray[np.float64]:
+    """(E,): squared difference of the colors on both sides of each edge, under the light at its middle."""
+    layout = scene.layout
+    color = np.where(missing_cells(scene), BLACK, layout.cell_color)
+    over_black = np.array([np.subtract(scene.ink(c)[::-1], scene.ink(BLACK)[::-1]) for c in color])
+    corners = layout.cell_corners.astype(np.int64)
+    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    markers = len(layout.marker_xy_mm)
+    edge_key = layout.edges[:, 0].astype(np.int64) * markers + layout.edges[:, 1]
+    edge = np.searchsorted(edge_key, sides.min(axis=1) * markers + sides.max(axis=1))
+    # An edge's two cells run along it in opposite directions; beyond the rim there is black.
+    sign = np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0)[:, None]
+    difference = np.zeros((len(edge_key), 3))
+    np.add.at(difference, edge, sign * np.repeat(over_black, corners.shape[1], axis=0))
+    if scene.light:
+        x, y = np.clip(np.rint(middle_px), 0, np.asarray(size) - 1).astype(np.int64).T
+        difference = difference * gain(scene.light, size)[:, y, x].T
+    return np.asarray(np.sum(difference**2, axis=1))
+
+
+def _information(
+    edges: NDArray[np.int32],
+    ends: NDArray[np.float64],
+    per_px: NDArray[np.float64],
+    area: Area,
+    markers: int,
+) -> Any:
+    """The sparse (2M, 2M) information matrix of all edges, as far as they lie inside the view's area."""
+    from scipy.sparse import coo_array
+
+    step = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(step, axis=1)
+    normal = np.stack([-step[:, 1], step[:, 0]], axis=-1) / length[:, None]
+    low, high = _inside(ends, area)
+    weight = per_px * length
+    # Integrals of (1 - t)^2, t (1 - t) and t^2 over the part inside.
+    both = {
+        (0, 0): ((1 - low) ** 3 - (1 - high) ** 3) / 3,
+        (0, 1): (high**2 - low**2) / 2 - (high**3 - low**3) / 3,
+        (1, 1): (high**3 - low**3) / 3,
+    }
+    blocks = normal[:, :, None] * normal[:, None, :]
+    row, column, value = [], [], []
+    for (a, b), integral in both.items():
+        for i, j in {(a, b), (b, a)}:
+            rows = 2 * edges[:, i, None, None] + np.array([[0], [1]])
+            columns = 2 * edges[:, j, None, None] + np.array([[0, 1]])
+            row.append(np.broadcast_to(rows, blocks.shape).ravel())
+            column.append(np.broadcast_to(columns, blocks.shape).ravel())
+            value.append((blocks * (weight * integral)[:, None, None]).ravel())
+    matrix = coo_array(
+        (np.concatenate(value), (np.concatenate(row), np.concatenate(column))),
+        shape=(2 * markers, 2 * markers),
+    )
+    return matrix.tocsc()
+
+
+def _inside(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The range of t, (E,) each, over which each edge lies inside the area; empty ranges are (0, 0)."""
+    start, step = ends[:, 0], ends[:, 1] - ends[:, 0]
+    step = np.where(np.abs(step) < 1e-12, 1e-12, step)
+    corner = np.asarray(area[:2]) - 0.5
+    first, second = (corner - start) / step, (corner + np.asarray(area[2:]) - start) / step
+    low = np.clip(np.minimum(first, second).max(axis=1), 0, 1)
+    high = np.clip(np.maximum(first, second).min(axis=1), 0, 1)
+    outside = high <= low
+    return np.where(outside, 0.0, low), np.where(outside, 0.0, high)
+
+
+def _inverse_blocks(information: Any, truth: Truth) -> NDArray[np.float64]:
+    """The (M, 2, 2) diagonal blocks of the inverse, for the visible markers."""
+    from scipy.sparse import eye_array
+    from scipy.sparse.linalg import splu
+
+    markers = len(truth.visible)
+    solver = splu((information + PRIOR_PER_PX2 * eye_array(2 * markers)).tocsc())
+    covariance = np.full((markers, 2, 2), np.nan)
+    wanted = np.flatnonzero(truth.visible)
+    for first in range(0, len(wanted), SOLVED_AT_ONCE):
+        chosen = wanted[first : first + SOLVED_AT_ONCE]
+        unit = np.zeros((2 * markers, 2 * len(chosen)))
+        entries = np.stack([2 * chosen, 2 * chosen + 1], axis=-1).ravel()
+        unit[entries, np.arange(len(entries))] = 1.0
+        solved = solver.solve(unit)[entries].reshape(len(chosen), 2, len(chosen), 2)
+        covariance[chosen] = solved[np.arange(len(chosen)), :, np.arange(len(chosen)), :]
+    return covariance

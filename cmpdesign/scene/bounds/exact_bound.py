@@ -1,0 +1,121 @@
+"""The exact Cramer-Rao bound of a scene, from derivatives of its rendered image.
+
+``bound.cramer_rao`` counts every gridline as if it were alone. Here nothing is assumed: the image's derivative with
+respect to every marker is rendered (central differences) and the Fisher matrix is their Gram matrix over the noise's
+variance. Markers that lie far apart move in one and the same rendering, so a few dozen renderings serve any pattern.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.bounds.bound import _inverse_blocks
+from cmpdesign.scene.drawing.render import render, render_truth
+from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.parts.sensor import Sensor
+from cmpdesign.scene.scene import Scene
+
+STEP_PX = 0.1
+APART = 3  # rings between markers that move together
+REACH_SIGMA = 5.0
+
+
+def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
+    """The smallest covariance (M, 2, 2) px^2 of an unbiased estimate of the markers; NaN where not visible.
+
+    A gridline moves with its two markers and keeps the curvature that the surface gives it. Inks, light and blur
+    count as known; gamma, JPEG and quantisation are left out.
+
+    Raises:
+        SceneError: the scene has no noise.
+    """
+    from scipy.sparse import coo_array
+
+    noise = scene.sensor.noise if scene.sensor else 0.0
+    if noise <= 0:
+        raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
+    clean = replace(scene, sensor=Sensor(bits=16))
+    truth = render_truth(scene, size=size)
+    markers = len(truth.visible)
+    groups = _far_apart(scene.layout.edges, markers)
+    owners = _owners(scene, truth.marker_xy_px, size)
+    rows, columns, values = [], [], []
+    for group in range(groups.max() + 1):
+        moved = np.flatnonzero(groups == group)
+        for axis in (0, 1):
+            change = _derivative(clean, moved, axis, size)
+            for marker in moved:
+                low, high = owners[marker]
+                if (high <= low).any():
+                    continue
+                part = change[low[1] : high[1], low[0] : high[0]]
+                y, x, channel = np.nonzero(part)
+                rows.append(((y + low[1]) * size[0] + x + low[0]) * 3 + channel)
+                columns.append(np.full(len(x), 2 * marker + axis))
+                values.append(part[y, x, channel] / noise)
+    jacobian = coo_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(size[0] * size[1] * 3, 2 * markers),
+    ).tocsc()
+    return _inverse_blocks((jacobian.T @ jacobian).tocsc(), truth)
+
+
+def _far_apart(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
+    """(M,) group numbers: markers of one group are more than ``APART`` - 1 rings from each other (greedily)."""
+    from scipy.sparse import coo_array, eye_array
+
+    one = np.ones(2 * len(edges))
+    both = np.concatenate([edges, edges[:, ::-1]])
+    step = (coo_array((one, both.T), shape=(markers, markers)) + eye_array(markers)).tocsr()
+    reached = step
+    for _ in range(APART - 1):
+        reached = reached @ step
+    group = np.full(markers, -1)
+    for marker in range(markers):
+        taken = group[reached.indices[reached.indptr[marker] : reached.indptr[marker + 1]]]
+        group[marker] = np.setdiff1d(np.arange(len(taken) + 1), taken)[0]
+    return group
+
+
+def _owners(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
+    """(M, 2, 2): the box of pixels (from, to) that a marker's cells and their blur can reach."""
+    edges = scene.layout.edges
+    low, high = xy_px.copy(), xy_px.copy()
+    for a, b in (edges.T, edges.T[::-1]):
+        np.minimum.at(low, a, xy_px[b])
+        np.maximum.at(high, a, xy_px[b])
+    reach = REACH_SIGMA * np.hypot(scene.blur_px, 0.3) + 1
+    box = np.stack([np.floor(low - reach), np.ceil(high + reach) + 1], axis=1)
+    return np.asarray(np.clip(box, 0, np.asarray(size)), dtype=np.int64)
+
+
+def _derivative(
+    scene: Scene, moved: NDArray[np.int64], axis: int, size: tuple[int, int]
+) -> NDArray[np.float64]:
+    """(H, W, 3): change of the image with the shift (1 px) of these markers along an image axis."""
+    xy_mm = scene.layout.marker_xy_mm
+    step_mm = STEP_PX * _layout_from_image(scene, moved, size)[:, :, axis]
+    images = []
+    for sign in (1, -1):
+        shifted = xy_mm.copy()
+        shifted[moved] += sign * step_mm
+        image = render(replace(scene, layout=replace(scene.layout, marker_xy_mm=shifted)), size=size).image
+        images.append(image.astype(np.float64) / 257)
+    return (images[0] - images[1]) / (2 * STEP_PX)
+
+
+def _layout_from_image(
+    scene: Scene, markers: NDArray[np.int64], size: tuple[int, int]
+) -> NDArray[np.float64]:
+    """(n, 2, 2) mm per px: the inverse derivative of the map from layout to image at these markers."""
+    view, xy = look(scene, size), scene.layout.marker_xy_mm[markers]
+    step = 1e-4 * np.ptp(scene.layout.marker_xy_mm)
+    columns = [
+        (view.image_from_layout(xy + step * unit) - view.image_from_layout(xy - step * unit)) / (2 * step)
+        for unit in np.eye(2)
+    ]
+    return np.linalg.inv(np.stack(columns, axis=2))

@@ -1,0 +1,197 @@
+"""Exact coverage of the image by polygons, seen through a point spread that is a sum of B-splines.
+
+The coverage that a spline at (i, j) sees is, by Green's theorem, a sum over the polygon's edges:
+
+    integral over the polygon of B(u - i) B(v - j) du dv  =  contour integral of C(u - i) B(v - j) dv,
+
+C the integral of B from -infinity. Font rasterisers do this with boxes (signed-area accumulation). As
+there, differences along the row are accumulated, which touch only the few samples around the edge, and one
+cumulative sum restores the coverage. Along an edge's piece inside one sample cell the integrand is a
+polynomial of degree 2 * degree + 1, which Gauss-Legendre quadrature with degree + 1 points integrates
+exactly. Nothing is approximated but for rounding (about 1e-6).
+
+This module holds the preparation and the engine in plain numpy; ``coverage_compiled`` the same as loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.drawing.coverage_task import Task
+from cmpdesign.scene.drawing.paths import Segments
+from cmpdesign.scene.parts.optics import PointSpread
+
+Engine = Literal["compiled", "numpy"]
+BAND_ROWS = 64
+
+# The image is drawn in bands of rows, so that a large one needs no large memory.
+Band = Callable[["Task", int, int], NDArray[np.float32]]
+
+
+def coverage(
+    paths: Segments,
+    values: NDArray[np.float64],
+    size: tuple[int, int],
+    spread: PointSpread,
+    engine: Engine = "compiled",
+    orientation: float | None = None,
+) -> NDArray[np.float32]:
+    """Sum over the polygons of value times blurred coverage.
+
+    Args:
+        paths: closed polygons in the image frame, of either orientation.
+        values: (polygons, planes): what each polygon adds to each plane where it covers it.
+        size: the image's (width, height).
+        spread: the point spread.
+        engine: "compiled" (numba) or its twin "numpy".
+        orientation: sign of the area (x to y counts as positive) of polygons that count as covered; the other way
+            round they count as minus that. None: each counts as covered either way round.
+
+    Returns:
+        (planes, height, width) float32.
+    """
+    width, height = size
+    task = _task(paths, _signed(paths, values, orientation), size, spread)
+    draw = _engine(engine)
+    image = np.empty((values.shape[1], height, width), dtype=np.float32)
+    for first in range(0, height, BAND_ROWS):
+        count = min(BAND_ROWS, height - first)
+        image[:, first : first + count] = draw(task, first, count)
+    return image
+
+
+def _engine(engine: Engine) -> Band:
+    if engine == "numpy":
+        return draw_band
+    from cmpdesign.scene.drawing.coverage_compiled import draw_band as compiled_band
+
+    return compiled_band
+
+
+def _task(paths: Segments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread) -> Task:
+    fine = spread.oversampling
+    columns, rows = (fine * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
+    # Knots of the even degree lie between the samples.
+    shift = spread.reach + (0.5 if spread.degree == 0 else 0.0)
+    cut, owner = _cut(fine * paths.xy_px + shift, paths.owner, columns, rows)
+    nodes, weights = np.polynomial.legendre.leggauss(spread.degree + 1)
+    quadrature = np.stack([(nodes + 1) / 2, weights / 2])
+    return Task(cut, owner, values, columns, rows, spread, size[0], quadrature)
+
+
+def _signed(paths: Segments, values: NDArray[np.float64], orientation: float | None) -> NDArray[np.float64]:
+    """What the contour integral is to be weighted with."""
+    if orientation is not None:
+        return -orientation * values
+    xy = paths.xy_px
+    area = np.bincount(paths.owner, xy[:, 0] * xy[:, 3] - xy[:, 2] * xy[:, 1], minlength=len(values))
+    return values * -np.sign(area)[:, None]
+
+
+def _cut(
+    uv: NDArray[np.float64], owner: NDArray[np.int64], columns: int, rows: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Drop what lies above, below or right of the samples; push what lies left of them onto their margin.
+
+    An edge left of all samples counts fully in every one of them; one to the right counts in none.
+    """
+    margin = 4.0
+    low, high = -margin, columns + margin
+    top, bottom = np.minimum(uv[:, 1], uv[:, 3]), np.maximum(uv[:, 1], uv[:, 3])
+    near = (bottom > -margin) & (top < rows + margin) & (np.minimum(uv[:, 0], uv[:, 2]) < high)
+    uv, owner = uv[near], owner[near]
+    if uv.size == 0 or (uv.min() >= low and uv[:, 0::2].max() <= high and uv[:, 1::2].max() <= rows + margin):
+        return uv, owner
+
+    start, step = uv[:, :2], uv[:, 2:] - uv[:, :2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = np.stack(
+            [
+                (low - start[:, 0]) / step[:, 0],
+                (high - start[:, 0]) / step[:, 0],
+                (-margin - start[:, 1]) / step[:, 1],
+                (rows + margin - start[:, 1]) / step[:, 1],
+            ]
+        )
+    crossings = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    t = np.concatenate([np.zeros((1, len(uv))), np.sort(crossings, axis=0), np.ones((1, len(uv)))])
+    points = start + t[..., None] * step
+    points[..., 0] = np.clip(points[..., 0], low, high)
+    pieces = np.concatenate([points[:-1], points[1:]], axis=-1).reshape(-1, 4)
+    owners = np.tile(owner, len(t) - 1)
+    top, bottom = np.minimum(pieces[:, 1], pieces[:, 3]), np.maximum(pieces[:, 1], pieces[:, 3])
+    kept = (bottom > top) & (bottom > -margin + 1e-9) & (top < rows + margin - 1e-9)
+    return np.ascontiguousarray(pieces[kept]), owners[kept]
+
+
+def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
+    """Pixel rows ``first`` to ``first + count`` as (planes, count, width) float32, in plain numpy."""
+    fine, reach, degree = task.spread.oversampling, task.spread.reach, task.spread.degree
+    rows = fine * (count - 1) + 2 * reach + 1
+    differences = _accumulate(task, fine * first, rows, degree)
+    vertical = np.stack([_filtered(plane.T, task.spread, count).T for plane in differences])
+    return _filtered(np.cumsum(vertical, axis=2), task.spread, task.width).astype(np.float32)
+
+
+def _filtered(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
+    """The point spread's weights along the last axis, one result a pixel."""
+    windows = np.lib.stride_tricks.sliding_window_view(samples, len(spread.weights), axis=-1)
+    return np.asarray(
+        windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64)
+    )
+
+
+def _accumulate(task: Task, top: int, rows: int, degree: int) -> NDArray[np.float64]:
+    """Differences along the rows (planes, rows, columns) of the band that starts at sample row ``top``."""
+    pieces, source = _split(task.segments)
+    drop = pieces[:, 3] - pieces[:, 1]
+    nodes, weights = task.quadrature
+    cell = np.floor(0.5 * (pieces[:, :2] + pieces[:, 2:])).astype(np.int64)
+    total = np.zeros((task.values.shape[1], rows * task.columns))
+    for node, weight in zip(nodes, weights, strict=True):
+        u, v = (pieces[:, :2] + node * (pieces[:, 2:] - pieces[:, :2]) - cell).T
+        across, along = _basis(u, degree + 1), _basis(v, degree)
+        for j in range(degree + 1):
+            row = cell[:, 1] - degree // 2 + j - top
+            for i in range(degree + 2):
+                column = np.maximum(cell[:, 0] - degree // 2 + i, 0)
+                inside = (row >= 0) & (row < rows) & (column < task.columns)
+                place = row[inside] * task.columns + column[inside]
+                share = (weight * drop * across[i] * along[j])[inside]
+                for plane in range(len(total)):
+                    value = share * task.values[task.owner[source[inside]], plane]
+                    total[plane] += np.bincount(place, value, minlength=total.shape[1])
+    return total.reshape(-1, rows, task.columns)
+
+
+def _split(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Pieces (n, 4) of the segments that lie inside one sample cell each, and their segments' numbers."""
+    source = [np.arange(len(segments)), np.arange(len(segments))]
+    t = [np.zeros(len(segments)), np.ones(len(segments))]
+    for axis in (0, 1):
+        start, end = segments[:, axis], segments[:, axis + 2]
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        knots = np.maximum(np.ceil(high) - np.floor(low) - 1, 0).astype(np.int64)
+        owner = np.repeat(np.arange(len(segments)), knots)
+        knot = np.arange(len(owner)) - np.repeat(np.cumsum(knots) - knots, knots) + np.floor(low)[owner] + 1
+        source.append(owner)
+        t.append((knot - start[owner]) / (end - start)[owner])
+    all_source, all_t = np.concatenate(source), np.concatenate(t)
+    order = np.lexsort([all_t, all_source])
+    all_source, all_t = all_source[order], all_t[order]
+    xy = segments[all_source, :2] + all_t[:, None] * (segments[all_source, 2:] - segments[all_source, :2])
+    together = all_source[1:] == all_source[:-1]
+    return np.concatenate([xy[:-1], xy[1:]], axis=1)[together], all_source[1:][together]
+
+
+def _basis(t: NDArray[np.float64], degree: int) -> list[NDArray[np.float64]]:
+    """The degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
+    values = [np.ones_like(t)]
+    for d in range(1, degree + 1):
+        below = [np.zeros_like(t), *values, np.zeros_like(t)]
+        values = [((t + d - r) * below[r] + (1 - t + r) * below[r + 1]) / d for r in range(d + 1)]
+    return values

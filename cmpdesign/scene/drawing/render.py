@@ -1,0 +1,235 @@
+"""A scene becomes an image and its ground truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.patterns.colors import BLACK
+from cmpdesign.scene.camera.plain import pitch_mm
+from cmpdesign.scene.drawing.coverage import Engine, coverage
+from cmpdesign.scene.drawing.folds import add_hidden_parts
+from cmpdesign.scene.drawing.paths import join, segments
+from cmpdesign.scene.drawing.view import View, views
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.parts.damage import Blob, Damage, Scratch, bled, missing
+from cmpdesign.scene.parts.light import gain
+from cmpdesign.scene.parts.optics import point_spread
+from cmpdesign.scene.parts.sensor import Sensor, expose
+from cmpdesign.scene.scene import Scene
+from cmpdesign.scene.truth import Truth
+
+Points = NDArray[np.float64]
+Planes = NDArray[np.float32]
+
+# Everything random has a stream of its own, so that one part's change leaves the others as they were.
+BACKGROUND, MISSING, BLEED, NOISE = range(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """An image (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor), its truth, and what it cannot be trusted in."""
+
+    image: NDArray[np.uint8] | NDArray[np.uint16]
+    truth: Truth
+    warnings: tuple[str, ...] = ()
+
+
+def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine = "compiled") -> Rendered:
+    """Draw a scene; ``size`` is (width, height) in px.
+
+    Where several views share the image, what none of them fills is dark.
+
+    Raises:
+        SceneError: the surface folds, a part lies behind a camera or turns away from it, or a value is out of range.
+    """
+    seen = _looked(scene, size)
+    gone = missing_cells(scene)
+    behind = _blurred(scene.background.planes(size, _rng(scene, BACKGROUND)), scene.blur_px)
+    parts = [_drawn(scene, view, gone, behind, engine) for view in seen]
+    planes = _assembled(seen, parts, size)
+    if scene.light:
+        planes = planes * gain(scene.light, size)
+    for glare in scene.damage.glare if scene.damage else ():
+        planes = planes + glare.plane(size)
+    image = expose(scene.sensor or Sensor(), planes, _noise_rng(scene))
+    warnings = (*scene.warnings, *(view.warning for view in seen if view.folds))
+    return Rendered(image, _truth(scene, seen, gone), warnings)
+
+
+def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
+    """The truth of ``render`` without its image."""
+    return _truth(scene, _looked(scene, size), missing_cells(scene))
+
+
+def _looked(scene: Scene, size: tuple[int, int]) -> tuple[View, ...]:
+    if min(size) < 1:
+        raise SceneError(f"size is {size[0]} x {size[1]}; it must be at least 1 x 1 px")
+    return views(scene, size)
+
+
+def _assembled(seen: tuple[View, ...], parts: list[Planes], size: tuple[int, int]) -> Planes:
+    if len(parts) == 1 and parts[0].shape[1:] == size[::-1]:
+        return parts[0]
+    planes = np.zeros((3, size[1], size[0]), dtype=np.float32)
+    for view, part in zip(seen, parts, strict=True):
+        planes[view.window] = part
+    return planes
+
+
+def _drawn(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, engine: Engine) -> Planes:
+    """One view's part of the image: (3, height, width)."""
+    planes = _pattern(scene, view, gone, behind[view.window], engine)
+    if scene.damage and (scene.damage.blobs or scene.damage.scratches):
+        return _with_dirt(planes, scene.damage, scene.blur_px, view, engine)
+    return planes
+
+
+def _rng(scene: Scene, stream: int) -> np.random.Generator:
+    return np.random.default_rng([scene.seed, stream])
+
+
+def _noise_rng(scene: Scene) -> np.random.Generator:
+    """Another stream in every frame of a sequence; all else that is random stays as it is."""
+    return np.random.default_rng([scene.seed, NOISE, scene.frame] if scene.frame else [scene.seed, NOISE])
+
+
+def missing_cells(scene: Scene) -> NDArray[np.bool_]:
+    """(C,) bool: the cells that fell out of this scene's pattern."""
+    if scene.damage is None:
+        return np.zeros(len(scene.layout.cell_color), dtype=np.bool_)
+    return missing(scene.damage, scene.layout, _rng(scene, MISSING))
+
+
+def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, engine: Engine) -> Planes:
+    """Ground over background, inks over ground: (3, height, width), B, G, R, blurred."""
+    layout = scene.layout
+    drawn = np.flatnonzero((layout.cell_color != BLACK) & ~gone)
+    polygons = layout.marker_xy_mm[layout.cell_corners[drawn]]
+    bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
+    if bleed_mm:
+        polygons = bled(polygons, bleed_mm, _rng(scene, BLEED))
+    # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
+    black = _bgr(scene.ink(BLACK))
+    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
+        -1, 3
+    )
+    values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
+    values[0, 3] = 1.0
+    values[1:, :3] = over_black
+    if bleed_mm:
+        values[1:, 4] = 1.0
+    covered = _summed(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
+
+    inks, ground_share = covered[:3], covered[3]
+    if bleed_mm:
+        inks = inks / np.maximum(covered[4], 1.0)
+    black_plane = black.astype(np.float32)[:, None, None]
+    return np.asarray(inks + behind + ground_share * (black_plane - behind), dtype=np.float32)
+
+
+def _summed(view: View, polygons_mm: list[Points], values: Points, blur_px: float, engine: Engine) -> Planes:
+    """(planes, height, width): what polygons (K, n, 2) of the layout add up to in a view's area, hidden parts left out.
+
+    Args:
+        view: the view.
+        polygons_mm: counter-clockwise ones.
+        values: (polygons, planes) what each adds to each plane.
+        blur_px: the optics' blur.
+        engine: see ``coverage``.
+    """
+    spread, folds = point_spread(blur_px), view.folds
+    seen = join([segments(part, view.area_from_layout, view.curved) for part in polygons_mm])
+    planes = coverage(seen, values, view.area[2:], spread, engine, view.orientation)
+    if folds is not None:
+        flat = join([segments(part, folds.texels_from_layout, False) for part in polygons_mm])
+        texture = coverage(flat, values, folds.texture_size, point_spread(0.0), engine)
+        add_hidden_parts(planes, folds, texture, blur_px)
+    return planes
+
+
+def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
+    return np.asarray(rgb[::-1], dtype=np.float64)
+
+
+def _blurred(planes: Planes, blur_px: float) -> Planes:
+    """The background is a picture, not a shape: an ordinary blur does."""
+    if blur_px == 0 or not any(planes.strides[1:]):
+        return planes
+    import cv2
+
+    return np.stack([cv2.GaussianBlur(plane, (0, 0), blur_px) for plane in planes])
+
+
+def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engine: Engine) -> Planes:
+    """Blobs and scratches over the pattern; where they overlap, they mix."""
+    spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
+    values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
+    covered = _summed(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
+    overlap = np.maximum(covered[3], 1.0)
+    return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
+
+
+def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Truth:
+    """Of one view as it is; of a tuple of views with a leading axis."""
+    layout, lift = scene.layout, seen[0].xyz_from_layout
+    xyz = lift(layout.marker_xy_mm), lift(layout.virtual_xy_mm.reshape(-1, 2))
+    parts = [_seen(scene, view, gone, *xyz) for view in seen]
+    columns = {name: [part[name] for part in parts] for name in parts[0]}
+    several = isinstance(scene.camera, tuple)
+    flat = [view.h for view in seen if view.h is not None]
+    return Truth(
+        **{name: np.stack(values) if several else values[0] for name, values in columns.items()},
+        mirrored=np.array([view.mirrored for view in seen]) if several else seen[0].mirrored,
+        H=None if len(flat) < len(seen) else np.stack(flat) if several else flat[0],
+        marker_xyz_mm=xyz[0],
+        virtual_xyz_mm=xyz[1].reshape(*layout.virtual_xy_mm.shape[:2], 3),
+    )
+
+
+def _seen(
+    scene: Scene, view: View, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
+) -> dict[str, NDArray[Any]]:
+    """What one view has its own values of."""
+    layout, step_mm = scene.layout, 1e-4 * pitch_mm(scene.layout)
+    marker_xy_px = view.project(marker_xyz_mm)
+    inside = view.contains(marker_xy_px)
+    samples = _cell_samples(scene)
+    away = view.hides(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
+    damaged = gone | ((_covered(scene, view, samples) | away).mean(axis=1) >= 0.5)
+    touching = np.zeros(len(marker_xy_px), dtype=np.bool_)
+    touching[layout.cell_corners[(layout.cell_color != BLACK) & ~damaged]] = True
+    hidden = _covered(scene, view, layout.marker_xy_mm[:, None])[:, 0]
+    hidden |= view.hides(layout.marker_xy_mm, step_mm)
+    return {
+        "marker_xy_px": marker_xy_px,
+        "visible": inside & touching & ~hidden,
+        "virtual_xy_px": view.project(virtual_xyz_mm).reshape(layout.virtual_xy_mm.shape),
+        "cell_visible": inside[layout.cell_corners].all(axis=1) & ~damaged,
+    }
+
+
+def _cell_samples(scene: Scene) -> Points:
+    """(C, samples, 2) mm: every cell's centre, and points towards its corners and sides."""
+    corners = scene.layout.marker_xy_mm[scene.layout.cell_corners]
+    centre = corners.mean(axis=1, keepdims=True)
+    rim = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
+    return np.concatenate([centre, centre + 0.6 * (rim - centre)], axis=1)
+
+
+def _covered(scene: Scene, view: View, xy_mm: Points) -> NDArray[np.bool_]:
+    """Which of the points (N, n, 2) mm lie under dirt or glare."""
+    covered = np.zeros(xy_mm.shape[:2], dtype=np.bool_)
+    if scene.damage is None:
+        return covered
+    spots: list[Blob | Scratch] = [*scene.damage.blobs, *scene.damage.scratches]
+    for spot in spots:
+        covered |= spot.covers(xy_mm)
+    if scene.damage.glare:
+        xy_px = view.image_from_layout(xy_mm.reshape(-1, 2)).reshape(xy_mm.shape)
+        for glare in scene.damage.glare:
+            covered |= glare.covers(xy_px)
+    return covered

@@ -1,0 +1,209 @@
+"""The way from the layout to the image: the scene's surface seen by one of its cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.scene.camera.pinhole import Area, Pinhole, depth_mm, project_3d
+from cmpdesign.scene.camera.plain import Camera, homography, is_mirrored, pinhole, pitch_mm, project
+from cmpdesign.scene.drawing.folds import Folds, find_folds, hidden
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.parts.surface import determinant, points_to_check, require_no_fold
+from cmpdesign.scene.scene import Scene
+
+Points = NDArray[np.float64]
+Map = Callable[[Points], Points]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One view of a scene.
+
+    Attributes:
+        xyz_from_layout: (N, 2) mm to (N, 3) mm, the surface in space.
+        project: (N, 3) mm to (N, 2) px of the whole image.
+        area: x, y, width, height of its part of the image.
+        mirrored: the pattern's back is seen.
+        h: (3, 3) image from layout; None where straight lines do not stay straight.
+        camera: None where the surface stays in the layout's plane and depth means nothing.
+        folds: where the surface turns away from the camera; None: nowhere.
+    """
+
+    xyz_from_layout: Map
+    project: Map
+    area: Area
+    mirrored: bool
+    h: Points | None
+    camera: Pinhole | None = None
+    folds: Folds | None = None
+
+    @property
+    def curved(self) -> bool:
+        return self.h is None
+
+    @property
+    def window(self) -> tuple[slice, slice, slice]:
+        """The area's place in planes (3, H, W)."""
+        x, y, width, height = self.area
+        return slice(None), slice(y, y + height), slice(x, x + width)
+
+    def image_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to px of the whole image."""
+        return self.project(self.xyz_from_layout(xy_mm))
+
+    def area_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to px, counted from the area's own top left pixel."""
+        at = self.image_from_layout(xy_mm)
+        return at - self.area[:2] if any(self.area[:2]) else at
+
+    @property
+    def sign(self) -> float:
+        """Of the Jacobian determinant of ``image_from_layout`` where the surface faces the camera."""
+        return 1.0 if self.mirrored else -1.0
+
+    @property
+    def orientation(self) -> float | None:
+        """Of polygons that are counter-clockwise in the layout; None where all of them face the camera anyway."""
+        return self.sign if self.folds is not None else None
+
+    @property
+    def warning(self) -> str:
+        """That a part turns away, how much and where; empty where none does."""
+        if self.folds is None:
+            return ""
+        x, y = self.folds.place_mm
+        name = f"view {self.camera.name}: " if self.camera and self.camera.name else ""
+        return (
+            f"{name}{100 * self.folds.share:.2g} % of the pattern turn away from the camera, among others at "
+            f"({x:.3g}, {y:.3g}) mm; what they hide is marked as not visible"
+        )
+
+    def hides(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
+        """Which of the points (N, 2) mm of the layout lie behind another part of the surface, or turn away."""
+        if self.folds is None:
+            return np.zeros(len(xy_mm), dtype=np.bool_)
+        facing = self.sign * determinant(self.image_from_layout, xy_mm, step_mm) > 0
+        return hidden(self.folds, self.depth_from_layout(xy_mm), facing)
+
+    def depth_from_layout(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
+        assert self.camera is not None
+        xyz = self.xyz_from_layout(xy_mm)
+        xy_px = self.project(xyz) - self.area[:2]
+        return np.column_stack([xy_px, depth_mm(self.camera, xyz)])
+
+    def contains(self, xy_px: Points) -> NDArray[np.bool_]:
+        """Which of the points (N, 2) px of the image lie in the area."""
+        corner, size = np.asarray(self.area[:2]), np.asarray(self.area[2:])
+        inside = (xy_px >= corner - 0.5) & (xy_px < corner + size - 0.5)
+        return np.asarray(inside.all(axis=1))
+
+
+def look(scene: Scene, size: tuple[int, int]) -> View:
+    """The only view of a scene.
+
+    Raises:
+        SceneError: it has several; the surface folds; a part lies behind the camera or turns away from it.
+    """
+    if isinstance(scene.camera, tuple) and len(scene.camera) > 1:
+        raise SceneError(
+            f"the scene has {len(scene.camera)} views, one is needed; take the scene with camera = one of them"
+        )
+    return views(scene, size)[0]
+
+
+def views(scene: Scene, size: tuple[int, int]) -> tuple[View, ...]:
+    """All views of a scene in an image of ``size`` (width, height).
+
+    Raises:
+        SceneError: the surface folds; a part lies behind a camera or turns away from it; views overlap.
+    """
+    cameras = scene.camera if isinstance(scene.camera, tuple) else (scene.camera,)
+    areas = [_area(camera, size) for camera in cameras]
+    _require_apart(areas, cameras)
+    lift = _lift(scene)
+    return tuple(_view(scene, camera, area, lift, size) for camera, area in zip(cameras, areas, strict=True))
+
+
+def _area(camera: Camera | Pinhole, size: tuple[int, int]) -> Area:
+    if isinstance(camera, Camera) or camera.area_px is None:
+        return (0, 0, *size)
+    x, y, width, height = camera.area_px
+    if x + width > size[0] or y + height > size[1]:
+        raise SceneError(
+            f"area_px {camera.area_px}{_of(camera)} leaves the image of {size[0]} x {size[1]} px; "
+            "make the area smaller or the image larger"
+        )
+    return camera.area_px
+
+
+def _require_apart(areas: list[Area], cameras: tuple[Camera | Pinhole, ...]) -> None:
+    for i, (x, y, width, height) in enumerate(areas):
+        for j in range(i):
+            other_x, other_y, other_width, other_height = areas[j]
+            if min(x + width, other_x + other_width) > max(x, other_x) and (
+                min(y + height, other_y + other_height) > max(y, other_y)
+            ):
+                raise SceneError(
+                    f"the views {_name(cameras[j], j)} and {_name(cameras[i], i)} share pixels of the image: "
+                    f"area_px {areas[j]} and {areas[i]}; give each its own area_px"
+                )
+
+
+def _name(camera: Camera | Pinhole, number: int) -> str:
+    return getattr(camera, "name", "") or str(number)
+
+
+def _of(camera: Camera | Pinhole) -> str:
+    name = getattr(camera, "name", "")
+    return f" of view {name}" if name else ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Lift:
+    """The surface as it was given, and whether it leads out of the plane."""
+
+    surface: Map | None
+    spatial: bool
+
+    def __call__(self, xy_mm: Points) -> Points:
+        """(N, 2) mm to (N, 3) mm."""
+        at = xy_mm if self.surface is None else self.surface(xy_mm)
+        if at.shape[1] == 3:
+            return at
+        xyz = np.zeros((len(at), 3))
+        xyz[:, :2] = at
+        return xyz
+
+
+def _lift(scene: Scene) -> _Lift:
+    layout, surface = scene.layout, scene.surface
+    if surface is None:
+        return _Lift(None, False)
+    spatial = surface(layout.marker_xy_mm[:1]).shape[1] == 3
+    if not spatial:
+        checked = points_to_check(layout.marker_xy_mm, layout.cell_corners)
+        require_no_fold(surface, checked, 1e-4 * pitch_mm(layout))
+    return _Lift(surface, spatial)
+
+
+def _view(scene: Scene, camera: Camera | Pinhole, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
+    if isinstance(camera, Camera) and not lift.spatial:
+        return _planar_view(scene, camera, area, lift, size)
+    at = camera if isinstance(camera, Pinhole) else pinhole(camera, scene.layout, size)
+    h = at.homography if lift.surface is None else None
+    view = View(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
+    if not view.curved:
+        return view
+    return replace(view, folds=find_folds(scene.layout, view.depth_from_layout, view.sign, area[2:]))
+
+
+def _planar_view(scene: Scene, camera: Camera, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
+    h = homography(camera, scene.layout, size)
+    straight = h if lift.surface is None else None
+    mirrored = is_mirrored(camera, scene.layout)
+    return View(lift, lambda xyz_mm: project(h, xyz_mm[:, :2]), area, mirrored, straight)

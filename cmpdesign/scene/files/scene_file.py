@@ -1,0 +1,228 @@
+"""Scene files: a TOML that composes a scene or a sequence of them; what is absent is not computed."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmpdesign.layout.layout import Layout
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.scene.camera.pinhole import Pinhole
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.files.key_frames import Keys, flattened, with_values
+from cmpdesign.scene.files.tables import (
+    BackgroundTable,
+    SceneTables,
+    SurfaceTable,
+    read_background,
+    read_tables,
+)
+from cmpdesign.scene.parts.background import Background, Picture, Plain
+from cmpdesign.scene.parts.surface import composed
+from cmpdesign.scene.scene import Scene
+
+Map = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneFile:
+    """A scene file with a layout.
+
+    Attributes:
+        path: where it lies; a background's picture is looked for beside it.
+        layout: the pattern.
+        document: the TOML as it was read, its [sequence] left out.
+        size_px: the image's (width, height).
+        frames: 1 without [sequence].
+        fps: frames a second; None without [sequence].
+        values: key frames by dotted path.
+    """
+
+    path: Path
+    layout: Layout
+    document: Mapping[str, Any]
+    size_px: tuple[int, int]
+    frames: int = 1
+    fps: float | None = None
+    values: Mapping[str, Keys] = field(default_factory=dict)
+
+    def time_s(self, frame: int) -> float:
+        """When a frame is seen."""
+        return frame / self.fps if self.fps else 0.0
+
+    @property
+    def bits(self) -> int:
+        """Of the pictures."""
+        sensor = self._tables(0).sensor
+        return sensor.bits if sensor else 8
+
+    def scene(self) -> Scene:
+        """The scene; of a sequence the first frame's.
+
+        Raises:
+            SceneError: names file, table and key.
+        """
+        return next(self.scenes())
+
+    def scenes(self) -> Iterator[Scene]:
+        """The scene of every frame, in order; each is made when it is asked for.
+
+        Raises:
+            SceneError: names file, table and key.
+        """
+        with _naming(self.path):
+            pressed = self._pressed()
+            for frame in range(self.frames):
+                tables = self._tables(frame)
+                contact = next(pressed, None)
+                parts = list(_deformations(tables.surface, self.document))
+                if contact is not None:
+                    parts.append(contact.surface())
+                yield Scene(
+                    **_parts(tables, self),
+                    surface=composed(*parts) if parts else None,
+                    seed=tables.seed,
+                    frame=frame,
+                    warnings=() if contact is None else contact.warnings,
+                )
+
+    def _pressed(self) -> Iterator[Any]:
+        """The contact of every frame; nothing, and nothing imported, without [contact]."""
+        if "contact" not in self.document:
+            return
+        from cmpdesign.scene.files.contacts import contacts
+
+        tables = [self._tables(frame).contact or {} for frame in range(self.frames)]
+        yield from contacts(tables, list(self.values), self.path.parent)
+
+    def _tables(self, frame: int) -> SceneTables:
+        return read_tables(with_values(self.document, self.values, self.time_s(frame)))
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Errors open with the file's name."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def load_scene(
+    path: str | Path, layout: Layout, *, size_px: tuple[int, int] | None = None, seed: int | None = None
+) -> SceneFile:
+    """Read and check a scene file, at every key frame of a sequence, too; nothing is drawn or solved yet.
+
+    Args:
+        path: the TOML file.
+        layout: the pattern.
+        size_px, seed: in place of the file's own.
+
+    Raises:
+        SceneError: the file cannot be read, is no TOML, or has a name or value that is not allowed.
+    """
+    path = Path(path)
+    with _naming(path):
+        document = _document(path)
+        given = {"size_px": size_px and list(size_px), "seed": seed}
+        document |= {name: value for name, value in given.items() if value is not None}
+        sequence = document.pop("sequence", None)
+        if isinstance(sequence, dict) and isinstance(sequence.get("values"), dict):
+            sequence = {**sequence, "values": flattened(sequence["values"])}
+        tables = read_tables(document if sequence is None else {**document, "sequence": sequence})
+        found = SceneFile(path, layout, document, tables.size_px)
+        if tables.sequence is not None:
+            frames, fps, values = tables.sequence.frames, tables.sequence.fps, tables.sequence.values
+            found = replace(found, frames=frames, fps=fps, values=MappingProxyType(values))
+        for time_s in sorted({0.0} | {key[0] for keys in found.values.values() for key in keys}):
+            _check(read_tables(with_values(document, found.values, time_s)), found)
+    return found
+
+
+def _check(tables: SceneTables, file: SceneFile) -> None:
+    """What can be wrong before anything is solved or drawn."""
+    _parts(tables, file)
+    if tables.contact is not None:
+        from cmpdesign.scene.files.contacts import check_contact
+
+        check_contact(tables.contact, file.path.parent)
+
+
+def _document(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise SceneError("is no UTF-8 text, so no TOML") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"is no valid TOML: {error}") from None
+
+
+def _parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
+    """All but the surface, which may have to be solved for."""
+    return {
+        "layout": file.layout,
+        "camera": _camera(tables),
+        "light": tables.light,
+        "background": _background(tables, file.path),
+        "optics": tables.optics,
+        "sensor": tables.sensor,
+        "damage": tables.damage,
+        "inks": {name: _rgb(value, name) for name, value in tables.inks.items()},
+    }
+
+
+def _camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
+    """One [[view]] is a view as any other; several make a tuple, and the truth gets a leading axis."""
+    if tables.view is None:
+        return tables.camera or Camera()
+    cameras = []
+    for number, table in enumerate(tables.view):
+        try:
+            cameras.append(table.pinhole(tables.size_px))
+        except SceneError as error:
+            raise SceneError(f"[[view]] {number}: {error}") from None
+    return cameras[0] if len(cameras) == 1 else tuple(cameras)
+
+
+def _deformations(table: SurfaceTable | None, document: Mapping[str, Any]) -> Iterator[Map]:
+    """In the order in which the file has them."""
+    if table is not None:
+        for name in document["surface"]:
+            yield getattr(table, name)
+
+
+def _background(tables: SceneTables, path: Path) -> Background:
+    if tables.background is None:
+        return Plain()
+    found = read_background(tables.background)
+    if not isinstance(found, BackgroundTable):
+        return found  # type: ignore[no-any-return]
+    from cmpdesign.files.images import ImageFileError, read_image
+
+    try:
+        picture = read_image(path.parent / found.path)
+    except ImageFileError as error:
+        raise SceneError(f"[background] path: {error}") from None
+    return Picture(picture.astype(np.uint8) if picture.dtype == np.uint8 else (picture >> 8).astype(np.uint8))
+
+
+def _rgb(value: tuple[float, float, float] | str, name: str) -> tuple[float, float, float]:
+    if name not in COLORS:
+        raise SceneError(f"[inks] {name} is unknown; the inks are {', '.join(COLORS)}")
+    if not isinstance(value, str):
+        return value
+    digits = value.removeprefix("#")
+    if len(digits) != 6 or any(digit not in "0123456789abcdefABCDEF" for digit in digits):
+        raise SceneError(f'[inks] {name} is "{value}"; write "#c8322d" or [200, 50, 45]')
+    return int(digits[0:2], 16), int(digits[2:4], 16), int(digits[4:6], 16)

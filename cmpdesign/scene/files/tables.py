@@ -1,0 +1,265 @@
+"""The tables of a scene file, checked: every name and number, before anything is drawn.
+
+A part's table has the names of its dataclass (``Camera``, ``Light`` ...), so there is one definition of each.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from itertools import pairwise
+from types import UnionType
+from typing import Any, Literal, Self, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from cmpdesign.scene.camera.pinhole import Pinhole
+from cmpdesign.scene.camera.plain import Camera
+from cmpdesign.scene.errors import STRICT, SceneError
+from cmpdesign.scene.parts.background import Busy, Gradient, Paper, Plain
+from cmpdesign.scene.parts.damage import Damage
+from cmpdesign.scene.parts.light import Light
+from cmpdesign.scene.parts.optics import Optics
+from cmpdesign.scene.parts.sensor import Sensor
+from cmpdesign.scene.parts.surface import Dent, Press, Shear, Twist
+
+Row = tuple[float, float, float]
+RGB = tuple[float, float, float]
+PLACED = ("focal_px", "centre_px", "R_camera_from_layout", "t_camera_from_layout_mm")
+LOOKING = ("distance_mm", "field_of_view_deg", "tilt_deg", "azimuth_deg", "roll_deg", "target_mm", "back")
+BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
+# A place may be given as [x, y] or [x, y, z] and a value as a number: all are rows of numbers to the key frames.
+Value = float | tuple[float, ...]
+
+
+class Table(BaseModel):
+    """Strict and frozen, as all tables are."""
+
+    model_config = ConfigDict(frozen=True, **STRICT)  # type: ignore[typeddict-item]
+
+
+class ViewTable(Table):
+    """[[view]]: a pinhole, placed by its pose or by what it looks at."""
+
+    name: str = ""
+    area_px: tuple[int, int, int, int] | None = None
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    mirrored: bool | None = None
+    focal_px: tuple[float, float] | None = None
+    centre_px: tuple[float, float] | None = None
+    R_camera_from_layout: tuple[Row, Row, Row] | None = None
+    t_camera_from_layout_mm: Row | None = None
+    distance_mm: float | None = None
+    field_of_view_deg: float | None = None
+    tilt_deg: float = 0.0
+    azimuth_deg: float = 0.0
+    roll_deg: float = 0.0
+    target_mm: Row = (0.0, 0.0, 0.0)
+    back: bool = False
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        given = self.model_fields_set
+        looking = [name for name in LOOKING if name in given]
+        placed = [name for name in PLACED if name in given]
+        if looking and placed:
+            raise ValueError(f"{placed[0]} and {looking[0]} place the camera twice; leave one of the two out")
+        needed = LOOKING[:2] if looking else PLACED
+        for name in needed:
+            if name not in given:
+                other = PLACED if looking else LOOKING[:2]
+                raise ValueError(f"{name} is missing (or give {', '.join(other)} alone)")
+        return self
+
+    def pinhole(self, size: tuple[int, int]) -> Pinhole:
+        """The camera, in an image of ``size``."""
+        if self.distance_mm is None:
+            camera = Pinhole(
+                cast(tuple[float, float], self.focal_px),
+                cast(tuple[float, float], self.centre_px),
+                self.distortion,
+                np.array(self.R_camera_from_layout),
+                np.array(self.t_camera_from_layout_mm),
+                self.area_px,
+                self.name,
+            )
+            odd = bool(np.linalg.det(camera.R_camera_from_layout) < 0)
+            if self.mirrored is not None and self.mirrored != odd:
+                raise SceneError(
+                    f"mirrored is {str(self.mirrored).lower()}, but the determinant of R_camera_from_layout is "
+                    f"{-1 if odd else 1}; it is -1 where an odd number of mirrors stands between, leave one out"
+                )
+            return camera
+        looking = {name: getattr(self, name) for name in (*LOOKING, "distortion", "area_px", "name")}
+        return Pinhole.looking(size, mirror=bool(self.mirrored), **looking)
+
+
+class SurfaceTable(Table):
+    """[surface]: deformations, in the order in which the file has them."""
+
+    press: Press | None = None
+    twist: Twist | None = None
+    shear: Shear | None = None
+    dent: Dent | None = None
+
+
+class SequenceTable(Table):
+    """[sequence]: how many frames, and which values go from where to where.
+
+    ``values`` holds, for a dotted path of names, key frames [time in s, value]; between them a value goes straight.
+    """
+
+    frames: int = Field(ge=1, le=1_000_000)
+    fps: float = Field(default=30.0, gt=0, le=10_000)
+    values: dict[str, tuple[tuple[float, Value], ...]]
+
+    @model_validator(mode="after")
+    def _increasing(self) -> Self:
+        for path, keys in self.values.items():
+            times = [key[0] for key in keys]
+            if not times or any(b <= a for a, b in pairwise(times)):
+                raise ValueError(
+                    f"values.{path}: the times are {times}; give at least one, each later than before"
+                )
+            if len({len(v) if isinstance(v, tuple) else -1 for _, v in keys}) != 1:
+                raise ValueError(
+                    f"values.{path}: its values have different shapes; give each as many numbers"
+                )
+        return self
+
+
+class BackgroundTable(Table):
+    """[background] of a picture; those that are generated have the names of their dataclass."""
+
+    kind: Literal["picture"]
+    path: str
+
+
+class SceneTables(Table):
+    """A whole scene file. What is absent is None and neither asked for nor computed."""
+
+    size_px: tuple[int, int] = (640, 480)
+    seed: int = Field(default=0, ge=0)
+    camera: Camera | None = None
+    view: tuple[ViewTable, ...] | None = None
+    surface: SurfaceTable | None = None
+    contact: dict[str, Any] | None = None
+    light: Light | None = None
+    background: dict[str, Any] | None = None
+    optics: Optics | None = None
+    sensor: Sensor | None = None
+    damage: Damage | None = None
+    inks: dict[str, RGB | str] = {}
+    sequence: SequenceTable | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.camera is not None and self.view is not None:
+            raise ValueError("[camera] and [[view]] both say where the pattern is seen from; leave one out")
+        if self.view is not None and not self.view:
+            raise ValueError("view is empty; give at least one [[view]] table or none")
+        if not all(10 <= side <= 9999 for side in self.size_px):
+            raise ValueError(f"size_px is {list(self.size_px)}; each side must lie between 10 and 9999 px")
+        return self
+
+
+def read_tables(document: Mapping[str, Any]) -> SceneTables:
+    """A TOML document as tables.
+
+    Raises:
+        SceneError: names table, key, value and limit; for an unknown name the nearest known one.
+    """
+    return cast(SceneTables, _read(SceneTables, document, ""))
+
+
+def read_background(table: Mapping[str, Any]) -> Any:
+    """[background]: the part itself, or a ``BackgroundTable`` for a picture.
+
+    Raises:
+        SceneError: see ``read_tables``.
+    """
+    kinds = [*BACKGROUNDS, "picture"]
+    kind = table.get("kind")
+    if kind not in kinds:
+        raise SceneError(
+            f"[background] kind is {kind!r}{_nearest(str(kind), kinds)}; it is one of {', '.join(kinds)}"
+        )
+    if kind == "picture":
+        return _read(BackgroundTable, table, "background")
+    return _read(BACKGROUNDS[str(kind)], {key: table[key] for key in table if key != "kind"}, "background")
+
+
+def _read(model: type, table: Mapping[str, Any], where: str) -> Any:
+    try:
+        # As JSON, a list may become a tuple and a table a dataclass, and yet a text is no number.
+        return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
+    except ValidationError as error:
+        # A value that fits none of several types is reported once for each of them.
+        messages = dict.fromkeys(_message(item, model, where) for item in error.errors())
+        raise SceneError("; ".join(messages)) from None
+
+
+def _message(item: Any, model: type, where: str) -> str:
+    inner = [part for part in item["loc"] if not _names_a_type(part)]
+    path: list[int | str] = [where, *inner] if where else inner
+    text, kind = item["msg"].removeprefix("Value error, ").removeprefix("Input should be "), item["type"]
+    if kind == "value_error":  # a part's own check: its path leads to the part, and the message names the key
+        return f"{_table(path)}{text}"
+    table, key = _table(path[:-1]), str(path[-1])
+    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
+        known = _names(model, inner[:-1])
+        return f"{table}{key} is unknown{_nearest(key, known)}; there are {', '.join(known)}"
+    if kind == "too_long":
+        found, most = item["ctx"]["actual_length"], item["ctx"]["max_length"]
+        return f"{table}{key} has {found} values; it takes {most}"
+    if kind in ("missing", "missing_argument"):
+        few = isinstance(inner[-1], int)
+        return f"{_table(path[:-2])}{path[-2]} has too few values" if few else f"{table}{key} is missing"
+    unit = next((f" in {unit}" for unit in ("mm", "deg", "px") if key.endswith(f"_{unit}")), "")
+    text = text.replace("an object", "a table").replace("a valid array", "a list")
+    shown = "a table" if isinstance(item["input"], dict) else json.dumps(item["input"])
+    return f"{table}{key} is {shown}; it must be {text}{unit}"
+
+
+def _names_a_type(part: int | str) -> bool:
+    """Pydantic puts the types that it tried, too, into a place's path."""
+    return isinstance(part, str) and (part in ("float", "str") or "[" in part)
+
+
+def _table(path: list[int | str]) -> str:
+    """ "[light] leds.0." of the path to a table; nothing at the top."""
+    if not path:
+        return ""
+    name, *rest = path
+    head = f"[[view]] {rest.pop(0)}: " if name == "view" and rest else f"[{name}] "
+    return head + "".join(f"{part}." for part in rest)
+
+
+def _names(model: Any, path: list[int | str]) -> list[str]:
+    """The names that the table at a path may have."""
+    for part in path:
+        if not isinstance(part, int):
+            model = _inner(_hints(model)[part])
+    return list(_hints(model))
+
+
+def _hints(model: Any) -> dict[str, Any]:
+    if is_dataclass(model):
+        hints = get_type_hints(model)
+        return {field.name: hints[field.name] for field in fields(model)}
+    return {name: field.annotation for name, field in model.model_fields.items()}
+
+
+def _inner(hint: Any) -> Any:
+    """The table's class in "Led | None" or "tuple[Led, ...]"."""
+    if get_origin(hint) in (Union, UnionType, tuple):
+        return next(found for found in map(_inner, get_args(hint)) if found not in (type(None), Ellipsis))
+    return hint
+
+
+def _nearest(word: str, known: list[str]) -> str:
+    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {found[0]}?)" if found else ""

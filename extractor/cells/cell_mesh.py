@@ -1,0 +1,144 @@
+"""Stage 6: the cells' centers become a triangular mesh; its triangles are the markers and the black cells.
+
+The centers of the colored cells form a lattice as regular as the pattern's own, and a center stays where it is
+when blur has long eaten the corners. Every marker is a triangle of a red, a green and a blue center, and so is
+every black cell; the two kinds turn in opposite directions. In that lattice, cells of one ink are second
+neighbours: an edge of the mesh that joins two of them runs across the wrong diagonal and is flipped, so that the
+colors find the right neighbours even where shear has made the wrong ones nearer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.cells.cells import Cells
+from extractor.numeric.compilation import compiled, lent
+from extractor.numeric.delaunay import delaunay
+
+MAX_FLIP_ROUNDS = 12
+# A triangle of three neighbouring centers is as large as a cell; one that spans a gap is at least twice that.
+MIN_AREA_RATIO = 0.4
+MAX_AREA_RATIO = 1.9
+# Neighbouring cells share a corner (eq. 5): L in units of the edge of an equilateral cell of the smaller area.
+SHARED_CORNER = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Stage 6.
+
+    Attributes:
+        faces: (F, 3) int32, the cells of each triangle as red, green, blue; -1 thrice where it is none.
+        neighbours: (F, 3) int32, the face across the edge opposite to that cell, or -1.
+        turn: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 for no face.
+    """
+
+    faces: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+    turn: NDArray[np.int8]
+
+
+@lent
+def _place_of(rows, i, value):  # type: ignore[no-untyped-def]
+    """The place of a value among the three of row i."""
+    return 0 if rows[i, 0] == value else 1 if rows[i, 1] == value else 2
+
+
+@lent
+def _cross(xy, a, b, c):  # type: ignore[no-untyped-def]
+    """Twice the signed area of a, b, c; positive clockwise with y down."""
+    x, y = xy[a, 0], xy[a, 1]
+    return (xy[b, 0] - x) * (xy[c, 1] - y) - (xy[b, 1] - y) * (xy[c, 0] - x)
+
+
+@compiled
+def _flip(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
+    """Flip edges between cells of one ink, in place, where the other diagonal joins two different inks."""
+    for _ in range(MAX_FLIP_ROUNDS):
+        flips = 0
+        for f in range(faces.shape[0]):
+            for k in range(3):
+                g = neighbours[f, k]
+                if g < f:
+                    continue
+                a, b, c = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], faces[f, k]
+                j = _place_of(neighbours, g, f)
+                d = faces[g, j]
+                if ink[a] != ink[b] or ink[c] == ink[d] or ink[c] == ink[a] or ink[d] == ink[a]:
+                    continue
+                # the four must be convex: both new triangles turn the same way
+                if _cross(points, c, a, d) * _cross(points, c, d, b) <= 0.0:
+                    continue
+                beyond_bc, beyond_ca = neighbours[f, (k + 1) % 3], neighbours[f, (k + 2) % 3]
+                beyond_ad = neighbours[g, _place_of(faces, g, b)]
+                beyond_db = neighbours[g, _place_of(faces, g, a)]
+                # f becomes c, a, d and g becomes c, d, b
+                faces[f, 0], faces[f, 1], faces[f, 2] = c, a, d
+                neighbours[f, 0], neighbours[f, 1], neighbours[f, 2] = beyond_ad, g, beyond_ca
+                faces[g, 0], faces[g, 1], faces[g, 2] = c, d, b
+                neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = beyond_db, beyond_bc, f
+                if beyond_ad >= 0:
+                    neighbours[beyond_ad, _place_of(neighbours, beyond_ad, g)] = f
+                if beyond_bc >= 0:
+                    neighbours[beyond_bc, _place_of(neighbours, beyond_bc, f)] = g
+                flips += 1
+                break
+        if flips == 0:
+            break
+
+
+@lent
+def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
+    """True when two cells have a corner in common, or when one of them has no triangle to tell."""
+    if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):
+        return True
+    limit = SHARED_CORNER * SHARED_CORNER * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
+    nearest = np.inf
+    for i in range(3):
+        for j in range(3):
+            dx, dy = corner[a, i, 0] - corner[b, j, 0], corner[a, i, 1] - corner[b, j, 1]
+            nearest = min(nearest, dx * dx + dy * dy)
+    return nearest < limit
+
+
+@compiled
+def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-untyped-def]
+    """Put every face in the order red, green, blue and drop those that are neither a marker nor a black cell."""
+    count = faces.shape[0]
+    ordered = np.full((count, 3), -1, np.int32)
+    across = np.full((count, 3), -1, np.int32)
+    turn = np.zeros(count, np.int8)
+    for f in range(count):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
+            continue
+        size = 0.5 * abs(_cross(points, a, b, c))
+        mean = (area[a] + area[b] + area[c]) / 3.0
+        if size < MIN_AREA_RATIO * mean or size > MAX_AREA_RATIO * mean:
+            continue
+        if not (_share_corner(corner, area, a, b) and _share_corner(corner, area, b, c)):
+            continue
+        if not _share_corner(corner, area, c, a):
+            continue
+        for k in range(3):
+            ordered[f, ink[faces[f, k]] - 1] = faces[f, k]
+            across[f, ink[faces[f, k]] - 1] = neighbours[f, k]
+        turn[f] = 1 if _cross(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0 else -1
+    for f in range(count):
+        for k in range(3):
+            g = across[f, k]
+            if g >= 0 and turn[g] != -turn[f]:
+                across[f, k] = -1
+    return ordered, across, turn
+
+
+def build_mesh(cells: Cells) -> Mesh | None:
+    """Stage 6: Delaunay triangles of the centers, corrected by color; None with fewer than three cells."""
+    faces, neighbours = delaunay(cells.center_px)
+    if len(faces) == 0:  # all on one line
+        return None
+    _flip(cells.center_px, cells.ink, faces, neighbours)
+    return Mesh(*_judge(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours))

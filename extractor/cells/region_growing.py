@@ -1,0 +1,146 @@
+"""Stage 4: the adaptive growing algorithm (AGA, the article's eq. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.cells.seeds import MOMENTS, Seeds
+from extractor.image.color import HUES
+from extractor.image.ink_segmentation import Segmentation
+from extractor.numeric.compilation import compiled, lent_vectorized
+
+GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
+FRAME = -1  # the owner of what lies around the image
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Stage 4.
+
+    Attributes:
+        owner: (H, W) int32, the region that a pixel belongs to, counted from 1; 0 is none.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+        seed: (N, 2) int32, the pixel about which the moments are taken.
+        moments: (N, 10) float64: sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
+        domain_px: (N,) int64, the area of the domain that the seed stood for.
+    """
+
+    owner: NDArray[np.int32]
+    ink: NDArray[np.uint8]
+    seed: NDArray[np.int32]
+    moments: NDArray[np.float64]
+    domain_px: NDArray[np.int64]
+
+
+@lent_vectorized
+def _add_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
+    """Write the moments of the first pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+    m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(np.uint64(count)):
+        x, y = float(x_of[i] - x0), float(y_of[i] - y0)
+        xx, xy, yy = x * x, x * y, y * y
+        m1 += x
+        m2 += y
+        m3 += xx
+        m4 += xy
+        m5 += yy
+        m6 += xx * x
+        m7 += xx * y
+        m8 += x * yy
+        m9 += yy * y
+    for k, value in enumerate((float(count), m1, m2, m3, m4, m5, m6, m7, m8, m9)):
+        moments[region, k] = value
+
+
+@compiled
+def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[no-untyped-def]
+    """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it.
+
+    Returns the owners in a frame one pixel wide that nothing grows into, and the moments.
+    """
+    height, width = label.shape
+    wide = width + 2
+    owner = np.full((height + 2, wide), FRAME, np.int32)
+    owner[1:-1, 1:-1] = 0
+    owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
+    queue = np.empty(limit_px + 2, np.int32)  # of pixels
+    framed = np.empty(limit_px + 2, np.int32)  # the same in the frame
+    moments = np.zeros((seed_xy.shape[0], MOMENTS))
+    limit2 = threshold * threshold
+    half, one, two = HUES // 2, np.uint64(1), np.uint64(2)
+    for region in range(seed_xy.shape[0]):
+        sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
+        first, start = sy * width + sx, (sy + 1) * wide + sx + 1
+        if owners[start] != 0:
+            continue
+        queue[0], framed[0] = first, start
+        owners[start] = region + 1
+        h0 = float(colors[3 * first])
+        sum_h, sum_s, sum_v = 0.0, float(colors[3 * first + 1]), float(colors[3 * first + 2])
+        mean_h, mean_s, mean_v = h0, sum_s, sum_v
+        begin, end = 0, 1
+        while begin < end and end <= limit_px:
+            wave_end = end
+            for i in range(begin, wave_end):
+                for side in range(4):
+                    step = 1 if side == 0 else -1 if side == 1 else wide if side == 2 else -wide
+                    to = np.uint64(framed[i] + step)
+                    if owners[to] != 0:
+                        continue
+                    step = 1 if side == 0 else -1 if side == 1 else width if side == 2 else -width
+                    pixel = np.uint64(queue[i] + step)
+                    if end > limit_px or (labels[pixel] != ink and labels[pixel] != 0):
+                        continue
+                    at = np.uint64(3) * pixel
+                    h, s, v = float(colors[at]), float(colors[at + one]), float(colors[at + two])
+                    # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
+                    dh = h - mean_h
+                    dh += HUES if dh < -half else -HUES if dh >= half else 0.0
+                    ds, dv = s - mean_s, v - mean_v
+                    scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
+                    near = dh * dh + ds * ds + dv * dv < limit2 * scale
+                    # written over where it is not near: in noise, that branch can not be guessed
+                    queue[end], framed[end] = pixel, to
+                    owners[to] = region + 1 if near else 0
+                    end += near
+                    away = h - h0
+                    away += HUES if away < -half else -HUES if away >= half else 0.0
+                    sum_h += away if near else 0.0
+                    sum_s += s if near else 0.0
+                    sum_v += v if near else 0.0
+            begin = wave_end
+            mean_h = h0 + sum_h / end
+            mean_h += HUES if mean_h < 0.0 else -HUES if mean_h >= HUES else 0.0
+            mean_s = sum_s / end
+            mean_v = sum_v / end
+        if end > limit_px:
+            continue  # a leak or a background: no cell is that large
+        _unframe(queue, framed, end, width)
+        _add_moments(queue, framed, end, sx, sy, moments, region)
+    return owner, moments
+
+
+@lent_vectorized
+def _unframe(queue, framed, count, width):  # type: ignore[no-untyped-def]
+    """Write each pixel's x over its number, and its y over the one in the frame: the two differ by the frame's pixels
+    before it."""
+    for i in range(np.uint64(count)):
+        y = (framed[i] - queue[i] - width - 3) >> 1
+        queue[i], framed[i] = queue[i] - y * width, y
+
+
+def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
+    """Stage 4 (AGA): from each seed, add 4-neighbours while eq. 3 stays below 0.15 and update the mean as it grows.
+
+    Eq. 3 is taken over OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of hue are circular;
+    ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
+    """
+    limit_px = segmentation.label.size // 6
+    owner, moments = _grow(
+        segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
+    )
+    owner = owner[1:-1, 1:-1]
+    return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)

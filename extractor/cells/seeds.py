@@ -1,0 +1,262 @@
+"""Stage 3: one seed per domain of an ink, and what its domain looks like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.image.ink_segmentation import Segmentation
+from extractor.numeric.compilation import compiled, lent
+
+MIN_DOMAIN_PX = 4
+# In a crowd, a cell has edges of 5 px at least, and of its area no less than a convex shape has for the spread of its
+# pixels (the root of their covariance's determinant): a triangle 10.4 times, an ellipse 12.6 times.
+MIN_CROWDED_PX = 12
+MIN_SOLIDITY = 8.0
+NO_CROWD = 1 << 62
+SAFE_AREA_PX = 20  # a cell with edges of 7 px
+MAX_SMALL = 1 / 6  # of the domains
+MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """Stage 3: one seed per domain, which is looked for when it is first asked for.
+
+    Attributes:
+        area_px: (N,) int64, the domain's area.
+        runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
+        domain: (R,) int32, the domain that a run belongs to.
+        crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
+    """
+
+    area_px: NDArray[np.int64]
+    runs: NDArray[np.int32]
+    domain: NDArray[np.int32]
+    crowded: bool = False
+
+    @property
+    def xy(self) -> NDArray[np.int32]:
+        """(N, 2) the pixel to grow from."""
+        return self._found[0]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """(N, 2) the domain's geometric center."""
+        return self._found[1]
+
+    @property
+    def ink(self) -> NDArray[np.uint8]:
+        """(N,) 1 red, 2 green, 3 blue."""
+        return self._found[2]
+
+    @cached_property
+    def _found(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]:
+        return _seeds(self.runs, self.domain, self.area_px)  # type: ignore[no-any-return]
+
+
+@compiled
+def _count_runs(label):  # type: ignore[no-untyped-def]
+    """How many horizontal runs of one ink there are."""
+    count = 0
+    for y in range(label.shape[0]):
+        row = label[y]
+        count += row[0] != 0
+        for x in range(1, label.shape[1]):
+            count += (row[x] != row[x - 1]) & (row[x] != 0)
+    return count
+
+
+@lent
+def _root(parent, i):  # type: ignore[no-untyped-def]
+    """The first run of the domain that run i belongs to; the path to it is halved on the way."""
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@compiled
+def _runs(label):  # type: ignore[no-untyped-def]
+    """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
+
+    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 an earlier run of each run's domain, or itself.
+    """
+    height, width = label.shape
+    runs = np.empty((_count_runs(label) + 1, 4), np.int32)
+    begin = np.empty(width + 1, np.int32)  # where the stretches of a row begin, those without ink among them
+    count = 0
+    for y in range(height):
+        row = label[y]
+        begin[0], stretches, before = 0, np.uint64(1), row[0]
+        for x in range(1, width):
+            begin[stretches] = x
+            stretches += np.uint64(row[x] != before)
+            before = row[x]
+        begin[stretches] = width
+        for n in range(np.int64(stretches)):
+            ink = row[begin[n]]
+            runs[count, 0], runs[count, 1], runs[count, 2], runs[count, 3] = (
+                y,
+                begin[n],
+                begin[n + 1] - 1,
+                ink,
+            )
+            count += ink != 0
+    parent = np.arange(count).astype(np.int32)
+    above = 0
+    for i in range(count):
+        y, start, end, ink = runs[i, 0], runs[i, 1], runs[i, 2], runs[i, 3]
+        while runs[above, 0] < y - 1 or (runs[above, 0] == y - 1 and runs[above, 2] < start):
+            above += 1
+        other, own = above, i
+        while runs[other, 0] == y - 1 and runs[other, 1] <= end:
+            if runs[other, 3] == ink:
+                if own == i:
+                    own = parent[other]
+                elif own != parent[other]:
+                    a, b = _root(parent, own), _root(parent, other)
+                    parent[max(a, b)] = min(a, b)
+            other += 1
+        parent[i] = own
+    return runs[:count], parent
+
+
+@compiled
+def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
+    """The runs of the domains that are large enough, or, where there are more than ``crowd``, that a cell could be;
+    (R,) int32 the domain of each; the domains' areas; and whether there are more."""
+    domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
+    count = 0
+    for i in range(runs.shape[0]):
+        first, d = parent[i] == i, domain[parent[i]]
+        d = count if first else d  # of both, so that no branch is to be guessed
+        domain[i] = d
+        count += first
+        area[d] += runs[i, 2] - runs[i, 1] + 1
+    area = area[:count]
+    crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
+    runs, domain, area = _kept(runs, domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
+    if crowded:
+        runs, domain, area = _kept(runs, domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
+    return runs, domain, area, crowded
+
+
+@compiled
+def _kept(runs, domain, area, keep):  # type: ignore[no-untyped-def]
+    """The runs of the domains to keep, these numbered anew, and their areas."""
+    number, few, own = np.empty(area.shape[0], np.int32), 0, 0
+    for d in range(area.shape[0]):
+        number[d] = few
+        few += keep[d]
+    if few == area.shape[0]:
+        return runs, domain, area
+    some, of = np.empty_like(runs), np.empty_like(domain)
+    for i in range(domain.shape[0]):
+        d = domain[i]
+        # written over where it is not kept: no branch is to be guessed
+        some[own, 0], some[own, 1], some[own, 2], some[own, 3] = (
+            runs[i, 0],
+            runs[i, 1],
+            runs[i, 2],
+            runs[i, 3],
+        )
+        of[own] = number[d]
+        own += keep[d]
+    return some[:own], of[:own], area[keep]
+
+
+@compiled
+def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
+    """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
+    sums = np.zeros((area.shape[0], 5))
+    for i in range(domain.shape[0]):
+        d, y, length = domain[i], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
+        x = 0.5 * (runs[i, 1] + runs[i, 2])
+        sums[d, 0] += length * x
+        sums[d, 1] += length * y
+        sums[d, 2] += length * (x * x + (length * length - 1) / 12.0)
+        sums[d, 3] += length * x * y
+        sums[d, 4] += length * y * y
+    out = np.empty(area.shape[0])
+    for d in range(area.shape[0]):
+        x, y = sums[d, 0] / area[d], sums[d, 1] / area[d]
+        # a pixel is a square, not a point: it adds 1/12 to each variance
+        xx, yy = sums[d, 2] / area[d] - x * x + 1.0 / 12.0, sums[d, 4] / area[d] - y * y + 1.0 / 12.0
+        xy = sums[d, 3] / area[d] - x * y
+        out[d] = np.sqrt(max(xx * yy - xy * xy, 0.0))
+    return out
+
+
+@compiled
+def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
+    """Per domain: the pixel of it nearest to its geometric center, that center and its ink."""
+    count = area.shape[0]
+    ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
+    for i in range(runs.shape[0]):
+        d, length = domain[i], runs[i, 2] - runs[i, 1] + 1
+        ink[d] = runs[i, 3]
+        center[d, 0] += 0.5 * length * (runs[i, 1] + runs[i, 2])
+        center[d, 1] += length * runs[i, 0]
+    middle, best = np.empty(count, np.int64), np.full(count, np.inf)
+    for d in range(count):
+        center[d, 0] /= area[d]
+        center[d, 1] /= area[d]
+        middle[d] = round(center[d, 0])
+    xy = np.zeros((count, 2), np.int32)
+    for i in range(runs.shape[0]):
+        d = domain[i]
+        x = min(max(middle[d], runs[i, 1]), runs[i, 2])
+        distance = (x - center[d, 0]) ** 2 + (runs[i, 0] - center[d, 1]) ** 2
+        if distance < best[d]:
+            best[d] = distance
+            xy[d, 0] = x
+            xy[d, 1] = runs[i, 0]
+    return xy, center, ink
+
+
+def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
+    """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
+
+    The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
+
+    Args:
+        crowd: where there are more domains than this, small and ragged ones are clutter, too: an image of noise has
+            many times more than any pattern.
+    """
+    runs, parent = _runs(segmentation.label)
+    runs, domain, area_px, crowded = _domains(runs, parent, crowd)
+    return Seeds(area_px, runs, domain, crowded)
+
+
+@compiled
+def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
+    """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown: a run's at once, from its middle
+    and its length; in halves, quarters and eighths of whole numbers, which are exact."""
+    out = np.zeros((seed_xy.shape[0], MOMENTS))
+    for i in range(runs.shape[0]):
+        d = domain[i]
+        y, length = float(runs[i, 0] - seed_xy[d, 1]), float(runs[i, 2] - runs[i, 1] + 1)
+        middle = 0.5 * float(runs[i, 1] + runs[i, 2]) - float(seed_xy[d, 0])
+        spread = length * (length * length - 1.0) / 12.0  # the sum of the squares about the middle
+        x = length * middle
+        xx = x * middle + spread
+        out[d, 0] += length
+        out[d, 1] += x
+        out[d, 2] += length * y
+        out[d, 3] += xx
+        out[d, 4] += x * y
+        out[d, 5] += length * y * y
+        out[d, 6] += middle * (x * middle + 3.0 * spread)
+        out[d, 7] += xx * y
+        out[d, 8] += x * y * y
+        out[d, 9] += length * y * y * y
+    return out
+
+
+def large_enough(seeds: Seeds) -> bool:
+    """Whether at most a few of the domains are too small to be recognised safely."""
+    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL

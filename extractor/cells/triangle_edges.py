@@ -1,0 +1,236 @@
+"""Where the edges of triangles lie: those of many triangles at once, each a lane of loops without branches.
+
+The ink's profile across an edge, 1 inside and 0 outside, is integrated: its area is the edge's position whatever the
+blur, so no blur has to be known. The line through two such positions is the edge. Profiles run along the median, not
+the normal: so they stay clear of the other edges in any triangle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from extractor.numeric.bilinear import STEPS
+from extractor.numeric.bilinear_batch import (
+    BLUE,
+    COLOR,
+    GREEN,
+    INSIDE,
+    POINTS,
+    RADIUS,
+    RED,
+    X,
+    Y,
+    fixed,
+    fixed_step,
+    room_for_samples,
+    sample_patches,
+    sample_points,
+)
+from extractor.numeric.compilation import compiled
+
+FIRST = 0.25  # of an edge, where its first profile crosses it; the second does as far from its end
+HALF_PROFILE = 4  # samples on each side of an edge
+MARGIN = 0.01  # px, that profiles stay away from the last row and column, more than half a step of a sample
+WINDOW = 0.8  # reach of a profile in units of the way from the cell's center to the middle of the edge
+FINE_REACH_PX = 8.0  # profiles that reach farther are followed by narrower ones,
+PASSES = 3  # so often at most
+MIN_DEPTH_PX = 0.3  # of an edge, from the cell's center
+MIN_CONTRAST = 12.0  # of an ink against what lies beyond its edge, over the three channels, 8-bit
+MIN_SINE = 0.05  # two edges that meet at less than 3 degrees have no corner
+MAX_CORNER_SHIFT = 1.0  # in units of the corner's distance from the center
+LOW, HIGH = -0.2, 1.2  # between which a profile is held
+CELLS = POINTS // 3  # triangles at once
+# Columns of what is known of an edge: its ends, the center of its cell and how far the first corner is from there; the
+# reach of profiles; the normal, the edge's distance from the center, the way from there to its middle; the color of
+# its ink; what turns a color into a share of ink, and what is taken off; 1 if it can be drawn; where the profiles
+# cross it, how they step, and the areas under them; the line n . p = d.
+START_X, START_Y, END_X, END_Y, CENTER_X, CENTER_Y, SIZE, REACH = (k * POINTS for k in range(8))
+NORMAL_X, NORMAL_Y, DEPTH, AWAY_X, AWAY_Y, INK = (k * POINTS for k in range(8, 14))
+WEIGHT, ZERO, FITS = (k * POINTS for k in (16, 19, 20))
+FIRST_X, FIRST_Y, SECOND_X, SECOND_Y, STEP_X, STEP_Y = (k * POINTS for k in range(21, 27))
+AREA, AREA_BEFORE, LINE_X, LINE_Y, LINE_D = (k * POINTS for k in range(27, 32))
+COLUMNS = 32
+
+
+@compiled
+def fit_edges(image, corners, good):  # type: ignore[no-untyped-def]
+    """Move the corners (N, 3, 2) of each ``good`` (N,) triangle to where the lines of its edges meet, in place; what
+    has no such edges is good no more.
+
+    The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
+    """
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    edges, room = np.zeros(COLUMNS * POINTS), room_for_samples()
+    left, reach = np.flatnonzero(good), np.full(good.shape[0], WINDOW)
+    for _ in range(PASSES):
+        for first in range(0, left.shape[0], CELLS):
+            cells = left[first : first + CELLS]
+            count = 3 * cells.shape[0]
+            _lay(corners, cells, reach, edges)
+            _turn(edges, count)
+            _weigh(flat, height, width, edges, count, room)
+            _clear(height, width, edges, count)
+            _cross(flat, height, width, False, edges, count, room)
+            _cross(flat, height, width, True, edges, count, room)
+            _draw(edges, count)
+            _move(edges, cells, corners, good, reach)
+        left = left[reach[left] > 0.0]
+
+
+@compiled
+def _lay(corners, cells, reach, edges):  # type: ignore[no-untyped-def]
+    """Lay out the edges of cells: the first one of each, then the second, then the third."""
+    count = cells.shape[0]
+    for n in range(count):
+        i = cells[n]
+        x = (corners[i, 0, 0] + corners[i, 1, 0] + corners[i, 2, 0]) / 3
+        y = (corners[i, 0, 1] + corners[i, 1, 1] + corners[i, 2, 1]) / 3
+        size = np.sqrt((corners[i, 0, 0] - x) ** 2 + (corners[i, 0, 1] - y) ** 2)
+        for k in range(3):
+            to, end = k * count + n, (k + 1) % 3
+            edges[START_X + to], edges[START_Y + to] = corners[i, k, 0], corners[i, k, 1]
+            edges[END_X + to], edges[END_Y + to] = corners[i, end, 0], corners[i, end, 1]
+            edges[CENTER_X + to], edges[CENTER_Y + to] = x, y
+            edges[SIZE + to], edges[REACH + to] = size, reach[i]
+
+
+@compiled
+def _turn(edges, count):  # type: ignore[no-untyped-def]
+    """Which way the edges lie from the centers."""
+    for i in range(count):
+        x, y, cx, cy = edges[START_X + i], edges[START_Y + i], edges[CENTER_X + i], edges[CENTER_Y + i]
+        dx, dy = edges[END_X + i] - x, edges[END_Y + i] - y
+        length = np.sqrt(dx * dx + dy * dy)
+        nx, ny = dy / length, -dx / length  # outward: corners run clockwise with y down
+        edges[NORMAL_X + i], edges[NORMAL_Y + i] = nx, ny
+        edges[DEPTH + i] = (x - cx) * nx + (y - cy) * ny
+        edges[AWAY_X + i], edges[AWAY_Y + i] = x + 0.5 * dx - cx, y + 0.5 * dy - cy
+
+
+@compiled
+def _weigh(flat, height, width, edges, count, room):  # type: ignore[no-untyped-def]
+    """Compare each cell's ink with the colors beyond its edges."""
+    patches, cells = room.patches, count // 3
+    for i in range(cells):
+        patches[X + i], patches[Y + i] = edges[CENTER_X + i], edges[CENTER_Y + i]
+        patches[RADIUS + i] = 0.2 * edges[SIZE + i]
+    sample_patches(flat, height, width, cells, room)
+    for k in range(3):
+        for i in range(cells):
+            edges[FITS + k * cells + i] = patches[INSIDE + i]
+            for channel in range(0, 3 * POINTS, POINTS):
+                edges[INK + channel + k * cells + i] = patches[COLOR + channel + i]
+    for i in range(count):
+        patches[X + i] = edges[CENTER_X + i] + 2 * edges[AWAY_X + i]
+        patches[Y + i] = edges[CENTER_Y + i] + 2 * edges[AWAY_Y + i]
+        patches[RADIUS + i] = 0.4 * edges[DEPTH + i]
+    sample_patches(flat, height, width, count, room)
+    for i in range(count):
+        b0, b1 = patches[COLOR + i], patches[COLOR + POINTS + i]
+        b2 = patches[COLOR + 2 * POINTS + i]
+        u0, u1, u2 = edges[INK + i] - b0, edges[INK + POINTS + i] - b1, edges[INK + 2 * POINTS + i] - b2
+        contrast = u0 * u0 + u1 * u1 + u2 * u2
+        fits = (contrast >= MIN_CONTRAST**2) & (edges[DEPTH + i] > MIN_DEPTH_PX)
+        edges[FITS + i] *= patches[INSIDE + i] * fits
+        contrast = max(contrast, MIN_CONTRAST**2)
+        u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
+        edges[WEIGHT + i], edges[WEIGHT + POINTS + i], edges[WEIGHT + 2 * POINTS + i] = u0, u1, u2
+        edges[ZERO + i] = u0 * b0 + u1 * b1 + u2 * b2
+
+
+@compiled
+def _clear(height, width, edges, count):  # type: ignore[no-untyped-def]
+    """Where the profiles cross the edges; edges are left out where one does not stay in the image."""
+    right, bottom = width - 1.0 - MARGIN, height - 1.0 - MARGIN
+    for i in range(count):
+        x, y = edges[START_X + i], edges[START_Y + i]
+        end_x, end_y = edges[END_X + i], edges[END_Y + i]
+        dx, dy = FIRST * (end_x - x), FIRST * (end_y - y)
+        x, y, end_x, end_y = x + dx, y + dy, end_x - dx, end_y - dy
+        edges[FIRST_X + i], edges[FIRST_Y + i], edges[SECOND_X + i], edges[SECOND_Y + i] = x, y, end_x, end_y
+        wide, high = edges[REACH + i] * abs(edges[AWAY_X + i]), edges[REACH + i] * abs(edges[AWAY_Y + i])
+        begins = (min(x, end_x) >= wide) & (min(y, end_y) >= high)
+        edges[FITS + i] *= begins & (max(x, end_x) + wide < right) & (max(y, end_y) + high < bottom)
+
+
+@compiled
+def _cross(flat, height, width, second, edges, count, room):  # type: ignore[no-untyped-def]
+    """Write the areas under the first or second profiles across the edges, in steps, and keep the ones before."""
+    places, parts = room.places, room.parts
+    for i in range(count):
+        fits, reach = edges[FITS + i] > 0.0, edges[REACH + i]
+        x = reach * edges[AWAY_X + i]
+        y = reach * edges[AWAY_Y + i]
+        x, y = (
+            (edges[SECOND_X + i] - x, edges[SECOND_Y + i] - y)
+            if second
+            else (edges[FIRST_X + i] - x, edges[FIRST_Y + i] - y)
+        )
+        places[X + i], places[Y + i] = fixed(x if fits else 0.0), fixed(y if fits else 0.0)
+    for i in range(count):
+        step = edges[REACH + i] / HALF_PROFILE if edges[FITS + i] > 0.0 else 0.0
+        edges[STEP_X + i], edges[STEP_Y + i] = step * edges[AWAY_X + i], step * edges[AWAY_Y + i]
+        edges[AREA_BEFORE + i], edges[AREA + i] = edges[AREA + i], 0.0
+    for m in range(2 * HALF_PROFILE + 1):
+        weight = 0.5 if m == 0 or m == 2 * HALF_PROFILE else 1.0
+        sample_points(flat, height, width, count, room)
+        for i in range(count):
+            u0, u1, u2 = edges[WEIGHT + i], edges[WEIGHT + POINTS + i], edges[WEIGHT + 2 * POINTS + i]
+            f = u0 * parts[BLUE + i] + u1 * parts[GREEN + i] + u2 * parts[RED + i]
+            f = f * (1.0 / (STEPS * STEPS)) - edges[ZERO + i]
+            edges[AREA + i] += weight * min(max(f, LOW), HIGH)
+        for i in range(count):
+            places[X + i] += fixed_step(edges[STEP_X + i])
+            places[Y + i] += fixed_step(edges[STEP_Y + i])
+
+
+@compiled
+def _draw(edges, count):  # type: ignore[no-untyped-def]
+    """The lines through the two places of each edge where its ink has fallen halfway to the color beyond."""
+    for i in range(count):
+        depth, reach = edges[DEPTH + i], edges[REACH + i]
+        step = reach / HALF_PROFILE
+        first = depth * (edges[AREA_BEFORE + i] * step - reach)
+        second = depth * (edges[AREA + i] * step - reach)
+        slope = (second - first) / (1.0 - 2 * FIRST)
+        off_a, off_b = first - FIRST * slope, second + FIRST * slope
+        nx, ny = edges[NORMAL_X + i], edges[NORMAL_Y + i]
+        ax, ay = edges[START_X + i] + off_a * nx, edges[START_Y + i] + off_a * ny
+        dx, dy = edges[END_X + i] + off_b * nx - ax, edges[END_Y + i] + off_b * ny - ay
+        norm = np.sqrt(dx * dx + dy * dy)
+        edges[LINE_X + i], edges[LINE_Y + i] = dy / norm, -dx / norm
+        edges[LINE_D + i] = edges[LINE_X + i] * ax + edges[LINE_Y + i] * ay
+
+
+@compiled
+def _move(edges, cells, corners, good, reach):  # type: ignore[no-untyped-def]
+    """Move the corners of the cells to where their lines meet, and write the ``reach`` (N,) of the next pass, 0 where
+    none follows."""
+    count, moved = cells.shape[0], np.empty((3, 2))
+    for n in range(count):
+        i, size = cells[n], edges[SIZE + n]
+        fits = edges[FITS + n] * edges[FITS + count + n] * edges[FITS + 2 * count + n] > 0.0
+        good[i] = fits and _meeting(edges, n, count, MAX_CORNER_SHIFT * size, moved)
+        if good[i]:
+            for k in range(3):
+                corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
+        ends = not good[i] or reach[i] * size < 2 * FINE_REACH_PX
+        reach[i] = 0.0 if ends else max(0.25 * reach[i], 2 * FINE_REACH_PX / size)
+
+
+@compiled
+def _meeting(edges, n, count, limit, moved):  # type: ignore[no-untyped-def]
+    """Write where the lines of a cell's edges meet, corner by corner; False where one does not or lies beyond the limit
+    from where it was."""
+    for k in range(3):
+        here, before = k * count + n, (k + 2) % 3 * count + n
+        ax, ay, a = edges[LINE_X + before], edges[LINE_Y + before], edges[LINE_D + before]
+        bx, by, b = edges[LINE_X + here], edges[LINE_Y + here], edges[LINE_D + here]
+        sine = ax * by - ay * bx
+        if not abs(sine) >= MIN_SINE:
+            return False
+        moved[k, 0], moved[k, 1] = (a * by - ay * b) / sine, (ax * b - a * bx) / sine
+        dx, dy = moved[k, 0] - edges[START_X + here], moved[k, 1] - edges[START_Y + here]
+        if not dx * dx + dy * dy < limit * limit:
+            return False
+    return True

@@ -1,0 +1,79 @@
+"""Heavy omission (the article's Fig. 8): a quadratic through the markers of one layer within a sextant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from extractor.numeric.compilation import compiled
+from extractor.numeric.dense_systems import cholesky_solve
+
+MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
+TERMS = 3  # 1, s, s^2, s from -1 to 1 along the sextant
+
+
+@compiled
+def by_layer(xy, layers):  # type: ignore[no-untyped-def]
+    """Places of the unknown markers, between known ones, on the quadratic through their layer and sextant.
+
+    Args:
+        xy: (M, 2) px, NaN where unknown.
+
+    Returns:
+        (M, 2) px, NaN where there are too few markers; and their (M,) variance, px^2 per axis, by what the fit leaves
+        in its markers, infinite where there is none. A corner of the layer, which two sextants share, lies where the
+        surer one says.
+    """
+    place, variance = np.full(xy.shape, np.nan), np.full(xy.shape[0], np.inf)
+    ids = np.empty(layers + 1, np.int64)
+    for layer in range(1, layers + 1):
+        first, around = 3 * layer * (layer - 1) + 1, 6 * layer
+        for sextant in range(6):
+            unknown = 0
+            for k in range(layer + 1):
+                ids[k] = first + (sextant * layer + k) % around
+                unknown += np.isnan(xy[ids[k], 0])
+            if unknown > 0:
+                _through(xy, ids[: layer + 1], place, variance)
+    return place, variance
+
+
+@compiled
+def _through(xy, ids, place, variance):  # type: ignore[no-untyped-def]
+    """Fit x and y as quadratics of the place within the sextant and read them at the unknown places in between."""
+    last = ids.shape[0] - 1
+    normal, right = np.zeros((TERMS, TERMS)), np.zeros((2, TERMS))
+    row, unit = np.ones(TERMS), np.empty((1, TERMS))
+    count, begin, end = 0, -1, -1
+    for k in range(last + 1):
+        if np.isnan(xy[ids[k], 0]):
+            continue
+        begin, end, count = k if begin < 0 else begin, k, count + 1
+        row[1] = 2.0 * k / last - 1.0
+        row[2] = row[1] * row[1]
+        for a in range(TERMS):
+            for b in range(TERMS):
+                normal[a, b] += row[a] * row[b]
+            right[0, a] += row[a] * xy[ids[k], 0]
+            right[1, a] += row[a] * xy[ids[k], 1]
+    if count < MIN_LAYER_MARKERS:
+        return
+    cholesky_solve(normal.copy(), right, TERMS)
+    left = 0.0
+    for k in range(begin, end + 1):
+        if not np.isnan(xy[ids[k], 0]):
+            s = 2.0 * k / last - 1.0
+            for axis in range(2):
+                left += (xy[ids[k], axis] - right[axis, 0] - s * (right[axis, 1] + s * right[axis, 2])) ** 2
+    left /= 2.0 * (count - TERMS)
+    for k in range(begin, end + 1):
+        if not np.isnan(xy[ids[k], 0]):
+            continue
+        s = 2.0 * k / last - 1.0
+        unit[0, 0], unit[0, 1], unit[0, 2] = 1.0, s, s * s
+        cholesky_solve(normal.copy(), unit, TERMS)
+        doubt = left * (1.0 + unit[0, 0] + s * (unit[0, 1] + s * unit[0, 2]))
+        if not doubt < variance[ids[k]]:
+            continue
+        variance[ids[k]] = doubt
+        for axis in range(2):
+            place[ids[k], axis] = right[axis, 0] + s * (right[axis, 1] + s * right[axis, 2])

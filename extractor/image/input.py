@@ -1,0 +1,91 @@
+"""What comes in: an image of any common kind becomes 8-bit BGR; what is not an image is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.errors import ImageError
+from extractor.numeric.compilation import compiled
+
+MIN_SIDE_PX = 16
+NOISE_PLACES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
+BESIDE = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
+
+
+def prepare(image: NDArray[Any]) -> NDArray[np.uint8] | None:
+    """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
+
+    16-bit images are scaled to 8 bits (value / 257, rounded), the alpha of BGRA is dropped, and a grayscale image
+    ((H, W) or (H, W, 1)) has no color to read.
+
+    Raises:
+        ImageError: not an array, a float or signed type, another shape, or a side below 16 px.
+    """
+    if not isinstance(image, np.ndarray):
+        raise ImageError(
+            f"image is {type(image).__name__}; give a numpy array (H, W, 3) of uint8 in BGR order"
+        )
+    if image.dtype not in (np.uint8, np.uint16):
+        raise ImageError(
+            f"image has dtype {image.dtype}; give uint8 or uint16 (scale float images to 0..255 first)"
+        )
+    if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
+        raise ImageError(
+            f"image has shape {image.shape}; give (H, W, 3) BGR, (H, W, 4) BGRA or (H, W) grayscale"
+        )
+    if min(image.shape[:2]) < MIN_SIDE_PX:
+        raise ImageError(
+            f"image is {image.shape[1]} x {image.shape[0]} px; give at least {MIN_SIDE_PX} px a side"
+        )
+    if image.ndim == 2 or image.shape[2] == 1:
+        return None
+    color = image[:, :, :3]
+    if color.dtype == np.uint16:
+        color = cv2.convertScaleAbs(color, alpha=1 / 257)
+    return np.ascontiguousarray(color, dtype=np.uint8)
+
+
+@compiled
+def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
+    """Standard deviation of a channel's noise in grey levels (Immerkaer 1996, with a median against what is no noise).
+
+    The Laplacian-like mask [1 -2 1; -2 4 -2; 1 -2 1] ignores gradients; its response to noise is 6 sigma. It is laid on
+    the middles of the ``cells`` (K, 3) with corners among ``xy`` (M, 2) px, in all channels, where nothing is clipped.
+    NaN where no cell is seen.
+    """
+    counts, total = np.zeros(8 * 255 + 1, np.int64), 0
+    around = min(max(NOISE_PLACES // max(cells.shape[0], 1), 1), len(BESIDE))
+    for i in range(cells.shape[0]):
+        a, b, c = cells[i]
+        cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3
+        if not (cx > 2.5 and cy > 2.5 and cx < image.shape[1] - 3.5 and cy < image.shape[0] - 3.5):
+            continue
+        for k in range(around):
+            x, y = int(cx + 0.5) + BESIDE[k][0], int(cy + 0.5) + BESIDE[k][1]
+            for channel in range(3):
+                response, low, high = np.int64(0), np.int64(255), np.int64(0)
+                for dy in range(-1, 2):
+                    left, middle = (
+                        np.int64(image[y + dy, x - 1, channel]),
+                        np.int64(image[y + dy, x, channel]),
+                    )
+                    right = np.int64(image[y + dy, x + 1, channel])
+                    low, high = min(low, left, middle, right), max(high, left, middle, right)
+                    row = left - 2 * middle + right
+                    response += -2 * row if dy == 0 else row
+                if low > 0 and high < 255:
+                    counts[abs(response)] += 1
+                    total += 1
+    if total == 0:
+        return np.nan
+    below, bin_of = 0, 0
+    while below + counts[bin_of] < 0.5 * total:
+        below += counts[bin_of]
+        bin_of += 1
+    # responses are integers: each stands for half a step on both sides
+    median = bin_of - 0.5 + (0.5 * total - below) / counts[bin_of]
+    return max(median, 0.0) / (6 * 0.6745)

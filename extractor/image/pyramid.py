@@ -1,0 +1,121 @@
+"""An image at a reduced scale: what is blurred, or large, needs no fine pixels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.numeric.compilation import compiled, inlined
+
+
+class Frame(NamedTuple):
+    """The image coordinates of polynomials: (x - x) / scale, (y - y) / scale."""
+
+    x: float
+    y: float
+    scale: float
+
+
+class Sight(NamedTuple):
+    """An image at 1/``scale`` of its size, and the coordinates of its polynomials."""
+
+    image: NDArray[np.uint8]
+    scale: int
+    frame: Frame
+
+    def reduced(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of the full image in this one."""
+        return (xy_px + 0.5) / self.scale - 0.5
+
+    def full(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of this image in the full one."""
+        return (xy_px + 0.5) * self.scale - 0.5
+
+
+class Sights:
+    """One image at every scale that is asked for, each made once."""
+
+    def __init__(self, image: NDArray[np.uint8]) -> None:
+        self._image = image
+        self._made: dict[int, Sight] = {}
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height at full scale, px."""
+        return self._image.shape[1], self._image.shape[0]
+
+    def at(self, scale: int) -> Sight:
+        """The image reduced by averaging ``scale`` x ``scale`` pixels."""
+        if scale not in self._made:
+            self._made[scale] = _sight(self._image, scale)
+        return self._made[scale]
+
+
+def _sight(image: NDArray[np.uint8], scale: int) -> Sight:
+    if scale == 2:
+        image = _halved(image)
+    elif scale > 1:
+        image = _averaged(image, scale)
+    height, width = image.shape[:2]
+    return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
+
+
+@compiled
+def _averaged(image, scale):  # type: ignore[no-untyped-def]
+    """The means of ``scale`` x ``scale`` pixels, halves rounded up; what is left over at the rims is cut off."""
+    height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
+    out = np.empty((height, width, 3), np.uint8)
+    flat, means = image.reshape(-1), out.reshape(-1)
+    column = np.empty(row, np.uint16)  # a sum of up to 256 rows
+    total = np.empty(3 * width, np.uint32)
+    half, share = np.float32(0.5), np.float32(1.0 / scale**2)
+    for y in range(height):
+        column[:] = np.uint16(0)
+        for k in range(scale):
+            line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
+            for i in range(row):
+                column[i] += np.uint16(line[i])
+        _add_up(column, scale, width, total)
+        own = means[3 * y * width : 3 * (y + 1) * width]
+        for i in range(3 * width):
+            own[i] = np.uint8(np.float32(total[i]) * share + half)
+    return out
+
+
+@inlined
+def _add_up(column, scale, width, total):  # type: ignore[no-untyped-def]
+    """Write the sums of ``scale`` pixels side by side, all channels of a pixel at once."""
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    at = np.uint64(0)
+    for x in range(np.uint64(width)):
+        red, green, blue = np.uint32(0), np.uint32(0), np.uint32(0)
+        for _ in range(scale):
+            red += np.uint32(column[at])
+            green += np.uint32(column[at + one])
+            blue += np.uint32(column[at + two])
+            at += three
+        total[three * x], total[three * x + one], total[three * x + two] = red, green, blue
+
+
+@compiled
+def _halved(image):  # type: ignore[no-untyped-def]
+    """The means of 2 x 2 pixels, halves rounded up: what OpenCV makes of them, at half of its time."""
+    height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
+    out = np.empty((height, width, 3), np.uint8)
+    flat, means = image.reshape(-1), out.reshape(-1)
+    both = np.empty(6 * width, np.uint16)
+    one, three, six = np.uint16(1), np.uint64(3), np.uint64(6)
+    for y in range(height):
+        above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
+        for i in range(6 * width):
+            both[i] = np.uint16(above[i]) + np.uint16(below[i])
+        line = means[3 * y * width : 3 * (y + 1) * width]
+        for x in range(np.uint64(width)):
+            for channel in range(three):
+                left = both[six * x + channel]
+                line[three * x + channel] = (left + both[six * x + channel + three] + one + one) >> np.uint16(
+                    2
+                )
+    return out

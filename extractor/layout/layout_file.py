@@ -1,0 +1,173 @@
+"""An independent reader of ``layout.json``, version 1.
+
+The file is the only bridge from the generator. Nothing in it is believed: every field is checked, then the
+fields against each other, then the digest of the geometry. ``layout.schema.json`` describes the format.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.errors import LayoutError
+from extractor.layout import json_fields as fields
+from extractor.layout.consistency import check_consistency
+from extractor.layout.reference import COLORS, Reference
+
+SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
+
+
+MAX_BYTES = 1 << 28
+
+
+FIELDS = (
+    "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
+    "reference", "palette", "border_mm", "outline", "generator", "digest",
+)  # fmt: skip
+
+
+OPTIONAL_FIELDS = ("fiducials",)
+
+
+def load_layout(path: str | PathLike[str]) -> Reference:
+    """Read and check a layout file.
+
+    Raises:
+        LayoutError: the file cannot be read, is of another format or version, or contradicts itself; one line
+            that names the file, the field, the value and what is expected.
+    """
+    name = str(path) if str(path).isprintable() else ascii(str(path))
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise LayoutError(f"{name}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a NUL byte in the path
+        raise LayoutError(f"{name}: cannot be read: {error}") from None
+    if len(data) > MAX_BYTES:
+        raise LayoutError(f"{name}: larger than {MAX_BYTES >> 20} MiB; expected a layout file")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise LayoutError(
+            f"{name}: byte {error.start} is not UTF-8; expected a layout file in UTF-8"
+        ) from None
+    return parse_layout(text, name)
+
+
+def parse_layout(text: str, name: str = "layout") -> Reference:
+    """The layout in a JSON text; ``name`` opens every error's message.
+
+    Raises:
+        LayoutError: see ``load_layout``.
+    """
+    try:
+        return _reference(fields.document(text))
+    except LayoutError as error:
+        raise LayoutError(f"{name}: {error}") from None
+
+
+def _reference(document: dict[str, Any]) -> Reference:
+    _check_header(document)
+    markers = fields.mapping(document["markers"], "markers")
+    fields.known_fields(markers, ("layer", "index", "x", "y"), "markers.")
+    layer = fields.integers(markers["layer"], "markers.layer", fields.MAX_INT)
+    count = len(layer)
+    x_mm = fields.lengths_mm(markers["x"], "markers.x", count)
+    y_mm = fields.lengths_mm(markers["y"], "markers.y", count)
+    cells = fields.mapping(document["cells"], "cells")
+    fields.known_fields(cells, ("corners", "color"), "cells.")
+    corners = fields.integer_rows(cells["corners"], "cells.corners", count - 1, (3, 4))
+    start = fields.mapping(document["reference"], "reference")
+    fields.known_fields(start, ("cell", "marker"), "reference.")
+    fiducials_mm, fiducial_diameter_mm = _fiducials(document)
+    reference = Reference(
+        pattern=fields.text_field(document["pattern"], "pattern"),
+        parameters=_parameters(document["parameters"]),
+        layer=layer,
+        index=fields.integers(markers["index"], "markers.index", fields.MAX_INT, count),
+        xy_mm=np.column_stack([x_mm, y_mm]),
+        cell_corners=corners,
+        cell_color=fields.choices(cells["color"], "cells.color", len(corners), COLORS),
+        edges=fields.integer_rows(document["edges"], "edges", count - 1, (2,)),
+        virtual_per_edge=fields.integer(document["virtual_per_edge"], "virtual_per_edge", 0, 1000),
+        reference_cell=fields.integer(start["cell"], "reference.cell", 0, len(corners) - 1),
+        reference_marker=fields.integer(start["marker"], "reference.marker", 0, count - 1),
+        palette=_palette(document["palette"]),
+        border_mm=fields.length_mm(document["border_mm"], "border_mm"),
+        outline_mm=fields.points_mm(document["outline"], "outline"),
+        digest=fields.text_field(document["digest"], "digest"),
+        fiducials_mm=fiducials_mm,
+        fiducial_diameter_mm=fiducial_diameter_mm,
+    )
+    check_consistency(reference)
+    _check_digest(reference)
+    return reference
+
+
+def _check_header(document: dict[str, Any]) -> None:
+    """Format and version first: what another version holds is not this reader's to judge."""
+    for field, expected in (("format", "cmp-layout"), ("version", 1), ("units", "mm")):
+        value = document.get(field)
+        if type(value) is not type(expected) or value != expected:
+            found = fields.shown(value) if field in document else "missing"
+            fields.fail(field, found, fields.shown(expected))
+    known = FIELDS + tuple(name for name in OPTIONAL_FIELDS if name in document)
+    fields.known_fields(document, known)
+    fields.text_field(document["generator"], "generator")
+
+
+def _parameters(value: object) -> dict[str, Any]:
+    parameters = fields.mapping(value, "parameters")
+    if type(parameters.get("mirrored", False)) is not bool:
+        fields.fail("parameters.mirrored", fields.shown(parameters["mirrored"]), "true or false")
+    return parameters
+
+
+def _palette(value: object) -> dict[str, str]:
+    palette = fields.mapping(value, "palette")
+    fields.known_fields(palette, COLORS, "palette.")
+    for name, ink in palette.items():
+        if type(ink) is not str or not re.fullmatch("#[0-9a-fA-F]{6}", ink):
+            fields.fail(f"palette.{name}", fields.shown(ink), 'a color as "#rrggbb"')
+    return palette
+
+
+def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
+    if "fiducials" not in document:
+        return np.empty((0, 2)), 0.0
+    marks = fields.mapping(document["fiducials"], "fiducials")
+    fields.known_fields(marks, ("x", "y", "diameter_mm"), "fiducials.")
+    count = len(marks["x"]) if isinstance(marks["x"], list) else 1
+    x_mm = fields.lengths_mm(marks["x"], "fiducials.x", count)
+    y_mm = fields.lengths_mm(marks["y"], "fiducials.y", count)
+    diameter_mm = fields.length_mm(marks["diameter_mm"], "fiducials.diameter_mm")
+    return np.column_stack([x_mm, y_mm]), diameter_mm
+
+
+def _check_digest(reference: Reference) -> None:
+    """In this order: layer, index, corners, color, edges as little-endian int32, then x, y as float64."""
+    digest = hashlib.sha256()
+    integers = (
+        reference.layer,
+        reference.index,
+        reference.cell_corners,
+        reference.cell_color,
+        reference.edges,
+    )
+    for column in integers:
+        digest.update(column.astype("<i4").tobytes())
+    for axis in (0, 1):
+        digest.update(reference.xy_mm[:, axis].astype("<f8").tobytes())
+    if digest.hexdigest() != reference.digest:
+        fields.fail(
+            "digest",
+            fields.shown(reference.digest),
+            f"{digest.hexdigest()}: the geometry was changed or damaged",
+        )

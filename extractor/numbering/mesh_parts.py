@@ -1,0 +1,122 @@
+"""The connected parts of a mesh, and which of its faces are markers: what the numbering starts from."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.cells.cell_mesh import Mesh
+from extractor.cells.cells import Cells
+from extractor.numeric.bilinear import sample_patch
+from extractor.numeric.compilation import compiled
+
+WITNESSES = 80  # faces that say which turn is that of the markers
+MIN_WITNESSES = 4  # of each turn
+
+
+@compiled
+def connected(neighbours, member):  # type: ignore[no-untyped-def]
+    """(N,) int32, counted from 0, the connected part that each ``member`` (N,) bool belongs to, by its ``neighbours``
+    (N, K), -1 for none; -1 for what is no member."""
+    part = np.full(member.shape[0], -1, np.int32)
+    stack = np.empty(member.shape[0], np.int32)
+    count = 0
+    for first in range(member.shape[0]):
+        if not member[first] or part[first] >= 0:
+            continue
+        part[first] = count
+        stack[0], height = first, 1
+        while height > 0:
+            height -= 1
+            i = stack[height]
+            for k in range(neighbours.shape[1]):
+                j = neighbours[i, k]
+                if j >= 0 and member[j] and part[j] < 0:
+                    part[j] = count
+                    stack[height] = j
+                    height += 1
+        count += 1
+    return part
+
+
+@compiled
+def _by_part(neighbours, turn):  # type: ignore[no-untyped-def]
+    """The faces, part by part, the largest first, and where each part begins."""
+    part = connected(neighbours, turn != 0)
+    sizes = np.zeros(part.max() + 1 if part.shape[0] > 0 else 0, np.int64)
+    for i in part:
+        if i >= 0:
+            sizes[i] += 1
+    largest = np.argsort(-sizes, kind="mergesort")  # as found where two are as large
+    begin, filled = np.zeros(sizes.shape[0] + 1, np.int64), np.empty(sizes.shape[0], np.int64)
+    for k in range(sizes.shape[0]):
+        filled[largest[k]] = begin[k]
+        begin[k + 1] = begin[k] + sizes[largest[k]]
+    faces = np.empty(begin[-1], np.int64)
+    for f in range(part.shape[0]):
+        if part[f] >= 0:
+            faces[filled[part[f]]] = f
+            filled[part[f]] += 1
+    return faces, begin
+
+
+def largest_parts(mesh: Mesh, count: int) -> list[NDArray[np.intp]]:
+    """The faces of each of the largest connected parts of the mesh, the largest first."""
+    faces, begin = _by_part(mesh.neighbours, mesh.turn)
+    return [faces[begin[i] : begin[i + 1]] for i in range(min(count, len(begin) - 1))]
+
+
+@compiled
+def innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
+    """The sound face nearest to the middle of its part of the mesh, or -1: rims are often damaged."""
+    x, y = 0.0, 0.0
+    for f in members:
+        for k in range(3):
+            x += center[faces[f, k], 0]
+            y += center[faces[f, k], 1]
+    x, y = x / members.shape[0], y / members.shape[0]  # of sums over three, as below
+    best, nearest = -1, np.inf
+    for f in members:
+        a, b, c = faces[f]
+        if blocked[a] or blocked[b] or blocked[c]:
+            continue
+        dx = center[a, 0] + center[b, 0] + center[c, 0] - x
+        dy = center[a, 1] + center[b, 1] + center[c, 1] - y
+        if dx * dx + dy * dy < nearest:
+            best, nearest = f, dx * dx + dy * dy
+    return best
+
+
+@compiled
+def _front(image, center, faces, turn):  # type: ignore[no-untyped-def]
+    """The turn of the brighter faces; 0 where too few are seen."""
+    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    every = max(1, int(np.count_nonzero(turn)) // WITNESSES)
+    brightness, color = np.empty((2, turn.shape[0] // every + 1)), np.zeros(3)
+    number_of, count = 0, [0, 0]
+    for f in range(turn.shape[0]):
+        if turn[f] == 0:
+            continue
+        number_of += 1
+        if number_of % every != 0:
+            continue
+        x, y = 0.0, 0.0
+        for k in range(3):
+            x += center[faces[f, k], 0] / 3
+            y += center[faces[f, k], 1] / 3
+        nearest = np.inf
+        for k in range(3):
+            nearest = min(nearest, np.hypot(center[faces[f, k], 0] - x, center[faces[f, k], 1] - y))
+        if sample_patch(flat, height, width, x, y, 0.12 * nearest, color):
+            side = 1 if turn[f] > 0 else 0
+            brightness[side, count[side]] = color.sum()
+            count[side] += 1
+    if min(count) < MIN_WITNESSES:
+        return 0
+    return 1 if np.median(brightness[1, : count[1]]) > np.median(brightness[0, : count[0]]) else -1
+
+
+def fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
+    """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
+    front = int(_front(image, cells.center_px, mesh.faces, mesh.turn))
+    return [front] if front != 0 else [1, -1]

@@ -1,0 +1,153 @@
+"""Bilinear samples of an image at many sub-pixel points at once, in loops without branches: lanes of vectors do them.
+
+The same samples as those of ``sampling``, to the bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.numeric.bilinear import HEXAGON, SHORT, STEPS
+from extractor.numeric.compilation import compiled
+
+FIXED, HALF_STEP = float(1 << 32), 1 << 23  # a pixel, and half of 1 / STEPS of it, in fixed places
+POINTS = 192  # sampled at once, at most
+X, Y, AT = (k * POINTS for k in range(3))
+BLUE, GREEN, RED, ACROSS, DOWN = (k * POINTS for k in range(5))
+RADIUS, COLOR, INSIDE = 2 * POINTS, 3 * POINTS, 6 * POINTS
+
+
+class Room(NamedTuple):
+    """What many samples at once are taken in, by columns of ``POINTS``, so that loops have no branches.
+
+    Attributes:
+        places: (3 P,) int64 ``X``, ``Y``, ``fixed``, and ``AT``, the first byte of four pixels.
+        words: (4 P,) uint32, the bytes of these.
+        parts: (5 P,) float32 ``BLUE``, ``GREEN``, ``RED``, the square of ``STEPS`` times each channel, and how far
+            beyond the first pixel the place lies, ``ACROSS`` and ``DOWN``.
+        patches: (7 P,) float64 ``X``, ``Y``, ``RADIUS``, px, the ``COLOR`` in three columns, and 1 where ``INSIDE`` the
+            image, else 0.
+    """
+
+    places: NDArray[np.int64]
+    words: NDArray[np.uint32]
+    parts: NDArray[np.float32]
+    patches: NDArray[np.float64]
+
+
+@compiled
+def fixed(place):  # type: ignore[no-untyped-def]
+    """A place as a whole number of 2^-32 px, half a step of a sample added, so that what is cut off rounds it."""
+    return np.int64(place * FIXED) + HALF_STEP
+
+
+@compiled
+def fixed_step(length):  # type: ignore[no-untyped-def]
+    """A length as a whole number of 2^-32 px."""
+    return np.int64(length * FIXED)
+
+
+@compiled
+def room_for_samples():  # type: ignore[no-untyped-def]
+    """A ``Room``."""
+    return Room(
+        np.zeros(3 * POINTS, np.int64),
+        np.zeros(4 * POINTS, np.uint32),
+        np.zeros(5 * POINTS, np.float32),
+        np.zeros(7 * POINTS),
+    )
+
+
+@compiled
+def _aim(height, width, places, shares, count):  # type: ignore[no-untyped-def]
+    """Write where the four pixels around each fixed place begin in the flat image, and how far beyond it lies."""
+    for i in range(count):
+        x, y = places[X + i], places[Y + i]
+        ix, iy = min(x >> 32, width - 2), min(y >> 32, height - 2)
+        places[AT + i] = 3 * (iy * width + ix)
+        shares[ACROSS + i], shares[DOWN + i] = (x >> 24) - STEPS * ix, (y >> 24) - STEPS * iy
+
+
+@compiled
+def _word(flat, at):  # type: ignore[no-untyped-def]
+    """Four bytes as one number, which the machine reads at once."""
+    a, b, c, d = flat[at], flat[at + np.uint64(1)], flat[at + np.uint64(2)], flat[at + np.uint64(3)]
+    low = np.uint32(a) | np.uint32(b) << np.uint32(8)
+    return low | np.uint32(c) << np.uint32(16) | np.uint32(d) << np.uint32(24)
+
+
+@compiled
+def _fetch(flat, width, places, words, count):  # type: ignore[no-untyped-def]
+    """Read the first and the last four of the six bytes of two pixels, and of the two below."""
+    two, below = np.uint64(2), np.uint64(3 * width)
+    for i in range(count):
+        k = np.uint64(places[AT + i])
+        words[i], words[POINTS + i] = _word(flat, k), _word(flat, k + two)
+        words[2 * POINTS + i], words[3 * POINTS + i] = _word(flat, k + below), _word(flat, k + below + two)
+
+
+@compiled
+def _byte(word, number):  # type: ignore[no-untyped-def]
+    """One of the four bytes of a word, 0 the lowest."""
+    return np.float32(np.int32(word >> np.uint32(8 * number)) & np.int32(255))
+
+
+@compiled
+def _mix(words, parts, count):  # type: ignore[no-untyped-def]
+    """Write the sums of the channels; whole numbers below 2^24, which these floats hold exactly."""
+    steps = np.float32(STEPS)
+    for i in range(count):
+        a, b, c, d = words[i], words[POINTS + i], words[2 * POINTS + i], words[3 * POINTS + i]
+        across, down = parts[ACROSS + i], parts[DOWN + i]
+        both = across * down
+        right, under = steps * across - both, steps * down - both
+        rest = steps * (steps - across - down) + both
+        above, below = rest * _byte(a, 0) + right * _byte(b, 1), under * _byte(c, 0) + both * _byte(d, 1)
+        parts[BLUE + i] = above + below
+        above, below = rest * _byte(a, 1) + right * _byte(b, 2), under * _byte(c, 1) + both * _byte(d, 2)
+        parts[GREEN + i] = above + below
+        above, below = rest * _byte(b, 0) + right * _byte(b, 3), under * _byte(d, 0) + both * _byte(d, 3)
+        parts[RED + i] = above + below
+
+
+@compiled
+def sample_points(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+    """Take the samples at the first ``count`` places of a ``Room``, which must lie in the image."""
+    _aim(height, width, room.places, room.parts, count)
+    _fetch(flat, width, room.places, room.words, count)
+    _mix(room.words, room.parts, count)
+
+
+@compiled
+def sample_patches(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+    """``sample_patch`` for the first ``count`` patches of a ``Room``."""
+    patches, parts = room.patches, room.parts
+    for i in range(count):
+        x, y, r = patches[X + i], patches[Y + i], patches[RADIUS + i]
+        inside = (r >= 0.0) & (x >= r) & (y >= r) & (x <= width - 1.0 - r) & (y <= height - 1.0 - r)
+        patches[INSIDE + i] = inside
+        for channel in range(3):
+            patches[COLOR + channel * POINTS + i] = 0.0
+    for k in range(HEXAGON.shape[0]):
+        _place_around(height, width, k, patches, room.places, count)
+        sample_points(flat, height, width, count, room)
+        for channel in range(3):
+            for i in range(count):
+                patches[COLOR + channel * POINTS + i] += parts[channel * POINTS + i]
+    for channel in range(3):
+        for i in range(count):
+            patches[COLOR + channel * POINTS + i] *= 1.0 / (7 * STEPS * STEPS)
+
+
+@compiled
+def _place_around(height, width, k, patches, places, count):  # type: ignore[no-untyped-def]
+    """Place a sample in every patch, at its center or a corner of its hexagon; somewhere where it lies outside."""
+    u, v = HEXAGON[k]
+    for i in range(count):
+        x, y = patches[X + i] + patches[RADIUS + i] * u, patches[Y + i] + patches[RADIUS + i] * v
+        inside = patches[INSIDE + i] > 0.0
+        places[X + i] = fixed(min(x, width - SHORT) if inside else 0.0)
+        places[Y + i] = fixed(min(y, height - SHORT) if inside else 0.0)

@@ -1,0 +1,196 @@
+"""The Delaunay triangles of points in the plane, with their neighbours: a general library takes twice the time of all
+the rest of the numbering.
+
+Points are inserted one by one in rows of a grid, each walked to from the one before (Lawson 1977): split the triangle
+that holds it, then flip every edge whose other triangle has the new point in its circle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.numeric.compilation import compiled
+
+FAR = 64.0  # of the points' extent, to the corners of the triangle that holds them all
+SLACK = 1e-15  # in units of the extent: points on a line, or on a circle, to within rounding
+CELL_POINTS = 3.0  # to a cell of the grid that orders the insertion
+
+
+@compiled
+def _order(points):  # type: ignore[no-untyped-def]
+    """The points' order along rows of a grid, every other row backwards."""
+    count = points.shape[0]
+    low_x, low_y = points[:, 0].min(), points[:, 1].min()
+    width, height = points[:, 0].max() - low_x, points[:, 1].max() - low_y
+    step = np.sqrt(max(width * height * CELL_POINTS / count, 1e-300))
+    key = np.empty(count)
+    for i in range(count):
+        row = np.floor((points[i, 1] - low_y) / step)
+        along = (points[i, 0] - low_x) / max(width, 1e-300)
+        key[i] = row + (0.999 * along if row % 2.0 == 0.0 else 0.999 * (1.0 - along))
+    return np.argsort(key)
+
+
+@compiled
+def _side(xy, a, b, p):  # type: ignore[no-untyped-def]
+    """Twice the area of a, b, p; positive where p lies on the inner side of a triangle's edge a-b."""
+    ax, ay = xy[a, 0], xy[a, 1]
+    return (xy[b, 0] - ax) * (xy[p, 1] - ay) - (xy[b, 1] - ay) * (xy[p, 0] - ax)
+
+
+@compiled
+def _in_circle(xy, a, b, c, p):  # type: ignore[no-untyped-def]
+    """Positive when p lies in the circle through a, b, c (which turn positively)."""
+    px, py = xy[p, 0], xy[p, 1]
+    ax, ay, bx, by, cx, cy = (
+        xy[a, 0] - px,
+        xy[a, 1] - py,
+        xy[b, 0] - px,
+        xy[b, 1] - py,
+        xy[c, 0] - px,
+        xy[c, 1] - py,
+    )
+    aa, bb, cc = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
+    return aa * (bx * cy - by * cx) - bb * (ax * cy - ay * cx) + cc * (ax * by - ay * bx)
+
+
+@compiled
+def _find(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-untyped-def]
+    """The triangle of those found that holds p, walked to from another; -1 should rounding lead in circles."""
+    f = start
+    for _ in range(4 * found):
+        outside = -1
+        for k in range(3):
+            if _side(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -slack:
+                outside = k
+                break
+        if outside < 0:
+            return f
+        f = neighbours[f, outside]
+        if f < 0:
+            return -1
+    return -1
+
+
+@compiled
+def _replace(neighbours, face, old, new):  # type: ignore[no-untyped-def]
+    """Let a face's neighbour ``old`` be ``new``."""
+    if face >= 0:
+        for k in range(3):
+            if neighbours[face, k] == old:
+                neighbours[face, k] = new
+
+
+@compiled
+def _split(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
+    """Split face f by the point p, which becomes vertex 0 of f and of the two new faces count and count + 1."""
+    a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+    na, nb, nc = neighbours[f, 0], neighbours[f, 1], neighbours[f, 2]
+    g, h = count, count + 1
+    faces[f, 0], faces[f, 1], faces[f, 2] = p, b, c
+    faces[g, 0], faces[g, 1], faces[g, 2] = p, c, a
+    faces[h, 0], faces[h, 1], faces[h, 2] = p, a, b
+    neighbours[f, 0], neighbours[f, 1], neighbours[f, 2] = na, g, h
+    neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = nb, h, f
+    neighbours[h, 0], neighbours[h, 1], neighbours[h, 2] = nc, f, g
+    _replace(neighbours, nb, f, g)
+    _replace(neighbours, nc, f, h)
+
+
+@compiled
+def _legalise(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-untyped-def]
+    """Flip the edges opposite to the new point, vertex 0 of the faces on the stack, until none is in a circle."""
+    for _ in range(stack.shape[0] - height):  # more flips than that only rounding can ask for
+        if height == 0:
+            break
+        height -= 1
+        f = stack[height]
+        g = neighbours[f, 0]
+        if g < 0:
+            continue
+        p, a, b = faces[f, 0], faces[f, 1], faces[f, 2]
+        k = 0 if neighbours[g, 0] == f else 1 if neighbours[g, 1] == f else 2
+        d = faces[g, k]
+        if not _in_circle(xy, p, a, b, d) > slack:
+            continue
+        # f = p, a, b and g = d, b, a become f = p, a, d and g = p, d, b
+        beyond_ad, beyond_db = neighbours[g, (k + 1) % 3], neighbours[g, (k + 2) % 3]
+        beyond_pb = neighbours[f, 1]
+        faces[f, 2] = d
+        faces[g, 0], faces[g, 1], faces[g, 2] = p, d, b
+        neighbours[f, 0], neighbours[f, 1] = beyond_ad, g
+        neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = beyond_db, beyond_pb, f
+        _replace(neighbours, beyond_ad, g, f)
+        _replace(neighbours, beyond_pb, f, g)
+        stack[height], stack[height + 1] = f, g
+        height += 2
+
+
+@compiled
+def _triangulate(points, order):  # type: ignore[no-untyped-def]
+    """All triangles, those with a corner beyond the points among them, and their neighbours."""
+    count = points.shape[0]
+    xy = np.empty((count + 3, 2))
+    middle = np.array(
+        [0.5 * (points[:, 0].min() + points[:, 0].max()), 0.5 * (points[:, 1].min() + points[:, 1].max())]
+    )
+    extent = max(np.ptp(points[:, 0]), np.ptp(points[:, 1]), 1e-300)
+    xy[:count] = (points - middle) / extent
+    for k in range(3):
+        angle = 0.3 + 2.0 * np.pi * k / 3.0
+        xy[count + k, 0], xy[count + k, 1] = FAR * np.cos(angle), FAR * np.sin(angle)
+    faces = np.full((2 * count + 1, 3), -1, np.int32)
+    neighbours = np.full((2 * count + 1, 3), -1, np.int32)
+    stack = np.empty(4 * count + 64, np.int32)
+    for k in range(3):
+        faces[0, k] = count + k
+    found, last = 1, 0
+    for i in order:
+        f = _find(xy, faces, neighbours, last, found, i, SLACK)
+        if f < 0:
+            continue
+        twice = False
+        for k in range(3):
+            twice = twice or (xy[faces[f, k], 0] == xy[i, 0] and xy[faces[f, k], 1] == xy[i, 1])
+        if twice:
+            continue
+        _split(faces, neighbours, f, found, i)
+        stack[0], stack[1], stack[2] = f, found, found + 1
+        found += 2
+        _legalise(xy, faces, neighbours, stack, 3, SLACK)
+        last = f
+    return faces[:found], neighbours[:found]
+
+
+@compiled
+def _inner(faces, neighbours, count):  # type: ignore[no-untyped-def]
+    """The triangles whose corners are all points, numbered anew."""
+    number = np.full(faces.shape[0], -1, np.int32)
+    kept = 0
+    for f in range(faces.shape[0]):
+        if max(faces[f, 0], faces[f, 1], faces[f, 2]) < count:
+            number[f] = kept
+            kept += 1
+    inner, beside = np.empty((kept, 3), np.int32), np.full((kept, 3), -1, np.int32)
+    for f in range(faces.shape[0]):
+        n = number[f]
+        if n < 0:
+            continue
+        for k in range(3):
+            inner[n, k] = faces[f, k]
+            if neighbours[f, k] >= 0:
+                beside[n, k] = number[neighbours[f, k]]
+    return inner, beside
+
+
+def delaunay(points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Delaunay triangles of points (N, 2), finite: (F, 3) int32 their corners, turning from x to y, and (F, 3) int32
+    the triangle across the edge opposite to each corner, or -1.
+
+    Of points at one place the first inserted is used. Along the hull, slivers may be missing.
+    """
+    if len(points) < 3:
+        return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)
+    faces, neighbours = _triangulate(points, _order(points))
+    return _inner(faces, neighbours, len(points))  # type: ignore[no-any-return]

@@ -1,0 +1,38 @@
+"""Small vectors and dense systems inside compiled loops."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from extractor.numeric.compilation import compiled
+
+
+@compiled
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """The product of two vectors of three."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def cholesky_solve(gram, right, count):  # type: ignore[no-untyped-def]
+    """Replace the rows of ``right`` by the solutions of gram x = row.
+
+    ``gram`` is symmetric and positive definite; its first ``count`` rows' lower triangle is read, and overwritten.
+    """
+    for j in range(count):
+        for k in range(j):
+            gram[j, j] -= gram[j, k] ** 2
+        gram[j, j] = np.sqrt(gram[j, j])
+        for i in range(j + 1, count):
+            for k in range(j):
+                gram[i, j] -= gram[i, k] * gram[j, k]
+            gram[i, j] /= gram[j, j]
+    for row in range(right.shape[0]):
+        for j in range(count):
+            for k in range(j):
+                right[row, j] -= gram[j, k] * right[row, k]
+            right[row, j] /= gram[j, j]
+        for j in range(count - 1, -1, -1):
+            for k in range(j + 1, count):
+                right[row, j] -= gram[k, j] * right[row, k]
+            right[row, j] /= gram[j, j]

@@ -1,0 +1,335 @@
+"""From the markers of two or more views to the surface in space: positions, displacements, normals, covariances.
+
+Everything is in mm of the layout frame: x right, y up, z out of the front. The views are placed once, by the markers at
+rest; each frame is then reconstructed by itself, so nothing drifts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.errors import PoseError
+from extractor.layout.reference import Reference
+from extractor.result import Markers, Status, VirtualStatus
+from extractor.space.camera import Array, View, finite
+from extractor.space.field import Field, along_edge
+from extractor.space.pose import Poses, place_views
+from extractor.space.rig import Rig
+from extractor.space.triangulation import DOUBT_SIGMAS, GATE_SIGMAS, PointReason, Points, triangulate
+
+MAX_SIGMA_EDGES = 0.1  # standard deviation of a position, above which it is not reported
+CROWD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
+MIN_REST = 3  # markers that must have a place at rest
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """The surface in one frame, in mm of the layout frame; NaN where unknown.
+
+    Attributes:
+        xyz_mm: (M, 3) float64, the markers by id.
+        cov_mm2: (M, 3, 3) float64: of the pixels' noise, of what the camera model leaves open, and of the poses. The
+            last part is common to all markers.
+        displacement_mm: (M, 3) float64 from the rest frame.
+        displacement_cov_mm2: (M, 3, 3) float64; errors of the poses that both frames share cancel.
+        normals: (M, 3) float64, unit vectors out of the front.
+        status: (M,) uint8, a ``Status`` each: the lesser of the views'.
+        reason: (M,) uint8, a ``PointReason`` each: why a marker has no position.
+        misfit: (M,) float64: by how many of its standard deviations the rays miss each other; also of markers that
+            are not reported for that.
+        virtual_xyz_mm, virtual_displacement_mm, virtual_normals: (E, m, 3) float64, on the smooth surface through
+            the markers, by edge from its smaller id.
+        virtual_cov_mm2: (E, m, 3, 3) float64.
+        virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
+        problem: which views show nothing, and why; empty where all show the pattern.
+    """
+
+    xyz_mm: Array
+    cov_mm2: Array
+    displacement_mm: Array
+    displacement_cov_mm2: Array
+    normals: Array
+    status: NDArray[np.uint8]
+    reason: NDArray[np.uint8]
+    misfit: Array
+    virtual_xyz_mm: Array
+    virtual_cov_mm2: Array
+    virtual_displacement_mm: Array
+    virtual_normals: Array
+    virtual_status: NDArray[np.uint8]
+    problem: str = ""
+
+    @property
+    def tac3d(self) -> dict[str, Array]:
+        """``3D_Positions``, ``3D_Displacements``, ``3D_Normals``: (M + E m, 3) each, the virtual markers last."""
+        pairs = {
+            "3D_Positions": (self.xyz_mm, self.virtual_xyz_mm),
+            "3D_Displacements": (self.displacement_mm, self.virtual_displacement_mm),
+            "3D_Normals": (self.normals, self.virtual_normals),
+        }
+        return {
+            name: np.concatenate([real, virtual.reshape(-1, 3)]) for name, (real, virtual) in pairs.items()
+        }
+
+
+class Reconstructor:
+    """Turns each frame's markers into a ``Shape``.
+
+    >>> from extractor import Reconstructor, ViewExtractor, load_layout, load_rig
+    >>> views = ViewExtractor(load_layout("layout.json"), load_rig("rig.toml"))  # doctest: +SKIP
+    >>> reconstructor = Reconstructor(views.layout, views.rig, views.extract(rest_image))  # doctest: +SKIP
+    >>> shape = reconstructor.reconstruct(views.extract(image))  # doctest: +SKIP
+
+    Args:
+        layout: any pattern.
+        rig: two views or more; those without a pose are placed by the markers at rest.
+        rest: the markers at rest, view by view; None: all poses are the rig's, and displacement is counted from the
+            layout's plane.
+        flatness_mm: standard deviation by which the markers at rest may lie off the layout, one number or (x, y, z).
+            0: the pattern at rest is the layout. Otherwise the views are placed jointly, and a dome is a dome.
+        model_px: what the camera model leaves open, as a standard deviation per axis that is added to the pixels'
+            own; None: what the rest frame's rays miss each other by beyond their covariances.
+        gate_sigmas: misfit above which a marker is not reported.
+        max_sigma_mm: standard deviation of a position above which it is not reported; None: a tenth of an edge.
+
+    Attributes:
+        poses: the views in their places, see ``Poses``.
+        rest_xyz_mm: (M, 3) float64, where the markers were at rest.
+
+    Raises:
+        PoseError: fewer than two views, a view that cannot be placed, or views that do not tell depth.
+    """
+
+    def __init__(
+        self,
+        layout: Reference,
+        rig: Rig,
+        rest: Sequence[Markers] | None,
+        *,
+        flatness_mm: float | tuple[float, float, float] = 0.0,
+        model_px: float | None = None,
+        gate_sigmas: float = GATE_SIGMAS,
+        max_sigma_mm: float | None = None,
+    ) -> None:
+        if len(rig.views) < 2:
+            raise PoseError(f"the rig has {len(rig.views)} view; depth needs two or more")
+        self.layout, self.rig = layout, rig
+        self.field = Field(layout)
+        edge_mm = np.linalg.norm(np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0], axis=1)
+        self._max_sigma_mm = (
+            MAX_SIGMA_EDGES * float(np.median(edge_mm)) if max_sigma_mm is None else max_sigma_mm
+        )
+        self._gate_sigmas = gate_sigmas
+        spread = np.broadcast_to(np.asarray(flatness_mm, np.float64), 3)
+        self.poses = self._placed(rest, (float(spread[0]), float(spread[1]), float(spread[2])))
+        self.model_px = 0.0 if model_px is None else model_px
+        flat = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
+        self._rest: Points | None = None
+        self.rest_xyz_mm: Array = flat
+        if rest is not None:
+            if model_px is None:
+                self.model_px = self._unexplained_px(rest)
+            self._rest = self._points(rest)
+            self._require_depth(rest, self._rest)
+            self.rest_xyz_mm = self._rest.xyz_mm
+        self._rest_virtual_mm = self._virtual(self.rest_xyz_mm)
+
+    def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
+        """The surface that the views show; a view that shows nothing is data, never an exception.
+
+        Args:
+            markers: view by view, in the rig's order and the frame of the full image; None: no picture was had.
+        """
+        kept, problem = self._sorted_out(markers)
+        points = self._widened(self._points(kept))
+        status = np.max(
+            [
+                np.where(_seen(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
+                for m in kept
+            ],
+            axis=0,
+        )
+        status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
+        normals = self.field.normals(points.xyz_mm)
+        virtual_mm = self._virtual(points.xyz_mm)
+        known = finite(virtual_mm)
+        cov = points.cov_mm2 + _through(points.by_pose, self.poses.cov)
+        return Shape(
+            xyz_mm=points.xyz_mm,
+            cov_mm2=cov,
+            displacement_mm=points.xyz_mm - self.rest_xyz_mm,
+            displacement_cov_mm2=self._displacement_cov(points),
+            normals=normals,
+            status=status,
+            reason=points.reason,
+            misfit=points.misfit,
+            virtual_xyz_mm=virtual_mm,
+            virtual_cov_mm2=self._virtual_cov(cov, known),
+            virtual_displacement_mm=virtual_mm - self._rest_virtual_mm,
+            virtual_normals=self._virtual_normals(normals, known),
+            virtual_status=np.where(known, VirtualStatus.INTERPOLATED, VirtualStatus.LOST).astype(np.uint8),
+            problem=problem,
+        )
+
+    @property
+    def rest_positions_mm(self) -> Array:
+        """(M + E m, 3) float64, where all points were at rest, the virtual ones last."""
+        return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
+
+    def _placed(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
+        views = self.rig.views
+        if rest is None:
+            missing = [view.name for view in views if not view.placed]
+            if missing:
+                raise PoseError(f"view {missing[0]!r} has no pose; give its R and t, or markers at rest")
+            none = np.zeros(len(self.layout.xy_mm), np.bool_)
+            cov = np.zeros((6 * len(views), 6 * len(views)))
+            return Poses(tuple(views), cov, float("nan"), np.full(len(views), np.nan), none)
+        self._require_count(rest)
+        for view, markers in zip(views, rest, strict=True):
+            if markers.reason is not None:
+                raise PoseError(
+                    f"view {view.name!r} shows no pattern at rest ({markers.reason}); choose another frame"
+                )
+        measured = [np.where((m.status == Status.MEASURED)[:, None], m.xy_px, np.nan) for m in rest]
+        cov = np.stack([m.cov_px2 for m in rest])
+        poses = place_views(views, self.layout.xy_mm, np.stack(measured), cov, spread_mm)
+        for view, markers in zip(poses.views, rest, strict=True):
+            if markers.mirrored is not None and markers.mirrored != _appears_mirrored(view):
+                raise PoseError(
+                    f"view {view.name!r}: its pose looks at the pattern from the other side than the rest frame shows; "
+                    "check R_camera_from_layout and mirrored"
+                )
+        return poses
+
+    def _require_count(self, markers: Sequence[Markers | None]) -> None:
+        if len(markers) != len(self.rig.views):
+            raise ValueError(f"markers of {len(markers)} views; the rig has {len(self.rig.views)}")
+
+    def _require_depth(self, rest: Sequence[Markers], points: Points) -> None:
+        if np.isfinite(points.xyz_mm[:, 0]).sum() >= MIN_REST:
+            return
+        both = np.logical_and.reduce([_seen(markers) for markers in rest])
+        reasons = np.bincount(points.reason[both], minlength=len(PointReason)) if both.any() else np.zeros(1)
+        why = PointReason(int(reasons.argmax())) if both.any() else PointReason.ONE_VIEW
+        names = " and ".join(repr(view.name) for view in self.rig.views)
+        says = {
+            PointReason.PARALLEL: "stand too near to each other to tell depth: a position's standard deviation would "
+            f"exceed {self._max_sigma_mm:.3g} mm",
+            PointReason.DISAGREE: "contradict each other at rest; check their intrinsics and which are mirrored",
+            PointReason.ONE_VIEW: "show no marker in common",
+            PointReason.NO_RAY: "have markers where the distortion has no inverse; check it",
+        }
+        raise PoseError(f"views {names} {says.get(why, 'show no marker in common')}")
+
+    def _sorted_out(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
+        """The views that show the pattern as their pose says, and what is wrong with the others."""
+        self._require_count(markers)
+        kept: list[Markers | None] = []
+        problems = []
+        for view, seen in zip(self.poses.views, markers, strict=True):
+            why = ""
+            if seen is None:
+                why = "no picture"
+            elif seen.reason is not None:
+                why = str(seen.reason)
+            elif seen.mirrored is not None and seen.mirrored != _appears_mirrored(view):
+                why = "shows the pattern's other side"
+            kept.append(None if why else seen)
+            if why:
+                problems.append(f"{view.name}: {why}")
+        return kept, "; ".join(problems)
+
+    def _points(self, markers: Sequence[Markers | None], model_px: float | None = None) -> Points:
+        count = len(self.layout.xy_mm)
+        more = np.eye(2) * (self.model_px if model_px is None else model_px) ** 2
+        xy = [np.full((count, 2), np.nan) if m is None else m.xy_px for m in markers]
+        cov = [np.full((count, 2, 2), np.nan) if m is None else m.cov_px2 + more for m in markers]
+        return triangulate(
+            self.poses.views,
+            np.stack(xy),
+            np.stack(cov),
+            cov_pose=self.poses.cov,
+            max_sigma_mm=self._max_sigma_mm,
+            gate_sigmas=np.inf if model_px is not None else self._gate_sigmas,
+        )
+
+    def _widened(self, points: Points) -> Points:
+        """Covariances where a whole neighbourhood's rays miss each other by more than they should.
+
+        Under a sharp contact gridlines bend more than extraction can follow, and its covariances do not say so.
+        """
+        around = self.field.mean_around(points.misfit**2)
+        more = np.where(around > CROWD_SIGMAS**2, around, 1.0)
+        done = np.where(points.misfit > DOUBT_SIGMAS, points.misfit**2, 1.0)
+        factor = np.where(np.isfinite(more), np.maximum(more / done, 1.0), 1.0)
+        return replace(points, cov_mm2=points.cov_mm2 * factor[:, None, None])
+
+    def _unexplained_px(self, rest: Sequence[Markers]) -> float:
+        """What the rest frame's rays miss each other by beyond their covariances; those far off do not count."""
+        misfit = self._points(rest, 0.0).misfit
+        misfit = misfit[np.isfinite(misfit)]
+        if len(misfit) < MIN_REST:
+            return 0.0
+        usual = misfit[misfit <= GATE_SIGMAS * np.median(misfit)]
+        variance = np.mean([np.nanmedian(np.trace(m.cov_px2, axis1=1, axis2=2)) / 2 for m in rest])
+        return float(np.sqrt(max(0.0, np.mean(usual**2) - 1) * variance))
+
+    def _displacement_cov(self, points: Points) -> Array:
+        if self._rest is None:
+            return points.cov_mm2 + _through(points.by_pose, self.poses.cov)
+        moved = points.by_pose - self._rest.by_pose
+        return points.cov_mm2 + self._rest.cov_mm2 + _through(moved, self.poses.cov)
+
+    def _virtual(self, xyz_mm: Array) -> Array:
+        """(E, m, 3) on the smooth surface through markers (M, 3); straight where too few neighbours are known."""
+        start, end = self.layout.edges.T
+        step = self.layout.xy_mm[end] - self.layout.xy_mm[start]
+        slopes = self.field.gradients(xyz_mm)
+        chord = xyz_mm[end] - xyz_mm[start]
+        at_ends = [np.einsum("ekd,ed->ek", slopes[ids], step) for ids in (start, end)]
+        first, last = (np.where(np.isfinite(slope), slope, chord) for slope in at_ends)
+        return along_edge(xyz_mm[start], xyz_mm[end], first, last, self._fractions)
+
+    @property
+    def _fractions(self) -> Array:
+        count = self.layout.virtual_per_edge
+        return (np.arange(count) + 1.0) / (count + 1)
+
+    def _virtual_cov(self, cov: Array, known: NDArray[np.bool_]) -> Array:
+        """By the shares of the edge's two markers; the directions at the ends add little."""
+        flat = cov.reshape(len(cov), 9)
+        start, end = self.layout.edges.T
+        share = 3 * self._fractions**2 - 2 * self._fractions**3
+        squares = (1 - share[:, None]) ** 2 * flat[start, None] + share[:, None] ** 2 * flat[end, None]
+        return np.asarray(np.where(known[..., None, None], squares.reshape(*known.shape, 3, 3), np.nan))
+
+    def _virtual_normals(self, normals: Array, known: NDArray[np.bool_]) -> Array:
+        start, end = self.layout.edges.T
+        t = self._fractions[:, None]
+        mixed = (1 - t) * normals[start, None] + t * normals[end, None]
+        unit = mixed / np.linalg.norm(mixed, axis=2, keepdims=True)
+        return np.asarray(np.where(known[..., None], unit, np.nan))
+
+
+def _seen(markers: Markers) -> NDArray[np.bool_]:
+    return finite(markers.xy_px)
+
+
+def _appears_mirrored(view: View) -> bool:
+    """The pattern's picture is turned over: seen from the back, or from the front through a mirror."""
+    return bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0)
+
+
+def _through(by_pose: Array, cov: Array) -> Array:
+    return np.asarray(by_pose @ cov @ np.swapaxes(by_pose, 1, 2))
+
+
+def shifted(markers: Markers, offset_px: tuple[float, float]) -> Markers:
+    """The same markers in a frame whose origin lies this much further left and up."""
+    offset = np.asarray(offset_px, np.float64)
+    return replace(markers, xy_px=markers.xy_px + offset, virtual_xy_px=markers.virtual_xy_px + offset)

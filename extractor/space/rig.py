@@ -1,0 +1,140 @@
+"""The rig file: which views a sensor has. TOML, one [[view]] table a view; unknown fields are refused.
+
+[[view]]
+name = "left"
+focal_px = [900.0, 900.0]
+centre_px = [319.5, 239.5]
+distortion = [0.0, 0.0, 0.0, 0.0, 0.0]     # k1, k2, p1, p2, k3; may be left out
+area_px = [0, 0, 320, 480]                 # x, y, width, height; left out: the whole image
+mirrored = false                           # an odd number of mirrors in between; may be left out
+# R_camera_from_layout = [[...], [...], [...]], t_camera_from_layout_mm = [...]: left out: from the rest frame
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from extractor.errors import RigError
+from extractor.layout.json_fields import shown
+from extractor.space.camera import View
+
+NUMBERS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "area_px": 4, "t_camera_from_layout_mm": 3}
+NEEDED = ("focal_px", "centre_px")
+KNOWN = ("name", *NUMBERS, "mirrored", "R_camera_from_layout")
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A sensor's views, in the order of the file.
+
+    Raises:
+        RigError: no view, or two of one name.
+    """
+
+    views: tuple[View, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "views", tuple(self.views))
+        names = [view.name for view in self.views]
+        if not names:
+            raise RigError("view is missing; expected at least one [[view]] table")
+        for name in names:
+            if names.count(name) > 1:
+                raise RigError(
+                    f"the view's name {name!r} is given {names.count(name)} times; give each its own"
+                )
+
+    def without_poses(self) -> Rig:
+        """The same views, to be placed by a rest frame; whether they are mirrored is kept."""
+        poseless = {"R_camera_from_layout": None, "t_camera_from_layout_mm": None}
+        return Rig(tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(view.name for view in self.views)
+
+
+def load_rig(path: str | PathLike[str]) -> Rig:
+    """Read and check a rig file; a scene file with [[view]] tables serves, too: its other tables are not read.
+
+    Raises:
+        RigError: one line that names the file, the field, the value and what is expected.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
+        raise RigError(f"{path}: cannot be read: {reason}") from None
+    return parse_rig(text, str(path))
+
+
+def parse_rig(text: str, name: str = "rig") -> Rig:
+    """The rig in a TOML text; ``name`` opens every error's message.
+
+    Raises:
+        RigError: see ``load_rig``.
+    """
+    try:
+        document = tomllib.loads(text)
+        tables = document.get("view")
+        if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
+            raise RigError("view is missing; expected at least one [[view]] table")
+        return Rig(tuple(_view(table, index) for index, table in enumerate(tables)))
+    except tomllib.TOMLDecodeError as error:
+        raise RigError(f"{name}: not TOML: {error}") from None
+    except RigError as error:
+        raise RigError(f"{name}: {error}") from None
+
+
+def _view(table: Mapping[str, Any], index: int) -> View:
+    where = f"view[{index}]."
+    for field in table:
+        if field not in KNOWN:
+            _fail(where + shown(field), "unknown", f"only the fields {', '.join(KNOWN)}")
+    for field in NEEDED:
+        if field not in table:
+            _fail(where + field, "missing", f"{NUMBERS[field]} numbers")
+    values: dict[str, Any] = {
+        field: _numbers(table[field], where + field, count, field == "area_px")
+        for field, count in NUMBERS.items()
+        if field in table
+    }
+    name = table.get("name", f"view{index}")
+    if not isinstance(name, str) or not name or not name.isprintable():
+        _fail(where + "name", shown(name), "a printable text")
+    if "mirrored" in table:
+        if not isinstance(table["mirrored"], bool):
+            _fail(where + "mirrored", shown(table["mirrored"]), "true or false")
+        values["mirrored"] = table["mirrored"]
+    if "R_camera_from_layout" in table:
+        values["R_camera_from_layout"] = _matrix(
+            table["R_camera_from_layout"], where + "R_camera_from_layout"
+        )
+    return View(name=name, **values)
+
+
+def _matrix(value: object, field: str) -> list[tuple[float, ...]]:
+    if not isinstance(value, list) or len(value) != 3:
+        _fail(field, shown(value), "3 rows of 3 numbers")
+    return [_numbers(row, f"{field}[{i}]", 3, False) for i, row in enumerate(value)]
+
+
+def _numbers(value: object, field: str, count: int, whole: bool) -> tuple[float, ...]:
+    kinds = (int,) if whole else (int, float)
+    if not isinstance(value, list) or len(value) != count:
+        _fail(field, shown(value), f"{count} numbers")
+    for i, item in enumerate(value):
+        if type(item) not in kinds or not np.isfinite(item):
+            _fail(f"{field}[{i}]", shown(item), "a whole number" if whole else "a finite number")
+    return tuple(value)
+
+
+def _fail(field: str, value: str, expected: str) -> NoReturn:
+    raise RigError(f"{field} is {value}; expected {expected}")

@@ -1,0 +1,170 @@
+"""One image that holds several views, as behind a pair of mirrors, or one image a view: each is read by itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.errors import ImageError
+from extractor.layout.reference import Reference
+from extractor.pipeline import Extractor
+from extractor.presets import Preset
+from extractor.result import Markers
+from extractor.space.camera import View
+from extractor.space.reconstruction import Reconstructor, Shape, shifted
+from extractor.space.rig import Rig
+from extractor.track.tracker import FrameStatus, Tracked, Tracker
+
+Image = NDArray[Any]
+
+
+def cut(image: Any, view: View) -> Any:
+    """The part of an image that a view fills.
+
+    Raises:
+        ImageError: not an image, or the area reaches beyond it.
+    """
+    if view.area_px is None:
+        return image
+    x, y, width, height = view.area_px
+    if not isinstance(image, np.ndarray) or image.ndim < 2:
+        raise ImageError(
+            f"view {view.name!r}: the image is {type(image).__name__}; give a numpy array (H, W, 3)"
+        )
+    if x + width > image.shape[1] or y + height > image.shape[0]:
+        raise ImageError(
+            f"view {view.name!r}: area_px {list(view.area_px)} reaches beyond the image of "
+            f"{image.shape[1]} x {image.shape[0]} px"
+        )
+    return np.ascontiguousarray(image[y : y + height, x : x + width])
+
+
+def _origin(view: View) -> tuple[float, float]:
+    return (0.0, 0.0) if view.area_px is None else (float(view.area_px[0]), float(view.area_px[1]))
+
+
+def _images(image: Image | Sequence[Image | None] | None, rig: Rig) -> list[Image | None]:
+    """An image for every view."""
+    if image is None or isinstance(image, np.ndarray):
+        return [image] * len(rig.views)
+    if len(image) != len(rig.views):
+        raise ImageError(f"{len(image)} images; give one for all views, or one for each of {len(rig.views)}")
+    return list(image)
+
+
+class ViewExtractor:
+    """Finds the markers of every view.
+
+    Raises:
+        LayoutError: the layout is not a triangular pattern.
+    """
+
+    def __init__(self, layout: Reference, rig: Rig, preset: Preset = "balanced") -> None:
+        self.layout, self.rig = layout, rig
+        self._extractor = Extractor(layout, preset)
+
+    def extract(self, image: Image | Sequence[Image]) -> tuple[Markers, ...]:
+        """The markers view by view, in the frame of the full image.
+
+        Args:
+            image: one that holds all views, or a sequence of one for each.
+
+        Raises:
+            ImageError: not an image, or smaller than a view's area.
+        """
+        found = []
+        for view, picture in zip(self.rig.views, _images(image, self.rig), strict=True):
+            found.append(shifted(self._extractor.extract(cut(picture, view)), _origin(view)))
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFrame:
+    """One frame in space.
+
+    Attributes:
+        index: its place in the sequence, from 0.
+        time_s: its time stamp in seconds; NaN where none was given.
+        status: ``TRACKED`` when at least one marker has a position.
+        reason: why not, or which view shows nothing; empty when all do.
+        shape: the surface.
+        views: what tracking says of every view.
+        elapsed_ms: what it took, images to surface.
+    """
+
+    index: int
+    time_s: float
+    status: FrameStatus
+    reason: str
+    shape: Shape
+    views: tuple[Tracked, ...]
+    elapsed_ms: float
+
+
+class ShapeTracker:
+    """Follows the surface through a sequence; a frame that cannot be read says so and keeps its place.
+
+    Args:
+        reconstructor: with the views in their places.
+        warm: start from the frame before where the image proves it.
+    """
+
+    def __init__(self, reconstructor: Reconstructor, *, warm: bool = True) -> None:
+        self.reconstructor = reconstructor
+        self._trackers = [Tracker(reconstructor.layout, warm=warm) for _ in reconstructor.rig.views]
+        self._count = 0
+
+    def track(
+        self, image: Image | Sequence[Image | None] | None, *, time_s: float = float("nan"), reason: str = ""
+    ) -> ShapeFrame:
+        """The next frame, whatever it holds.
+
+        Args:
+            image: one for all views or one for each; None where none could be had, for ``reason``.
+            time_s: its time stamp.
+        """
+        started = time.perf_counter()
+        rig = self.reconstructor.rig
+        pictures = _images(image, rig)
+        tracked = tuple(
+            self._view(view, tracker, picture, time_s, reason)
+            for view, tracker, picture in zip(rig.views, self._trackers, pictures, strict=True)
+        )
+        shown = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
+        shape = self.reconstructor.reconstruct(shown)
+        found = bool(np.isfinite(shape.xyz_mm).any())
+        worst = max((frame.status for frame in tracked), default=FrameStatus.LOST)
+        status = FrameStatus.TRACKED if found else max(worst, FrameStatus.LOST)
+        frame = ShapeFrame(
+            index=self._count,
+            time_s=time_s,
+            status=FrameStatus(status),
+            reason=_reason(rig, tracked, shape, found),
+            shape=shape,
+            views=tracked,
+            elapsed_ms=1e3 * (time.perf_counter() - started),
+        )
+        self._count += 1
+        return frame
+
+    def _view(self, view: View, tracker: Tracker, image: Image | None, time_s: float, reason: str) -> Tracked:
+        try:
+            part = None if image is None else cut(image, view)
+        except ImageError as error:
+            part, reason = None, str(error)
+        frame = tracker.track(part, time_s=time_s, reason=reason)
+        return replace(frame, markers=shifted(frame.markers, _origin(view)))
+
+
+def _reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: bool) -> str:
+    said = [f"{name}: {frame.reason}" for name, frame in zip(rig.names, tracked, strict=True) if frame.reason]
+    if not said and shape.problem:
+        said = [shape.problem]
+    if not said and not found:
+        said = ["the views have no marker in common that can be believed"]
+    return "; ".join(said)
