@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import OutputError as OutputError
+    from cmpdesign.files.layout_json import layout_to_json as layout_to_json
     from cmpdesign.files.layout_json import write_layout as write_layout
     from cmpdesign.layout.build import build_layout as build_layout
     from cmpdesign.layout.checks import check_design as check_design
@@ -30,6 +31,7 @@ _HOMES = {
     "OutputError": "cmpdesign.errors",
     "build_layout": "cmpdesign.layout.build",
     "check_design": "cmpdesign.layout.checks",
+    "layout_to_json": "cmpdesign.files.layout_json",
     "load_design": "cmpdesign.design.design",
     "write_layout": "cmpdesign.files.layout_json",
     "write_svg": "cmpdesign.products.drawing.svg",

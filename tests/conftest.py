@@ -1,36 +1,12 @@
-"""What several test files share: small layouts and their documents, made once."""
+"""What pytest hands to the tests of every folder."""
 
 from __future__ import annotations
 
-import json
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from cmpdesign.design.design import load_design
-from cmpdesign.files.layout_json import layout_to_json
-from cmpdesign.layout.build import build_layout
-from cmpdesign.layout.layout import Layout
-
-PATTERNS = ("honeycomb", "round", "elliptical", "square")
-
-
-@cache
-def small_layout(pattern: str = "honeycomb", layers: int = 2) -> Layout:
-    return build_layout(load_design(pattern, {"layers": str(layers), "pitch_mm": "1.5"}))
-
-
-@cache
-def small_text(pattern: str = "honeycomb", layers: int = 2) -> str:
-    return layout_to_json(small_layout(pattern, layers))
-
-
-def small_document(pattern: str = "honeycomb", layers: int = 2) -> dict[str, Any]:
-    """A fresh copy, free to be damaged."""
-    document: dict[str, Any] = json.loads(small_text(pattern, layers))
-    return document
+from tests.support.layouts import small_text
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import contact, drawings, fields, gallery, hero, measured, scene_templates, stages, surface
+from . import fields, gallery, measured
+from .pictures import contact, drawings, hero, scene_templates, stages, surface
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"

@@ -1,1 +1,0 @@
-"""Every figure that the documentation states: one command each, conditions printed with it."""

@@ -1,0 +1,157 @@
+"""The benchmarks that figures are quoted from run, and their arithmetic is right."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.suites.article.corners import plain_triangles
+from benchmarks.suites.comparison.measure import errors_of, measure
+from benchmarks.suites.comparison.methods import METHODS, REFERENCE
+from benchmarks.suites.comparison.report import markdown, picture
+from benchmarks.support.published import filled
+from benchmarks.support.scenes import Case, checkerboard, inner_markers
+from cmpdesign.patterns.colors import BLACK, RED, WHITE
+from cmpdesign.scene import Rendered, Truth, standard_layout
+from extractor.cells.region_growing import Regions
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("startup", {"conditions", "processes", "largest"}),
+        ("rendering", {"conditions", "errors", "speeds"}),
+        ("contact", {"conditions", "contacts", "closed_forms_percent"}),
+        (
+            "extraction",
+            {"conditions", "presets", "large", "over_pixels", "over_markers", "growth"},
+        ),
+    ],
+)
+def test_a_quick_run_prints_and_writes(name: str, keys: set[str], tmp_path: Path) -> None:
+    out = tmp_path / "figures.json"
+    command = [sys.executable, "-m", f"benchmarks.{name}", "--quick", "--json", str(out)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "Python" in result.stdout and "…" not in result.stdout
+    figures = json.loads(out.read_text(encoding="utf-8"))
+    assert set(figures) == keys and figures["conditions"]["cpu"]
+    for error in figures.get("errors", []):
+        assert error["edge_rms_px"] < 3e-4 and error["edge_largest_px"] < 1e-3 and error["edges"] > 50
+    for scene in figures.get("accuracy", []):
+        assert scene["wrong"] == 0 and scene["measured_share"] > 0.99
+        assert scene["rms_inner_px"] > 0.9 * scene["bound_inner_px"]
+
+
+def test_the_benchmark_of_molds_runs(tmp_path: Path) -> None:
+    out = tmp_path / "figures.json"
+    command = [sys.executable, "-m", "benchmarks.molds", "--quick", "--json", str(out)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stderr
+    figures = json.loads(out.read_text(encoding="utf-8"))
+    assert set(figures) == {"conditions", "seconds", "exponents", "booleans", "processes"}
+    assert list(figures["seconds"]) == ["9", "36"] and list(figures["booleans"]) == ["36"]
+    first, second = figures["processes"]
+    # Two processes, the same bytes.
+    assert first["digest"] == second["digest"] and first["gb"] < 1.5
+
+
+def test_exponents_are_slopes_in_the_logarithm() -> None:
+    code = (
+        "from benchmarks.extraction import exponent, per_unit, side_px\n"
+        "x = [1, 2, 4, 8]\n"
+        "print(exponent(x, [3 * v ** 1.5 for v in x]), *per_unit(x, [7 + 0.5 * v for v in x]), *side_px(12.0))"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
+    )
+    np.testing.assert_allclose(
+        [float(word) for word in result.stdout.split()], (1.5, 7, 0.5, 4000, 3000), rtol=1e-9
+    )
+
+
+def test_a_block_of_a_page_is_written_anew() -> None:
+    page = "# A\n\n<!-- one: written by make bench -->\nold\n<!-- end of one -->\n\nprose\n"
+    once = filled(page, {"one": "| new |", "other": "never"})
+    assert once == "# A\n\n<!-- one: written by make bench -->\n\n| new |\n\n<!-- end of one -->\n\nprose\n"
+    assert filled(once, {"one": "| new |"}) == once
+    for broken in (page.replace("<!-- end of one -->", ""), page + page):
+        with pytest.raises(ValueError, match="the block one"):
+            filled(broken, {"one": "| new |"})
+
+
+def rendered_at(true: np.ndarray) -> Rendered:
+    flat = np.pad(true, ((0, 0), (0, 1)))
+    nothing = np.empty((0, 0, 2))
+    truth = Truth(true, np.ones(len(true), bool), nothing, np.ones(0, bool), False, None, flat, nothing)
+    return Rendered(np.zeros((1, 1, 3), np.uint8), truth)
+
+
+def test_errors_are_the_markers_and_wrong_ones_are_counted() -> None:
+    layout = standard_layout("honeycomb", 2)
+    true = 20.0 * layout.marker_xy_mm
+    shifted = true + (0.1, -0.2)
+    errors, wrong = errors_of(shifted, True, layout, rendered_at(true))
+    np.testing.assert_allclose(errors, np.broadcast_to((0.1, -0.2), true.shape))
+    assert wrong == 0
+    shifted[[3, 4]] = shifted[[4, 3]]
+    shifted[5] = np.nan
+    errors, wrong = errors_of(shifted, True, layout, rendered_at(true))
+    assert wrong == 2 and list(np.flatnonzero(np.isnan(errors[:, 0]))) == [3, 4, 5]
+    # without numbers a swap is none; what lies between markers, and the second at one marker, is invented
+    listed = np.concatenate([shifted[np.arange(len(true)) != 5], true[:2] + 9.9, true[:1] + 0.3])
+    errors, wrong = errors_of(listed, False, layout, rendered_at(true))
+    assert wrong == 3 and list(np.flatnonzero(np.isnan(errors[:, 0]))) == [5]
+    np.testing.assert_allclose(np.nanmean(errors, axis=0), (0.1, -0.2))
+    errors, wrong = errors_of(np.empty((0, 2)), False, layout, rendered_at(true))
+    assert wrong == 0 and np.isnan(errors).all()
+
+
+def test_the_articles_corners_are_those_of_the_triangles() -> None:
+    """Regions drawn from known triangles: corners within a pixel, clockwise, and no triangle for a disc."""
+    owner = np.zeros((80, 160), np.int32)
+    corner = np.array([[10, 60], [40, 12], [68, 64]])
+    cv2.fillConvexPoly(owner, corner[:, None], 1)
+    cv2.circle(owner, (110, 40), 22, 2, -1)
+    regions = Regions(
+        owner, np.array([2, 3], np.uint8), np.zeros((2, 2), np.int32), np.zeros((2, 10)), np.ones(2, int)
+    )
+    found = plain_triangles(regions)
+    assert list(found.region) == [0] and list(found.ink) == [2]
+    away = np.linalg.norm(found.corner_px[0][:, None] - corner[None], axis=2)
+    assert away.min(axis=0).max() < 1.0
+    (ax, ay), (bx, by) = found.corner_px[0, 1:] - found.corner_px[0, 0]
+    assert ax * by - ay * bx > 0
+
+
+def test_the_checkerboard_is_one() -> None:
+    """Squares alternate, the red cell gone, and nothing black is outside."""
+    board = checkerboard(plain=True)
+    assert len(board.cell_color) == 441 and set(board.cell_color) == {BLACK, WHITE}
+    side = board.cell_color.reshape(21, 21)
+    assert (side[1:] != side[:-1]).all() and (side[:, 1:] != side[:, :-1]).all()
+    assert inner_markers(board).sum() == 400
+    assert (checkerboard(plain=False).cell_color == RED).sum() == 1
+
+
+@pytest.mark.slow
+def test_the_comparison_runs_on_one_scene() -> None:
+    """All methods read the flat scene; ours are numbered without a mistake, and the first of the bound."""
+    results = {result.method: result for result in measure(Case(), 2)}
+    assert set(results) == {method.name for method in METHODS}
+    for name, limit in (("fast", 2.0), ("balanced", 1.5), ("accurate", 1.1)):
+        mine = results[f"cmpdesign, {name}"]
+        assert mine.found_share == 1 and mine.wrong == 0 and mine.inner_px < limit * mine.bound_px
+    best = min(results.values(), key=lambda r: r.inner_px / r.bound_px)
+    assert best.method.startswith("cmpdesign") and results[REFERENCE].ratio == 1
+    assert picture(list(results.values())).startswith(b"\x89PNG")
+    assert markdown(list(results.values())).count("\n") == len(METHODS) + 1

@@ -1,0 +1,197 @@
+"""The command line on pictures: render and verify, with good, bad and damaged files."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cmpdesign.cli import app
+from cmpdesign.scene import load_truth
+from tests.support.command import refused, run
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a layout and a good picture of it."""
+    folder = tmp_path_factory.mktemp("made")
+    assert run("build", "round", "-o", folder, "--set", "layers=5", "--only", "layout").exit_code == 0
+    options = (
+        "--size",
+        "400x300",
+        "--pitch",
+        "24",
+        "--rotation",
+        "50",
+        "--tilt",
+        "20",
+        "--press",
+        "0.4",
+        "--noise",
+        "2",
+    )
+    result = run(
+        "render", folder / "layout.json", "-o", folder / "good.png", "--truth", folder / "truth.npz", *options
+    )
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def test_render_writes_picture_and_truth(made: Path) -> None:
+    image, truth = cv2.imread(str(made / "good.png")), load_truth(made / "truth.npz")
+    assert image is not None and image.shape == (300, 400, 3)
+    assert truth.marker_xy_px.shape == (91, 2) and truth.visible.all() and not truth.mirrored
+
+
+def test_render_is_seeded(made: Path, tmp_path: Path) -> None:
+    def rendered(seed: int) -> bytes:
+        options = ("--noise", "3", "--seed", seed)
+        assert run("render", made / "layout.json", "-o", tmp_path / "a.png", *options).exit_code == 0
+        return (tmp_path / "a.png").read_bytes()
+
+    assert rendered(1) == rendered(1) != rendered(2)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "expected"),
+    [
+        ("--pitch", "0", "pitch_px is 0"),
+        ("--pitch", "nan", "--pitch is nan; expected a finite number"),
+        ("--rotation", "inf", "--rotation is inf"),
+        ("--tilt", "89", "tilt_deg is 89"),
+        ("--blur", "-1", "blur_px is -1"),
+        ("--noise", "-1", "noise is -1"),
+        ("--press", "50", "fold"),
+        ("--size", "640", "expected WIDTHxHEIGHT"),
+        ("--truth", "missing/truth.npz", "missing/truth.npz"),
+    ],
+)
+def test_render_refuses(
+    option: str, value: str, expected: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert expected in refused("render", made / "layout.json", "-o", "image.png", f"{option}={value}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_verify_a_good_picture(made: Path, tmp_path: Path) -> None:
+    result = run(
+        "verify", made / "layout.json", made / "good.png", "-o", tmp_path, "--debug", tmp_path / "stages"
+    )
+    assert result.exit_code == 0, result.output
+    assert "good.png: verified (91 of 91 measured, 0 repaired, 0 lost" in result.stdout
+    report = json.loads((tmp_path / "verify.json").read_text(encoding="utf-8"))
+    assert report["verified"] is True
+    overlay = cv2.imread(str(tmp_path / "good.overlay.png"))
+    assert overlay is not None and overlay.shape[0] * 400 == overlay.shape[1] * 300
+    assert (overlay == (80, 255, 255)).all(axis=2).sum() > 91  # measured markers are yellow
+    stages = sorted((tmp_path / "stages").iterdir())
+    assert len(stages) >= 5
+    assert all(cv2.imread(str(path)) is not None for path in stages)
+
+
+def test_json_is_all_there_is_on_stdout(made: Path) -> None:
+    result = run("verify", made / "layout.json", made / "good.png", "--json")
+    report = json.loads(result.stdout)
+    assert result.exit_code == 0 and result.stderr == ""
+    assert report["images"][0]["measured"] == 91
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_alpha_and_16_bits_are_read(deep: bool, made: Path, tmp_path: Path) -> None:
+    image = cv2.imread(str(made / "good.png"))
+    assert image is not None
+    pixels: Any = (
+        image.astype(np.uint16) * 257 if deep else np.dstack([image, np.full((300, 400), 9, np.uint8)])
+    )
+    assert cv2.imwrite(str(tmp_path / "a.png"), pixels)
+    assert run("verify", made / "layout.json", tmp_path / "a.png").exit_code == 0
+
+
+def test_not_verified_says_why(made: Path, tmp_path: Path) -> None:
+    black = tmp_path / "black.png"
+    cv2.imwrite(str(black), np.zeros((100, 100, 3), np.uint8))
+    result = run("verify", made / "layout.json", black)
+    assert result.exit_code == 1 and "not verified: " in result.stdout
+    back = tmp_path / "back.png"
+    arguments = ("--size", "400x300", "--pitch", "24", "--mirrored")
+    assert run("render", made / "layout.json", "-o", back, *arguments).exit_code == 0
+    result = run("verify", made / "layout.json", back)
+    assert result.exit_code == 1 and "seen from the back" in result.stdout
+
+
+def test_a_bar_over_many_images_stays_on_stderr(made: Path, tmp_path: Path) -> None:
+    images = [made / "good.png", made / "none.png", made / "good.png"]
+    arguments = [str(value) for value in ("verify", made / "layout.json", *images)]
+    result = CliRunner().invoke(app, arguments, env={"FORCE_COLOR": "1"})
+    assert "verifying" in result.stderr and "error: " in result.stderr
+    lines = result.stdout.splitlines()
+    assert len(lines) == 2 and all("verified (91 of 91" in line for line in lines)
+
+
+def test_one_bad_file_among_many(made: Path, tmp_path: Path) -> None:
+    bad, gray = tmp_path / "bad.png", tmp_path / "gray.png"
+    bad.write_text("no picture")
+    cv2.imwrite(str(gray), np.zeros((50, 50), np.uint8))
+    images = [bad, made / "good.png", gray, made / "none.png", made / "good.png"]
+    result = run("verify", made / "layout.json", *images, "-o", tmp_path / "out")
+    assert result.exit_code == 2
+    assert result.stdout.count("verified (91 of 91") == 2
+    errors = result.stderr.splitlines()
+    assert len(errors) == 3 and all(line.startswith("error: ") for line in errors)
+    assert "a multicolor pattern needs color" in errors[1]
+    report = json.loads((tmp_path / "out" / "verify.json").read_text(encoding="utf-8"))
+    assert [image["verified"] for image in report["images"]] == [False, True, False, False, True]
+    assert report["verified"] is False and "is not an image" in report["images"][0]["error"]
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "verify.json",
+        "good.overlay.png",
+        "good-2.overlay.png",
+    }
+
+
+def test_the_worst_exit_code_counts(made: Path, tmp_path: Path) -> None:
+    black = tmp_path / "black.png"
+    cv2.imwrite(str(black), np.zeros((100, 100, 3), np.uint8))
+    assert run("verify", made / "layout.json", black, made / "good.png").exit_code == 1
+    assert run("verify", made / "layout.json", black, made / "none.png", made / "good.png").exit_code == 2
+
+
+def test_bad_layouts(made: Path, tmp_path: Path) -> None:
+    text = (made / "layout.json").read_text(encoding="utf-8")
+    layout = tmp_path / "layout.json"
+    for damaged, expected in (
+        (text.replace('"version": 1', '"version": 7'), "version is 7; expected 1"),
+        (text[: len(text) // 2], "not JSON, or truncated"),
+    ):
+        layout.write_text(damaged, encoding="utf-8")
+        assert expected in refused("verify", layout, made / "good.png")
+        assert expected in refused("render", layout, "-o", tmp_path / "image.png")
+
+
+def test_square_patterns_are_refused_in_one_line(tmp_path: Path) -> None:
+    assert run("build", "square", "-o", tmp_path, "--only", "layout").exit_code == 0
+    assert run("render", tmp_path / "layout.json", "-o", tmp_path / "image.png").exit_code == 0
+    assert "square" in refused("verify", tmp_path / "layout.json", tmp_path / "image.png")
+
+
+def test_output_that_cannot_be_written(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("here before")
+    assert "cannot be written" in refused(
+        "verify", made / "layout.json", made / "good.png", "-o", tmp_path / "file"
+    )
+    assert "cannot be written" in refused("render", made / "layout.json", "-o", tmp_path / "file" / "a.png")
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "replace", full)
+    assert "No space left" in refused("render", made / "layout.json", "-o", tmp_path / "a.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

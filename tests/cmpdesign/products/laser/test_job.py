@@ -1,0 +1,284 @@
+"""The job as a user meets it: refused or made, in which order and time; and what the camera sees of the result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import resvg_py
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner, Result
+
+from cmpdesign.cli import app
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.laser.as_made_svg import as_made_svg
+from cmpdesign.products.laser.figures import timing
+from cmpdesign.products.laser.formats.drawing import job_drawing
+from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
+from cmpdesign.products.laser.job import Job
+from cmpdesign.products.laser.library import load_machine, load_material, machines, materials
+from cmpdesign.products.laser.paths.order import ordered, shortest_pause
+from cmpdesign.products.laser.paths.strokes import ragged
+from cmpdesign.products.laser.paths.timing import move_times_s
+from cmpdesign.products.laser.paths.tour import length_mm, short_tour
+from cmpdesign.products.laser.refuse import duplicates, open_paths
+from extractor import Extractor
+from extractor.layout.layout_file import parse_layout
+from tests.support.laser_tools import Points, groups_of, made_job, run_gcode
+
+PX_PER_MM = 20.0
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
+    result = run(
+        "build",
+        "honeycomb",
+        "-o",
+        tmp_path,
+        "--only",
+        "laser",
+        "--set",
+        "layers=3",
+        "--set",
+        "laser.outline=true",
+    )
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in (tmp_path / "laser").glob("[!.]*")}
+    jobs = ["0-holes", "1-red", "2-green", "3-blue", "4-white", "5-outline", "job", "coupon"]
+    expected = {f"{job}.{suffix}" for job in jobs for suffix in ("svg", "dxf", "lbrn2", "gcode")}
+    assert names == expected | {"as-made.svg", "job-sheet.html", "coupon.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"laser", "report.json"}
+    assert "assumed" in result.stderr
+    figures = json.loads((tmp_path / "report.json").read_text())["laser"]
+    assert [one["name"] for one in figures["passes"]] == jobs[:6]
+    red = figures["passes"][1]
+    assert red["front"]["area_error_percent"] == pytest.approx(0, abs=1e-3)
+    assert red["front"]["web_mm"] > 1 and red["back"]["web_mm"] > red["front"]["web_mm"]
+    sheet = (tmp_path / "laser" / "job-sheet.html").read_text()
+    for text in (
+        "Fill.",
+        "Cure.",
+        "2-green",
+        f"{red['front']['corner_loss_mm']:.3f}",
+        "T1",
+        "CO2 tube, 40 W",
+    ):
+        assert text in sheet
+    assert "<script" not in sheet and "http" not in sheet
+
+
+@pytest.mark.parametrize(
+    ("settings_", "expected"),
+    [
+        (["laser.kerf_mm=1.2mm"], "that the kerf leaves nothing of: "),
+        (
+            ["laser.minimum_web_mm=2mm"],
+            "smallest web of 1-red at the front: 1.35 mm, limit 2 mm; make pitch_mm larger",
+        ),
+        (["layers=80", "pitch_mm=3"], "width of the job, on the bed: "),
+        (["laser.x_mm=290"], "edge of the job beyond the bed's width: "),
+        (["print_ids=true"], "a laser burns outlines only; leave print_ids out"),
+        (["laser.taper_deg=6"], "the beam closes before the back"),
+        (["laser.depth_mm=2mm"], "depth of the cavities in this material: 2 mm, limit 1 mm"),
+        (["laser.speed_mm_s=900"], "speed: 900 mm/s, limit 400 mm/s"),
+        (["laser.mode=pocket", "laser.hatch_mm=0.2"], "ridges stay between the lines"),
+        (
+            ["fiducials.gap_mm=0", "fiducials.diameter_mm=0.5"],
+            "fiducial hole and the pattern: 0.104 mm, limit 0.3 mm",
+        ),
+        (["laser.face=back", "laser.taper_deg=4"], "into cured cells"),
+        (["laser.machine=co2-40"], "no such machine (did you mean co2-40w?)"),
+        (["laser.material=silicon-black"], "did you mean silicone-black?"),
+        (
+            ["laser.machine=diode-blue-10w", "laser.material=pdms"],
+            "has no settings for it, only for co2-40w, uv-5w",
+        ),
+        (["laser.kerf_mm=0.1", "laser.kerf_x_mm=0.1"], "fix the kerf twice"),
+        (["laser.corner=round"], "laser.corner = 'round' must be 'plain' or 'overcut'"),
+        (["laser.cornr=plain"], "laser.cornr is unknown (did you mean corner?)"),
+    ],
+)
+def test_bad_jobs_are_refused(settings_: list[str], expected: str, tmp_path: Path) -> None:
+    flags = [flag for text in settings_ for flag in ("--set", text)]
+    name = "square" if "fiducials.gap_mm=0" in settings_ else "honeycomb"
+    result = run("build", name, "-o", tmp_path / "out", "--only", "laser", *flags)
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
+    assert expected in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_double_and_flat_paths_are_found() -> None:
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    twice = ragged([square, np.roll(square, 2, axis=0)[::-1], square + 0.01], [0, 1, 2], closed=True)
+    assert duplicates(twice) == 1 and open_paths(twice) == 0
+    flat = ragged([square, np.array([(0, 0), (1, 1), (2, 2)], dtype=float)], [0, 1], closed=True)
+    assert open_paths(flat) == 1 and duplicates(flat) == 0
+    assert open_paths(ragged([square], [0], closed=False)) == 1
+
+
+def test_every_machine_and_material_reads_and_names_its_sources() -> None:
+    kinds = {load_machine(name).kind for name in machines()}
+    assert {"co2", "diode", "fibre", "uv"} == kinds
+    for name in materials():
+        material = load_material(name)
+        assert set(material.on) <= set(machines())
+        for settings_ in material.on.values():
+            assert all(len(getattr(settings_, field).source) >= 3 for field in type(settings_).model_fields)
+
+
+@pytest.mark.parametrize("material", ["silicone-black", "silicone-translucent", "pdms"])
+def test_every_shipped_setting_makes_a_job(material: str) -> None:
+    for machine in load_material(material).on:
+        for mode in ("cut", "pocket"):
+            job = made_job(laser__machine=machine, laser__material=material, laser__mode=mode)
+            assert min(job.back.x_mm, job.back.y_mm) > 0
+            assert all(one.cavities.exists.all() for one in job.cell_passes)  # type: ignore[union-attr]
+
+
+def test_own_machine_and_material_files(tmp_path: Path) -> None:
+    machine = tmp_path / "mine.toml"
+    machine.write_text(machines()["co2-40w"].read_text().replace("value = 300.0", "value = 60.0"))
+    material = tmp_path / "gel.toml"
+    material.write_text(materials()["silicone-black"].read_text().replace("[on.co2-40w]", "[on.mine]"))
+    flags = ["--set", f"laser.machine={machine}", "--set", f"laser.material={material}"]
+    result = run("build", "tac3d", "-o", tmp_path / "out", "--only", "laser", *flags)
+    assert result.exit_code == 0, result.output
+    assert 'width="60mm"' in (tmp_path / "out" / "laser" / "1-red.svg").read_text()
+    machine.write_text("name = 3")
+    assert run("build", "tac3d", "-o", tmp_path, "--only", "laser", *flags).exit_code == 2
+    material.write_text(materials()["pdms"].read_text().replace("taper_deg", "tapr_deg"))
+    machine.write_text(machines()["co2-40w"].read_text())
+    result = run("build", "tac3d", "-o", tmp_path, "--only", "laser", *flags)
+    assert result.exit_code == 2 and (
+        "taper_deg is missing" in result.stderr or "did you mean taper_deg" in result.stderr
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 40), st.integers(0, 10_000))
+def test_a_tour_visits_every_cell_once(count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    entries = rng.uniform(0, 20, (count, 1, 2)) + rng.uniform(0, 0.5, (count, 3, 2))
+    order, entry = short_tour(entries)
+    assert sorted(order.tolist()) == list(range(count))
+    assert ((entry >= 0) & (entry < 3)).all()
+
+
+def test_a_small_tour_is_the_shortest() -> None:
+    from itertools import permutations, product
+
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        entries = rng.uniform(0, 10, (6, 1, 2)) + rng.uniform(-0.5, 0.5, (6, 2, 2))
+        order, entry = short_tour(entries)
+        ways = [
+            length_mm(entries, np.array(p), np.array(q))
+            for p in permutations(range(6))
+            for q in product(range(2), repeat=6)
+        ]
+        assert length_mm(entries, order, entry) <= 1.12 * min(ways)
+
+
+def test_orders() -> None:
+    job = made_job(layers="10")
+    one = job.cell_passes[0]
+    assert one.cavities is not None
+    centres, found = one.cavities.nominal_mm.mean(axis=1), {}
+    for name in ("travel", "heat", "given"):
+        order, entry = ordered(one.cavities.entries_mm, name)  # type: ignore[arg-type]
+        assert sorted(order.tolist()) == list(range(len(centres)))
+        steps = np.arange(len(order), dtype=float)
+        found[name] = length_mm(one.cavities.entries_mm, order, entry), shortest_pause(order, centres, steps)
+    assert found["travel"][0] <= found["given"][0] < 0.5 * found["heat"][0]
+    assert found["heat"][1] >= 4 > found["travel"][1] == 1
+    assert order.tolist() == list(range(len(order)))
+
+
+def test_times_are_those_of_the_moves() -> None:
+    assert move_times_s(np.array([100.0]), 50.0, 1000.0)[0] == pytest.approx(2.05)
+    assert move_times_s(np.array([0.1]), 50.0, 1000.0)[0] == pytest.approx(0.02)
+    job = made_job(laser__passes="3")
+    one, machine = job.cell_passes[0], job.setup.machine
+    burn = run_gcode(drawing_to_gcode(job_drawing(job).only(one)))
+
+    def length(moves: Any) -> Any:
+        return np.hypot(*(np.array(moves)[:, 2:4] - np.array(moves)[:, :2]).T)
+
+    accel = machine.acceleration_mm_s2.value
+    total = move_times_s(length(burn.burnt), one.speed_mm_s, accel).sum()
+    total += move_times_s(length(burn.dark), machine.travel_mm_s.value, accel).sum()
+    found = timing(job, one)
+    assert found.time_s == pytest.approx(total, abs=2e-3)
+    assert found.burn_mm == pytest.approx(length(burn.burnt).sum(), abs=1e-2)
+
+
+def drawn_from_gcode(job: Job) -> str:
+    """The pattern in its inks, from nothing but each pass' program and the kerf."""
+    low, high = job.outline_mm.min(axis=0), job.outline_mm.max(axis=0)
+    radii = np.array([job.front.x_mm, job.front.y_mm])
+    inks, shapes = job.layout.palette, []
+
+    def path(polygon: Points, ink: str) -> str:
+        points = "L".join(f"{x - low[0]:.5f} {high[1] - y:.5f}" for x, y in polygon)
+        return f'<path fill="{ink}" d="M{points}Z"/>'
+
+    shapes.append(path(job.outline_mm, inks["black"]))
+    for one in job.cell_passes:
+        assert one.color is not None
+        for stroke in groups_of(run_gcode(drawing_to_gcode(job_drawing(job).only(one)))):
+            line = shapely.LineString(np.vstack([stroke[:, :2], stroke[-1:, 2:]]) / radii)
+            rim = shapely.buffer(line, 1.0, quad_segs=16).exterior
+            shapes.append(path(shapely.get_coordinates(rim) * radii, inks[COLORS[one.color]]))
+    width, height = high - low
+    size = f'width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
+    return head + "".join(shapes) + "</svg>"
+
+
+def seen(svg: str, job: Job) -> tuple[Points, Points, int]:
+    """Extracted and true marker places in px of a rendered drawing, and how many ids are wrong."""
+    png = resvg_py.svg_to_bytes(
+        svg_string=svg, dpi=int(25.4 * PX_PER_MM), skip_system_fonts=True, background="#808080"
+    )
+    image = cv2.imdecode(np.frombuffer(bytes(png), np.uint8), cv2.IMREAD_COLOR)
+    pad = 40
+    image = cv2.GaussianBlur(
+        cv2.copyMakeBorder(image, *[pad] * 4, cv2.BORDER_CONSTANT, value=(128, 128, 128)), (0, 0), 1.0
+    )
+    layout = job.layout
+    markers = Extractor(parse_layout(layout_to_json(layout))).extract(image)
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    scale = int(25.4 * PX_PER_MM) / 25.4
+    true = (
+        np.column_stack([layout.marker_xy_mm[:, 0] - low[0], high[1] - layout.marker_xy_mm[:, 1]]) * scale
+        + pad
+        - 0.5
+    )
+    measured = np.isfinite(markers.xy_px).all(axis=1)
+    assert measured[layout.present].mean() > 0.99
+    away = np.hypot(*(markers.xy_px - true)[measured].T)
+    return markers.xy_px[measured], true[measured], int((away > 0.3 * 1.5 * scale).sum())
+
+
+@pytest.mark.parametrize("name", ["honeycomb", "round"])
+@pytest.mark.parametrize("corner", ["plain", "overcut"])
+def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> None:
+    """From the programs alone: swept, inked, rendered, extracted. Corners stay where they were designed."""
+    job = made_job(name, laser__corner=corner, layers="6", laser__kerf_mm="0.2")
+    for svg in (drawn_from_gcode(job), as_made_svg(job)):
+        found, true, wrong = seen(svg, job)
+        assert wrong == 0
+        rms_mm = float(np.sqrt(((found - true) ** 2).sum(axis=1).mean())) / PX_PER_MM
+        assert rms_mm < 0.02, f"corners move by {1000 * rms_mm:.1f} um"

@@ -1,0 +1,236 @@
+"""``cmpdesign reconstruct`` on real files: tables agree with each other and the truth, bad input is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.support.command import refused, run
+from tests.support.layouts import small_text
+from tests.support.view_scenes import (
+    HALF,
+    SMALL,
+    binocular,
+    binocular_shot,
+    contact,
+    reference,
+    rig_of,
+    rig_text,
+)
+
+LAYOUT = reference(layers=SMALL)
+MARKERS = len(LAYOUT.xy_mm)
+POINTS = MARKERS + len(LAYOUT.edges) * LAYOUT.virtual_per_edge
+FRAMES = 4
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A layout, a rig, the frames of a press as PNG files (frame 2 has lost its right half), and the truth."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "layout.json").write_text(small_text("honeycomb", SMALL), encoding="utf-8")
+    (folder / "rig.toml").write_text(rig_text(rig_of(binocular())), encoding="utf-8")
+    truth = []
+    for name in ("frames", "left", "right"):
+        (folder / name).mkdir()
+    for k in range(FRAMES):
+        shot = binocular_shot(None if k == 0 else contact, 40 + k)
+        image = shot.image.copy()
+        if k == 2:
+            image[:, HALF[0] :] = 0
+        cv2.imwrite(str(folder / "frames" / f"{k}.png"), image)
+        for name, part in (("left", image[:, : HALF[0]]), ("right", image[:, HALF[0] :])):
+            cv2.imwrite(str(folder / name / f"{k}.png"), part)
+        truth.append(np.concatenate([shot.truth.marker_xyz_mm, shot.truth.virtual_xyz_mm.reshape(-1, 3)]))
+    np.save(folder / "truth.npy", truth)
+    return folder
+
+
+def arrays(made: Path, output: Path, *options: object, source: str = "frames") -> dict[str, np.ndarray]:
+    command = (
+        "reconstruct",
+        made / "layout.json",
+        made / "rig.toml",
+        "0",
+        made / source,
+        "-o",
+        output,
+        *options,
+    )
+    result = run(*command)
+    assert result.exit_code == 0, result.output
+    with np.load(output, allow_pickle=False) as file:
+        return dict(file)
+
+
+def test_arrays_hold_the_surface_in_micrometres(made: Path, tmp_path: Path) -> None:
+    table, truth = arrays(made, tmp_path / "a.npz", "--fps", "10"), np.load(made / "truth.npy")
+    for name in ("3D_Positions", "3D_Displacements", "3D_Normals"):
+        assert table[name].shape == (FRAMES, POINTS, 3) and table[name].dtype == np.float32
+    seen = [0, 1, 3]
+    for values, true in ((table["3D_Positions"], truth), (table["3D_Displacements"], truth - truth[0])):
+        assert np.sqrt(np.nanmean((values - true)[seen] ** 2)) < 0.0015
+        assert np.isfinite(values[seen]).all()
+    np.testing.assert_allclose(np.linalg.norm(table["3D_Normals"][seen], axis=2), 1, atol=1e-5)
+    sigma = np.sqrt(table["cov_mm2"][seen][:, :MARKERS, [0, 3, 5]])
+    error = (table["3D_Positions"] - truth)[seen][:, :MARKERS]
+    assert 0.7 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.5
+    assert table["frame_status"].tolist() == [1, 1, 2, 1] and np.isnan(table["3D_Positions"][2]).all()
+    assert table["reason"][2].startswith("right: no_") and not table["reason"][[0, 1, 3]].any()
+    assert (table["point_reason"][2, :MARKERS] == 2).all() and not table["status"][2].any()
+    np.testing.assert_allclose(table["time_s"], np.arange(FRAMES) / 10)
+    np.testing.assert_allclose(table["rest_positions_mm"], truth[0], atol=0.01)
+    assert table["edge"].tolist() == [-1] * MARKERS + np.repeat(np.arange(len(LAYOUT.edges)), 5).tolist()
+    assert str(table["format"]) == "cmp-reconstruction" and table["views"].tolist() == ["left", "right"]
+    for camera, rotation in zip(binocular(), table["R_camera_from_layout"], strict=True):
+        np.testing.assert_allclose(rotation, camera.R_camera_from_layout, atol=1e-3)
+
+
+def test_all_tables_say_the_same(made: Path, tmp_path: Path) -> None:
+    import pyarrow.parquet as pyarrow
+
+    table = arrays(made, tmp_path / "a.npz")
+    for name in ("b.csv", "c.parquet"):
+        command = (
+            "reconstruct",
+            made / "layout.json",
+            made / "rig.toml",
+            "0",
+            made / "frames",
+            "-o",
+            tmp_path / name,
+        )
+        assert run(*command).exit_code == 0
+    parquet = pyarrow.read_table(tmp_path / "c.parquet")
+    with (tmp_path / "b.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == parquet.column_names and len(rows) == parquet.num_rows == FRAMES * POINTS
+    for name, column in (
+        ("z_mm", table["3D_Positions"][..., 2]),
+        ("dx_mm", table["3D_Displacements"][..., 0]),
+        ("ny", table["3D_Normals"][..., 1]),
+        ("cov_zz_mm2", table["cov_mm2"][..., 5]),
+        ("point_reason", table["point_reason"]),
+    ):
+        text = np.array([float(row[name] or "nan") for row in rows]).reshape(FRAMES, POINTS)
+        np.testing.assert_allclose(text, column, atol=1e-6)
+        np.testing.assert_array_equal(parquet[name].to_numpy().reshape(FRAMES, POINTS), column)
+    assert {row["frame_status"] for row in rows} == {"tracked", "lost"}
+    assert [row["point"] for row in rows[:3]] == ["0", "1", "2"] and rows[MARKERS]["edge"] == "0"
+
+
+def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
+    arrays(made, tmp_path / "a.npz")
+    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    assert summary["frames"] == {
+        "declared": 4, "read": 4, "tracked": 3, "lost": 1, "unreadable": 0, "other_size": 0
+    }  # fmt: skip
+    assert summary["marker_shares"] == {"measured": 0.75, "repaired": 0.0, "lost": 0.25}
+    assert summary["lost_markers"] == {"one_view": MARKERS}
+    assert 0.1 < summary["sigma_um"][2] < 2 and summary["largest_displacement"]["mm"] == pytest.approx(
+        1.63, abs=0.1
+    )
+    assert [view["name"] for view in summary["views"]] == ["left", "right"]
+    assert all(view["rms_px"] < 0.02 and view["position_mm"][2] < 0 for view in summary["views"])
+
+
+def test_two_cameras_are_two_sources(made: Path, tmp_path: Path) -> None:
+    rig = rig_of(binocular())
+    text = "".join(
+        f'[[view]]\nname = "{view.name}"\nfocal_px = {list(view.focal_px)}\n'
+        f"centre_px = {[view.centre_px[0] - k * HALF[0], view.centre_px[1]]}\ndistortion = {list(view.distortion)}\n"
+        for k, view in enumerate(rig.views)
+    )
+    (tmp_path / "two.toml").write_text(text, encoding="utf-8")
+    both = f"{made / 'left'},{made / 'right'}"
+    command = ("reconstruct", made / "layout.json", tmp_path / "two.toml")
+    result = run(*command, "0", both, "-o", tmp_path / "b.npz")
+    assert result.exit_code == 0, result.output
+    one = arrays(made, tmp_path / "a.npz")
+    with np.load(tmp_path / "b.npz") as two:
+        np.testing.assert_allclose(two["3D_Positions"], one["3D_Positions"], atol=1e-5)
+    rests = f"{made / 'left' / '0.png'},{made / 'right' / '0.png'}"
+    assert run(*command, rests, both, "-o", tmp_path / "c.npz", "--frames", "2").exit_code == 0
+    (tmp_path / "short").mkdir()
+    cv2.imwrite(str(tmp_path / "short" / "0.png"), cv2.imread(str(made / "right" / "0.png")))
+    result = run(*command, rests, f"{made / 'left'},{tmp_path / 'short'}", "-o", tmp_path / "d.npz")
+    assert result.exit_code == 1 and "short has fewer frames than the others" in result.stderr
+    assert "REST lists 3 pictures, SOURCE 2" in refused(*command, "a,b,c", both, "-o", tmp_path / "e.npz")
+
+
+def test_given_poses_are_kept_or_found_again(made: Path, tmp_path: Path) -> None:
+    rig = made / "rig.toml"
+    text = rig.read_text(encoding="utf-8").split("[[view]]")
+    turned = np.array([[np.cos(0.02), -np.sin(0.02), 0], [np.sin(0.02), np.cos(0.02), 0], [0, 0, 1]])
+    tables = [
+        f"{table}R_camera_from_layout = {(camera.R_camera_from_layout @ turned).tolist()}\n"
+        f"t_camera_from_layout_mm = {camera.t_camera_from_layout_mm.tolist()}\n"
+        for table, camera in zip(text[1:], binocular(), strict=True)
+    ]
+    (tmp_path / "turned.toml").write_text("[[view]]" + "[[view]]".join(tables), encoding="utf-8")
+    command = (
+        "reconstruct",
+        made / "layout.json",
+        tmp_path / "turned.toml",
+        "0",
+        made / "frames",
+        "--frames",
+        "1",
+    )
+    found = {}
+    for name, options in (("kept", ()), ("found", ("--from-rest",))):
+        assert run(*command, "-o", tmp_path / f"{name}.npz", *options).exit_code == 0
+        with np.load(tmp_path / f"{name}.npz") as file:
+            found[name] = file["R_camera_from_layout"][0]
+    true = binocular()[0].R_camera_from_layout
+    np.testing.assert_allclose(found["kept"], true @ turned, atol=1e-12)
+    np.testing.assert_allclose(found["found"], true, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rig", "rest", "options", "said"),
+    [
+        ("missing.toml", "0", (), "missing.toml: cannot be read"),
+        ("one.toml", "0", (), "the rig has 1 view; depth needs two or more"),
+        ("twins.toml", "0", (), "stand too near to each other to tell depth"),
+        ("large.toml", "0", (), "reaches beyond the image of 960 x 360 px"),
+        ("mirror.toml", "0", (), "check which of them are mirrored"),
+        ("rig.toml", "9", (), "has fewer frames"),
+        ("rig.toml", "none.png", (), "none.png"),
+        ("rig.toml", "2", (), "view 'right' shows no pattern at rest (no_"),
+        ("rig.toml", "0", ("--flatness-mm", "-1"), "--flatness-mm is -1; expected a number from 0"),
+        ("rig.toml", "0", ("--fps", "0"), "--fps is 0"),
+        ("rig.toml", "0", ("-o", "a.txt"), "unknown ending; expected one of .npz, .parquet, .csv"),
+    ],
+)
+def test_bad_input_is_one_line_and_no_file(
+    rig: str, rest: str, options: tuple[str, ...], said: str, made: Path, tmp_path: Path
+) -> None:
+    text = (made / "rig.toml").read_text(encoding="utf-8")
+    left = text[: text.index('[[view]]\nname = "right"')]
+    changed = {
+        "one.toml": left,
+        "twins.toml": left + left.replace('"left"', '"twin"'),
+        "large.toml": text.replace("[480, 0, 480, 360]", "[480, 0, 481, 360]"),
+        "mirror.toml": text.replace("mirrored = false", "mirrored = true", 1),
+        "rig.toml": text,
+    }
+    for name, content in changed.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    before = sorted(tmp_path.iterdir())
+    arguments = (
+        "reconstruct",
+        made / "layout.json",
+        tmp_path / rig,
+        rest,
+        made / "frames",
+        "-o",
+        tmp_path / "a.npz",
+    )
+    assert said in refused(*arguments, *options)
+    assert sorted(tmp_path.iterdir()) == before

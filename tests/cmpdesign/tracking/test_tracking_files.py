@@ -1,0 +1,399 @@
+"""``cmpdesign track`` on real files: its tables agree, and what was tracked survives whatever ends a run."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cmpdesign.cli import app
+from cmpdesign.tracking import sources
+from tests.support.command import refused, run
+from tests.support.layouts import small_text
+from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference
+
+FRAMES = 24
+MARKERS = 91
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a layout, a lossless video of a moving pattern, the same frames as PNG files, and the truth."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
+    (folder / "frames").mkdir()
+    video = cv2.VideoWriter(str(folder / "video.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25, SIZE)
+    assert video.isOpened()
+    truth = []
+    for index, rendered in enumerate(moving(FRAMES)):
+        video.write(rendered.image)
+        cv2.imwrite(str(folder / "frames" / f"frame{index}.png"), rendered.image)
+        truth.append(rendered.truth.marker_xy_px)
+    video.release()
+    np.save(folder / "truth.npy", truth)
+    return folder
+
+
+def tracked(made: Path, source: str, output: Path, *options: object, code: int = 0) -> dict[str, np.ndarray]:
+    result = run("track", made / "layout.json", made / source, "-o", output, *options)
+    assert result.exit_code == code, result.output
+    return loaded(output)
+
+
+def loaded(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path, allow_pickle=False) as file:
+        return dict(file)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_video_becomes_arrays(made: Path, tmp_path: Path) -> None:
+    table = tracked(made, "video.avi", tmp_path / "a.npz")
+    truth = np.load(made / "truth.npy")
+    assert table["xy_px"].shape == (FRAMES, MARKERS, 2) and table["xy_px"].dtype == np.float64
+    assert np.abs(table["xy_px"] - truth).max() < 1.0
+    np.testing.assert_array_equal(table["frame"], np.arange(FRAMES))
+    np.testing.assert_allclose(table["time_s"], np.arange(FRAMES) / 25, atol=1e-6)
+    assert (table["frame_status"] == 1).all() and (table["status"] == 1).all()
+    assert table["start"][0] == "cold" and (table["start"][1:] == "warm").all()
+    np.testing.assert_allclose(table["displacement_px"], table["xy_px"] - table["rest_xy_px"])
+    np.testing.assert_array_equal(table["layout_xy_mm"], reference().xy_mm)
+    assert str(table["digest"]) == reference().digest
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.summary.json"]
+
+
+def test_all_tables_and_sources_say_the_same(made: Path, tmp_path: Path) -> None:
+    import pyarrow.parquet as pyarrow
+
+    table = tracked(made, "video.avi", tmp_path / "a.npz")
+    folder = tracked(made, "frames", tmp_path / "b.npz", "--fps", "25")
+    for name in ("xy_px", "status", "displacement_mm", "time_s", "frame"):
+        np.testing.assert_allclose(folder[name], table[name], atol=1e-6)
+    for name in ("c.csv", "d.parquet"):
+        assert run("track", made / "layout.json", made / "video.avi", "-o", tmp_path / name).exit_code == 0
+    rows, parquet = rows_of(tmp_path / "c.csv"), pyarrow.read_table(tmp_path / "d.parquet")
+    assert list(rows[0]) == parquet.column_names and len(rows) == parquet.num_rows == FRAMES * MARKERS
+    assert parquet.schema.metadata[b"digest"].decode() == reference().digest
+    for name, column, digits in (
+        ("x_px", table["xy_px"][..., 0], 5),
+        ("dy_mm", table["displacement_mm"][..., 1], 6),
+    ):
+        values = np.array([float(row[name]) for row in rows]).reshape(FRAMES, MARKERS)
+        np.testing.assert_allclose(values, column, atol=10.0**-digits)
+        np.testing.assert_allclose(parquet[name].to_numpy().reshape(FRAMES, MARKERS), column)
+    assert {row["frame_status"] for row in rows} == {"tracked"}
+    assert [row["marker"] for row in rows[:MARKERS]] == [str(i) for i in range(MARKERS)]
+
+
+def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
+    result = run("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.csv")
+    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    assert summary["frames"] == {
+        "declared": 24,
+        "read": 24,
+        "tracked": 24,
+        "lost": 0,
+        "unreadable": 0,
+        "other_size": 0,
+    }
+    assert summary["marker_shares"] == {"measured": 1.0, "repaired": 0.0, "lost": 0.0}
+    assert summary["starts"] == {"cold": 1, "warm": 23}
+    assert summary["time_ms"]["p50"] <= summary["time_ms"]["p95"] <= summary["time_ms"]["p99"]
+    truth = np.load(made / "truth.npy")
+    length = np.linalg.norm(truth - truth[0], axis=2)
+    largest = summary["largest_displacement"]
+    assert largest["px"] == pytest.approx(length.max(), abs=0.5)
+    assert length[largest["frame"], largest["marker"]] > length.max() - 0.5
+    assert "24 read, 24 tracked" in result.stdout and "p99" in result.stdout
+
+
+def test_jitter_at_rest_is_the_noise_of_resting_markers(made: Path, tmp_path: Path) -> None:
+    from tracking_scenes import shot
+
+    (tmp_path / "rest").mkdir()
+    found = []
+    for index in range(15):
+        cv2.imwrite(str(tmp_path / "rest" / f"{index}.png"), shot(seed=index).image)
+    table = tracked(made, str(tmp_path / "rest"), tmp_path / "a.npz")
+    found = table["xy_px"].std(axis=0, ddof=1)
+    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    assert summary["jitter_px"] == pytest.approx(np.sqrt(np.mean(found**2)), rel=0.1)
+
+
+def test_overlay_and_quiver_plot(made: Path, tmp_path: Path) -> None:
+    pictures = ("--overlay", tmp_path / "o.mp4", "--quiver", tmp_path / "q.png")
+    tracked(made, "video.avi", tmp_path / "a.npz", *pictures)
+    video = cv2.VideoCapture(str(tmp_path / "o.mp4"))
+    frames = []
+    while (read := video.read())[0]:
+        frames.append(read[1])
+    assert len(frames) == FRAMES and video.get(cv2.CAP_PROP_FPS) == 25
+    yellow = (np.abs(frames[-1].astype(int) - (80, 255, 255)).max(axis=2) < 60).sum()
+    assert yellow > 20 * MARKERS
+    quiver = cv2.imread(str(tmp_path / "q.png"))
+    assert quiver is not None
+    colored = (quiver.max(axis=2).astype(int) - quiver.min(axis=2) > 60).sum()
+    assert colored > 50 * MARKERS and (quiver == 255).all(axis=2).mean() > 0.5
+    assert not list(tmp_path.glob("*.part*"))
+
+
+def test_rest_may_be_a_frame_or_an_image(made: Path, tmp_path: Path) -> None:
+    truth = np.load(made / "truth.npy")
+    by_number = tracked(made, "video.avi", tmp_path / "a.npz", "--rest", "7")
+    by_image = tracked(made, "video.avi", tmp_path / "b.npz", "--rest", made / "frames" / "frame7.png")
+    assert np.abs(by_number["displacement_px"] - (truth - truth[7])).max() < 1
+    np.testing.assert_array_equal(by_number["displacement_px"], by_image["displacement_px"])
+    scaled = tracked(made, "video.avi", tmp_path / "c.npz", "--mm-per-px", "0.1")
+    np.testing.assert_allclose(scaled["displacement_mm"], scaled["displacement_px"] * (0.1, -0.1))
+
+
+def test_cold_and_warm_give_the_same_ids(made: Path, tmp_path: Path) -> None:
+    warm = tracked(made, "video.avi", tmp_path / "a.npz")
+    cold = tracked(made, "video.avi", tmp_path / "b.npz", "--cold")
+    assert (cold["start"] == "cold").all()
+    np.testing.assert_array_equal(warm["status"], cold["status"])
+    assert np.abs(warm["xy_px"] - cold["xy_px"]).max() < 0.3
+
+
+def test_a_truncated_video_keeps_its_frames(made: Path, tmp_path: Path) -> None:
+    data = (made / "video.avi").read_bytes()
+    cut = tmp_path / "cut.avi"
+    cut.write_bytes(data[: int(0.6 * len(data))])
+    result = run("track", made / "layout.json", cut, "-o", tmp_path / "a.npz")
+    assert result.exit_code == 1 and "of the 24 frames that it declares" in result.stderr
+    table = loaded(tmp_path / "a.npz")
+    read = len(table["frame"])
+    assert 10 <= read < FRAMES
+    good = table["frame_status"] == 1
+    assert good.sum() >= read - 1  # the last one may be torn
+    assert np.abs(table["xy_px"] - np.load(made / "truth.npy")[:read])[good].max() < 1.0
+    assert json.loads((tmp_path / "a.summary.json").read_text())["ended_early"]
+
+
+def test_a_damaged_folder_keeps_every_frame_in_its_place(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for index in range(12):
+        data = (made / "frames" / f"frame{index}.png").read_bytes()
+        (folder / f"frame{index}.png").write_bytes(data)
+    (folder / "frame3.png").write_bytes(b"no picture")
+    (folder / "frame5.png").write_bytes(b"")
+    image = cv2.imread(str(folder / "frame7.png"))
+    assert image is not None
+    cv2.imwrite(str(folder / "frame7.png"), image[:200, :300])
+    cv2.imwrite(str(folder / "frame9.png"), np.zeros_like(image))
+    (folder / "notes.txt").write_text("not a frame")
+    options = ("--overlay", tmp_path / "o.avi", "--fps", "10")
+    result = run("track", made / "layout.json", folder, "-o", tmp_path / "a.csv", *options)
+    assert result.exit_code == 0, result.output
+    rows = rows_of(tmp_path / "a.csv")[::MARKERS]
+    assert [row["frame"] for row in rows] == [str(i) for i in range(12)]
+    assert [row["time_s"] for row in rows] == [f"{i / 10:.6f}" for i in range(12)]
+    status = {i: rows[i]["frame_status"] for i in (3, 5, 7, 9)}
+    assert status == {3: "unreadable", 5: "unreadable", 7: "other size", 9: "lost"}
+    assert "300 x 200 px instead of 320 x 240 px" in rows[7]["reason"] and "not an image" in rows[3]["reason"]
+    others = [row for i, row in enumerate(rows) if i not in status]
+    assert all(row["frame_status"] == "tracked" and row["x_px"] and not row["reason"] for row in others)
+    assert all(rows[i]["x_px"] == "" and rows[i]["status"] == "0" for i in status)
+    video = cv2.VideoCapture(str(tmp_path / "o.avi"))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 12
+
+
+class StoppingCamera:
+    """Stands for OpenCV's reader of a camera that is unplugged after some frames."""
+
+    def __init__(self, folder: Path, frames: int) -> None:
+        self.paths = [folder / f"frame{i}.png" for i in range(frames)]
+        self.released = False
+
+    def isOpened(self) -> bool:
+        return True
+
+    def read(self) -> tuple[bool, Any]:
+        return (True, cv2.imread(str(self.paths.pop(0)))) if self.paths else (False, None)
+
+    def release(self) -> None:
+        self.released = True
+
+
+def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = StoppingCamera(made / "frames", 8)
+    monkeypatch.setattr(sources, "_capture", lambda number: camera)
+    result = run("track", made / "layout.json", "0", "-o", tmp_path / "a.npz")
+    assert result.exit_code == 1 and "the camera stopped after 8 frames" in result.stderr
+    table = loaded(tmp_path / "a.npz")
+    assert (table["frame_status"] == [1] * 8 + [3] * (len(table["frame"]) - 8)).all()
+    assert table["time_s"][0] == 0 and (np.diff(table["time_s"]) >= 0).all()
+    assert camera.released
+
+
+def test_a_camera_that_is_not_there(made: Path, tmp_path: Path) -> None:
+    assert "camera 63 cannot be opened" in refused(
+        "track", made / "layout.json", "63", "-o", tmp_path / "a.npz"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+LIMITED = """
+import resource, sys
+limit = int(sys.argv.pop(1))
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+from cmpdesign.cli import main
+main()
+"""
+
+
+def process(
+    *arguments: object, code: str = "from cmpdesign.cli import main; main()"
+) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_a_csv_that_no_longer_fits_is_cut_at_a_frame(made: Path, tmp_path: Path) -> None:
+    arguments = ("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.csv")
+    limited = process(60_000, *arguments, code=LIMITED)
+    _, errors = limited.communicate(timeout=120)
+    assert limited.returncode == 2 and "cannot be written" in errors and "frames are kept in" in errors
+    rows = rows_of(tmp_path / "a.csv")
+    assert len(rows) % MARKERS == 0 and 2 <= len(rows) // MARKERS < FRAMES
+    assert f"{len(rows) // MARKERS} frames are kept" in errors
+    assert all(row["dy_mm"] for row in rows)
+
+
+def test_arrays_that_do_not_fit_are_kept_in_pieces_and_recovered(made: Path, tmp_path: Path) -> None:
+    arguments = ("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.npz")
+    limited = process(100_000, *arguments, code=LIMITED)
+    _, errors = limited.communicate(timeout=120)
+    assert limited.returncode == 2 and "24 frames are kept in" in errors and "--recover" in errors
+    assert not (tmp_path / "a.npz").exists()
+    assert "--recover" in refused(*arguments)
+    result = run(*arguments, "--recover")
+    assert result.exit_code == 0 and "24 frames recovered" in result.stdout
+    whole = tracked(made, "video.avi", tmp_path / "b.npz")
+    table = loaded(tmp_path / "a.npz")
+    np.testing.assert_allclose(table["xy_px"], whole["xy_px"])
+    np.testing.assert_allclose(table["rest_xy_px"], whole["rest_xy_px"])
+    assert "nothing to recover" in refused(*arguments, "--recover")
+
+
+@pytest.fixture(scope="module")
+def long_folder(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Enough frames for a run to be caught in the middle."""
+    folder = tmp_path_factory.mktemp("long")
+    for index in range(4000):
+        os.link(made / "frames" / f"frame{index % FRAMES}.png", folder / f"{index}.png")
+    return folder
+
+
+def caught(made: Path, source: Path, output: Path, number: int) -> tuple[int, str]:
+    """A run that gets a signal while it is writing."""
+    running = process("track", made / "layout.json", source, "-o", output)
+    part = output.with_name(output.name + ".part")
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and running.poll() is None:
+        if part.is_file() and part.stat().st_size > 100_000:
+            break
+        if part.is_dir() and list(part.glob("0*.npz")):
+            break
+        time.sleep(0.02)
+    running.send_signal(number)
+    _, errors = running.communicate(timeout=60)
+    return running.returncode, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_completes_the_file(number: int, made: Path, long_folder: Path, tmp_path: Path) -> None:
+    code, errors = caught(made, long_folder, tmp_path / "a.csv", number)
+    assert code == 130 and "Traceback" not in errors
+    rows = rows_of(tmp_path / "a.csv")
+    assert len(rows) % MARKERS == 0 and 5 < len(rows) // MARKERS < 4000
+    assert json.loads((tmp_path / "a.summary.json").read_text())["frames"]["read"] == len(rows) // MARKERS
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz"])
+def test_a_killed_run_is_recovered(ending: str, made: Path, long_folder: Path, tmp_path: Path) -> None:
+    output = tmp_path / f"a.{ending}"
+    code, _ = caught(made, long_folder, output, signal.SIGKILL)
+    assert code == -signal.SIGKILL and not output.exists()
+    result = run("track", made / "layout.json", long_folder, "-o", output, "--recover")
+    assert result.exit_code == 0 and "frames recovered" in result.stdout
+    table = loaded(output) if ending == "npz" else {}
+    frames = len(table["frame"]) if table else len(rows_of(output)) / MARKERS
+    assert frames > 5 and not output.with_name(output.name + ".part").exists()
+
+
+def test_a_bar_stays_on_stderr(made: Path, tmp_path: Path) -> None:
+    arguments = [
+        str(v) for v in ("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.npz")
+    ]
+    result = CliRunner().invoke(app, arguments, env={"FORCE_COLOR": "1"})
+    assert result.exit_code == 0 and "tracking" in result.stderr and "24 read" in result.stdout
+
+
+def test_nothing_tracked_is_exit_code_1(made: Path, tmp_path: Path) -> None:
+    (tmp_path / "dark").mkdir()
+    cv2.imwrite(str(tmp_path / "dark" / "0.png"), np.zeros((100, 100, 3), np.uint8))
+    quiver = tmp_path / "q.png"
+    result = run(
+        "track", made / "layout.json", tmp_path / "dark", "-o", tmp_path / "a.npz", "--quiver", quiver
+    )
+    assert result.exit_code == 1 and "is not drawn" in result.stderr and not quiver.exists()
+    assert loaded(tmp_path / "a.npz")["frame_status"].tolist() == [2]
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "expected"),
+    [
+        ("missing.avi", (), "no such file or folder"),
+        ("layout.json", (), "is not a video that can be read"),
+        ("empty", (), "holds no image"),
+        ("video.avi", ("-o", "a.txt"), "unknown ending; expected one of .npz, .parquet, .csv"),
+        ("video.avi", ("--rest", "99"), "has fewer frames"),
+        ("video.avi", ("--rest", "missing.png"), "missing.png"),
+        ("video.avi", ("--rest", "dark.png"), "no pattern is found in dark.png"),
+        ("video.avi", ("--fps", "0"), "--fps is 0"),
+        ("video.avi", ("--mm-per-px", "nan"), "--mm-per-px is nan"),
+        ("video.avi", ("--overlay", "o.gif"), "unknown ending; expected one of .mp4, .avi, .mkv"),
+        ("video.avi", ("--quiver", "q.pdf"), "expected .png"),
+    ],
+)
+def test_bad_input_is_one_line_and_no_file(
+    source: str,
+    options: tuple[str, ...],
+    expected: str,
+    made: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    cv2.imwrite("dark.png", np.zeros((50, 50, 3), np.uint8))
+    before = sorted(tmp_path.rglob("*"))
+    path = tmp_path / "empty" if source == "empty" else made / source
+    line = refused("track", made / "layout.json", path, "-o", "work/a.npz", *options)
+    assert expected in line
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_parquet_without_pyarrow_says_how_to_get_it(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
+    assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []

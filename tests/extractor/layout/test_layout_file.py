@@ -1,0 +1,343 @@
+"""The reader of layout.json: what the writer writes is read, and whatever is wrong is one clear line."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cmpdesign.design.design import load_design
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.build import build_layout
+from extractor.errors import LayoutError
+from extractor.layout.layout_file import SCHEMA_PATH, load_layout, parse_layout
+from extractor.layout.reference import Reference
+from tests.support.layouts import PATTERNS, small_document, small_layout, small_text
+
+SCHEMA = json.loads(SCHEMA_PATH.read_text(encoding="utf-8"))
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+
+Damage = Callable[[dict[str, Any]], object]
+
+
+def refused(text: str) -> str:
+    """The message that the text is refused with."""
+    with pytest.raises(LayoutError) as caught:
+        parse_layout(text, "some.json")
+    message = str(caught.value)
+    assert message.startswith("some.json: ")
+    assert message.isprintable() and len(message) < 300
+    return message
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_reads_back_what_was_written(pattern: str) -> None:
+    layout, reference = small_layout(pattern), parse_layout(small_text(pattern))
+    for name, column in (
+        ("layer", layout.marker_layer),
+        ("index", layout.marker_index),
+        ("xy_mm", layout.marker_xy_mm),
+        ("cell_corners", layout.cell_corners),
+        ("cell_color", layout.cell_color),
+        ("edges", layout.edges),
+        ("outline_mm", layout.outline_mm),
+        ("present", layout.present),
+    ):
+        read = getattr(reference, name)
+        np.testing.assert_array_equal(read, column)
+        assert read.dtype == column.dtype
+        assert not read.flags.writeable
+    for name in ("pattern", "parameters", "virtual_per_edge", "reference_cell", "reference_marker"):
+        assert getattr(reference, name) == getattr(layout, name)
+    for name in ("palette", "border_mm", "digest", "mirrored"):
+        assert getattr(reference, name) == getattr(layout, name)
+
+
+def test_layers_and_mirrored() -> None:
+    text = layout_to_json(build_layout(load_design("round", {"layers": "4", "mirrored": "true"})))
+    reference = parse_layout(text)
+    assert reference.layers == 4 and reference.mirrored
+    with pytest.raises(TypeError):
+        reference.palette["red"] = "#000000"  # type: ignore[index]
+
+
+def test_a_clipped_layout_keeps_its_ids() -> None:
+    clipped = {"layers": "5", "clip": "circle", "clip_diameter_mm": "12"}
+    layout = build_layout(load_design("honeycomb", clipped))
+    reference = parse_layout(layout_to_json(layout))
+    assert len(reference.layer) == 91
+    assert 0 < reference.present.sum() < 91
+    np.testing.assert_array_equal(reference.present, layout.present)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_the_writer_keeps_the_schema(pattern: str) -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    VALIDATOR.validate(small_document(pattern))
+
+
+def test_200_layers_are_read() -> None:
+    text = layout_to_json(build_layout(load_design("honeycomb", {"layers": "200", "pitch_mm": "0.5"})))
+    reference = parse_layout(text)
+    assert len(reference.layer) == 120_601
+
+
+def put(*path: str | int, to: object) -> Damage:
+    def damage(document: dict[str, Any]) -> None:
+        holder: Any = document
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = to
+
+    return damage
+
+
+def drop(*path: str | int) -> Damage:
+    def damage(document: dict[str, Any]) -> None:
+        holder: Any = document
+        for key in path[:-1]:
+            holder = holder[key]
+        del holder[path[-1]]
+
+    return damage
+
+
+def swap_edges(document: dict[str, Any]) -> None:
+    document["edges"][3:5] = document["edges"][4:2:-1]
+
+
+def swap_red_and_green(document: dict[str, Any]) -> None:
+    other = {"red": "green", "green": "red"}
+    document["cells"]["color"] = [other.get(color, color) for color in document["cells"]["color"]]
+
+
+def second_white(document: dict[str, Any]) -> None:
+    color = document["cells"]["color"]
+    color[len(color) - 1 - color[::-1].index("black")] = "white"
+
+
+def move_a_marker(document: dict[str, Any]) -> None:
+    document["markers"]["x"][18] += 1e-6
+
+
+WRONG: dict[str, tuple[Damage, str]] = {
+    "other format": (put("format", to="svg"), "format is 'svg'; expected 'cmp-layout'"),
+    "other version": (put("version", to=2), "version is 2; expected 1"),
+    "version as truth": (put("version", to=True), "version is true; expected 1"),
+    "version as float": (put("version", to=1.0), "version is 1.0; expected 1"),
+    "other units": (put("units", to="inch"), "units is 'inch'; expected 'mm'"),
+    "no version": (drop("version"), "version is missing; expected 1"),
+    "no markers": (drop("markers"), "markers is missing"),
+    "no column": (drop("markers", "x"), "markers.x is missing"),
+    "unknown field": (put("color", to=1), "'color' is unknown"),
+    "unknown column": (put("cells", "hue", to=[]), "cells.'hue' is unknown"),
+    "markers a list": (put("markers", to=[1]), "markers is a list of 1; expected an object"),
+    "column a text": (put("markers", "x", to="1"), "markers.x is '1'; expected a list"),
+    "column empty": (put("markers", "layer", to=[]), "markers.layer is empty"),
+    "column short": (drop("markers", "y", 3), "markers.y is a list of 18; expected 19 entries"),
+    "text in column": (put("markers", "x", 4, to="far"), "markers.x[4] is 'far'; expected a number"),
+    "truth in column": (put("markers", "x", 4, to=True), "markers.x[4] is true"),
+    "truth as layer": (put("markers", "layer", 1, to=True), "markers.layer[1] is true"),
+    "float as layer": (put("markers", "layer", 1, to=1.0), "markers.layer[1] is 1.0"),
+    "null in column": (put("markers", "y", 0, to=None), "markers.y[0] is null"),
+    "huge length": (put("markers", "x", 4, to=1e300), "markers.x[4] is 1e+300"),
+    "giant integer": (put("markers", "x", 4, to=10**1000), "markers.x[4] is an integer of 3322 bits"),
+    "giant id": (put("edges", 0, 1, to=10**50), "edges[0][1] is an integer of 167 bits"),
+    "negative id": (put("cells", "corners", 2, 1, to=-1), "cells.corners[2][1] is -1"),
+    "id out of range": (put("cells", "corners", 2, 1, to=19), "19; expected an integer from 0 to 18"),
+    "corners of four": (put("cells", "corners", 2, to=[0, 1, 2, 3]), "cells.corners[2] is a list of 4"),
+    "corners no list": (put("cells", "corners", 0, to=7), "cells.corners[0] is 7"),
+    "corner twice": (put("cells", "corners", 2, 1, to=0), "expected different markers"),
+    "unknown color": (put("cells", "color", 5, to="pink"), "cells.color[5] is 'pink'; expected one of red"),
+    "color a list": (put("cells", "color", 5, to=["red"]), "cells.color[5] is a list of 1"),
+    "two of a color": (swap_red_and_green, "cells.color is counter-clockwise around marker 0"),
+    "two white": (second_white, "reference.cell is"),
+    "edge order": (swap_edges, "edges in ascending order"),
+    "edge turned": (put("edges", 0, to=[1, 0]), "edges[0] is [1, 0]; expected the smaller id first"),
+    "edge missing": (drop("edges", 0), "expected every side of cell"),
+    "layer wrong": (put("markers", "layer", 7, to=1), "markers.layer[7] is 1; expected 2"),
+    "marker twice": (put("markers", "index", 7, to=1), "markers.index[7] is 1; expected 0"),
+    "reference.cell": (put("reference", "cell", to=1), "reference."),
+    "reference.marker": (put("reference", "marker", to=18), "reference.marker is 18; expected a corner"),
+    "no ink": (drop("palette", "red"), "palette.red is missing"),
+    "bad ink": (put("palette", "red", to="#12345g"), "palette.red is '#12345g'"),
+    "ink and newline": (put("palette", "red", to="#123456\n"), "palette.red is"),
+    "negative border": (put("border_mm", to=-1), "border_mm is -1"),
+    "border as truth": (put("border_mm", to=False), "border_mm is false"),
+    "outline of two": (put("outline", to=[[0, 0], [1, 1]]), "outline is a polygon of 2 points"),
+    "outline flat": (put("outline", to=[[0, 0], [1, 1], [2, 2]]), "counter-clockwise"),
+    "outline of threes": (put("outline", 0, to=[1, 2, 3]), "outline[0] is a list of 3"),
+    "virtual": (put("virtual_per_edge", to=-1), "virtual_per_edge is -1"),
+    "mirrored": (put("parameters", "mirrored", to=1), "parameters.mirrored is 1; expected true or false"),
+    "pattern": (put("pattern", to="a\nb"), "pattern is 'a\\nb'"),
+    "lone surrogate": (put("pattern", to="\ud800"), "pattern is '\\ud800'"),
+    "digest": (put("digest", to="0" * 64), "the geometry was changed"),
+    "moved marker": (move_a_marker, "the geometry was changed"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_fields(case: str) -> None:
+    damage, expected = WRONG[case]
+    document = small_document()
+    damage(document)
+    assert expected in refused(json.dumps(document))
+
+
+def test_clockwise_cell() -> None:
+    document = small_document()
+    document["cells"]["corners"][0].reverse()
+    assert "cells.corners[0]" in refused(json.dumps(document))
+
+
+def test_cell_given_twice() -> None:
+    document = small_document()
+    corners = document["cells"]["corners"]
+    corners[1] = corners[0][1:] + corners[0][:1]
+    assert "cells.corners[1]" in refused(json.dumps(document))
+
+
+def test_square_rows() -> None:
+    document = small_document("square")
+    document["markers"]["layer"][6] = 0
+    assert "markers.layer[6] is 0; expected 1" in refused(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "not JSON, or truncated"),
+        ("svg", "not JSON, or truncated"),
+        (small_text()[:-200], "not JSON, or truncated"),
+        ("[]", "the document is a list of 0; expected an object"),
+        ("null", "the document is null"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"a":' * 100_000, "nested too deeply"),
+        (small_text().replace("-1.5", "NaN"), "holds the value NaN"),
+        (small_text().replace("-1.5", "-Infinity"), "holds the value -Infinity"),
+        (small_text().replace("-1.5", "1e999"), "is inf; expected a number"),
+        (small_text().replace("-1.5", "9" * 5000), "thousands of digits"),
+        (small_text().replace('"units"', '"version"'), "the field 'version' is given more than once"),
+        ("\0" + small_text(), "not JSON, or truncated"),
+        ("\ufeff" + small_text(), "not JSON, or truncated"),
+    ],
+)
+def test_wrong_texts(text: str, expected: str) -> None:
+    assert expected in refused(text)
+
+
+def test_wrong_files(tmp_path: Path) -> None:
+    binary = tmp_path / "binary.json"
+    binary.write_bytes(b'{"format": "\xff\xfe"}')
+    loop = tmp_path / "loop.json"
+    loop.symlink_to(loop)
+    cases = {
+        tmp_path / "none.json": "No such file",
+        tmp_path: "Is a directory",
+        binary: "byte 12 is not UTF-8",
+        loop: "cannot be read",
+        tmp_path / "nul\0.json": "cannot be read",
+        Path("/dev/zero"): "larger than",
+    }
+    for path, expected in cases.items():
+        with pytest.raises(LayoutError, match=expected) as caught:
+            load_layout(path)
+        assert str(caught.value).isprintable()
+
+
+def test_deep_but_valid_parameters() -> None:
+    document = small_document()
+    text = json.dumps(document).replace(
+        '"parameters": {', '"parameters": {"deep": ' + "[" * 400 + "]" * 400 + ", "
+    )
+    assert isinstance(parse_layout(text), Reference)
+
+
+JSON = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=5)
+    | st.sampled_from([0, 1, 2, -1, 18, 19, 1e308, 2**31, 10**400, "red", "white", "#ffffff", "cmp-layout"]),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def paths(value: Any, here: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
+    """The path of every value in a document."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [here, *(path for key, item in items for path in paths(item, (*here, key)))]
+
+
+PATHS = {pattern: paths(small_document(pattern)) for pattern in ("honeycomb", "square")}
+
+
+def read_or_refused(text: str) -> None:
+    """The reader's whole promise; and it never reads what the schema forbids."""
+    try:
+        reference = parse_layout(text)
+    except LayoutError as error:
+        assert str(error).isprintable()
+        return
+    assert isinstance(reference, Reference)
+    VALIDATOR.validate(json.loads(text))
+
+
+def mutate(document: Any, path: tuple[str | int, ...], action: str, value: object) -> Any:
+    if not path:
+        return value
+    holder = document
+    for key in path[:-1]:
+        holder = holder[key]
+    key = path[-1]
+    if action == "delete":
+        del holder[key]
+    elif action == "insert" and isinstance(holder, list):
+        holder.insert(key, value)
+    elif action == "insert":
+        holder[f"{key}_"] = value
+    elif action == "repeat" and isinstance(holder, list):
+        holder.insert(key, copy.deepcopy(holder[key]))
+    else:
+        holder[key] = value
+    return document
+
+
+@settings(max_examples=400, deadline=None)
+@given(data=st.data(), pattern=st.sampled_from(sorted(PATHS)))
+def test_fuzz_any_field(data: st.DataObject, pattern: str) -> None:
+    document: Any = small_document(pattern)
+    path = data.draw(st.sampled_from(PATHS[pattern]))
+    action = data.draw(st.sampled_from(["delete", "replace", "insert", "repeat"]))
+    document = mutate(document, path, action, data.draw(JSON))
+    read_or_refused(json.dumps(document))
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    at=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=4),
+    length=st.integers(0, 10**4),
+    cut=st.booleans(),
+)
+def test_fuzz_bytes(
+    tmp_path_factory: pytest.TempPathFactory, at: list[tuple[int, int]], length: int, cut: bool
+) -> None:
+    data = bytearray(small_text().encode())
+    for place, byte in at:
+        data[place % len(data)] = byte
+    path = tmp_path_factory.getbasetemp() / "fuzz.json"
+    path.write_bytes(data[:length] if cut else data)
+    try:
+        assert isinstance(load_layout(path), Reference)
+    except LayoutError as error:
+        assert str(error).isprintable()

@@ -1,0 +1,177 @@
+"""The house rules: who may import whom, what loads when, and that the wheel works elsewhere."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = sorted([*(ROOT / "cmpdesign").rglob("*.py"), *(ROOT / "extractor").rglob("*.py")])
+EXTRACTOR_NEEDS = {"numpy", "cv2", "scipy", "numba", "llvmlite"}
+HEAVY = {"numpy", "cv2", "numba", "scipy", "pydantic", "shapely", "matplotlib", "svgwrite", "extractor"}
+
+
+def python(
+    code: str, *arguments: str, executable: str | Path = sys.executable, cwd: Path = ROOT
+) -> subprocess.CompletedProcess[str]:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    command = [str(executable), "-c", code, *arguments]
+    return subprocess.run(
+        command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def imported(path: Path) -> set[str]:
+    """The top-level packages that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            found.add(node.module.partition(".")[0])
+    return found
+
+
+def test_extractor_imports_little_and_never_cmpdesign() -> None:
+    allowed = EXTRACTOR_NEEDS | {"extractor"} | set(sys.stdlib_module_names)
+    for path in sorted((ROOT / "extractor").rglob("*.py")):
+        assert imported(path) <= allowed, path
+
+
+# Everything third-party but what the extractor needs is as if it were not installed.
+ALONE = """
+import sys
+from importlib.abc import MetaPathFinder
+
+NEEDS = set(sys.argv[1].split(","))
+
+class Refuse(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        top = name.partition(".")[0]
+        if top in NEEDS or top in sys.stdlib_module_names or top.startswith(("_", "sitecustomize")):
+            return None
+        if top != "extractor":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return None
+
+sys.meta_path.insert(0, Refuse())
+for blocked in ("cmpdesign", "pydantic", "typer"):
+    try:
+        __import__(blocked)
+    except ModuleNotFoundError:
+        continue
+    raise SystemExit(f"{blocked} could be imported")
+
+import numpy as np
+from extractor import Extractor, load_layout
+reference = load_layout(sys.argv[2])
+image = np.full((120, 160, 3), 90, np.uint8)
+markers = Extractor(reference).extract(image)
+assert not np.isfinite(markers.xy_px).any() and markers.reason is not None
+print("alone", len(reference.layer))
+"""
+
+
+def test_extractor_works_alone(layout_file: Path) -> None:
+    result = python(ALONE, ",".join(EXTRACTOR_NEEDS), str(layout_file))
+    assert result.stdout == "alone 19\n", result.stderr
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom cmpdesign.cli import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print('loaded', *sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)"
+    )
+    result = python(code)
+    loaded = set(result.stderr.split("loaded ")[-1].split())
+    assert "verify" in result.stdout and "typer" in loaded
+    assert not loaded & HEAVY
+
+
+def test_importing_the_packages_is_cheap() -> None:
+    result = python("import sys, cmpdesign; print(*sorted(sys.modules))")
+    assert not set(result.stdout.split()) & HEAVY
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_are_short(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) < 500
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            lines = (node.end_lineno or 0) - node.lineno + 1
+            assert lines < 80, f"{node.name} has {lines} lines"
+
+
+def test_products_know_no_pattern_and_layouts_no_format() -> None:
+    for path in (ROOT / "cmpdesign" / "products").rglob("*.py"):
+        assert "cmpdesign.patterns import" not in path.read_text(encoding="utf-8"), path
+    for path in (ROOT / "cmpdesign" / "layout").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert "cmpdesign.files" not in text and "cmpdesign.products" not in text, path
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from the checkout by the declared backend."""
+    folder = tmp_path_factory.mktemp("wheel")
+    code = "import sys; from hatchling.build import build_wheel; print(build_wheel(sys.argv[1]))"
+    result = python(code, str(folder))
+    assert result.returncode == 0, result.stderr
+    return folder / result.stdout.split()[-1]
+
+
+def test_wheel_holds_what_is_shipped(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    shipped = {"extractor/layout.schema.json", "extractor/py.typed", "cmpdesign/py.typed"}
+    shipped |= {f"cmpdesign/{path.relative_to(ROOT)}" for path in (ROOT / "templates").rglob("*.toml")}
+    shipped |= {str(path.relative_to(ROOT)) for path in SOURCES}
+    assert shipped <= names
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert not any(name.startswith("tests") for name in names)
+
+
+@pytest.fixture(scope="module")
+def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clean environment that has the wheel, and the dependencies of this one through a path file."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    venv.create(folder, with_pip=False, symlinks=True)
+    site = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))
+    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    zipfile.ZipFile(wheel).extractall(site)
+    return folder
+
+
+def test_wheel_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
+    interpreter = elsewhere / "bin" / "python"
+    where = python(
+        "import cmpdesign, extractor; print(cmpdesign.__file__, extractor.__file__)",
+        executable=interpreter,
+        cwd=tmp_path,
+    )
+    assert all(name.startswith(str(elsewhere)) for name in where.stdout.split()), where.stdout + where.stderr
+
+    def cmpdesign(*arguments: str) -> str:
+        code = "from cmpdesign.cli import main; main()"
+        result = python(code, *arguments, executable=interpreter, cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    assert "tac3d" in cmpdesign("templates")
+    cmpdesign("build", "honeycomb", "-o", "made", "--set", "layers=4")
+    cmpdesign(
+        "render", "made/layout.json", "-o", "view.png", "--pitch", "30", "--rotation", "20", "--noise", "1"
+    )
+    verdict = json.loads(cmpdesign("verify", "made/layout.json", "view.png", "--json"))
+    assert verdict["verified"] is True
+    assert verdict["images"][0]["measured"] == 61
