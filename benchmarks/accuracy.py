@@ -28,14 +28,14 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
-from benchmarks.support.published import publish
+from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.support.published import write_published
 from benchmarks.support.scenes import (
-    KINDS,
+    SCENE_KINDS,
     WRONG_SHARE,
-    Case,
-    bounds_px,
-    extractor_of,
+    SceneCase,
+    bound_rms_px,
+    cached_extractor,
     inner_markers,
     shortest_edges,
 )
@@ -46,13 +46,13 @@ from extractor.presets import PRESETS, Preset
 SEEDS, QUICK_SEEDS = 5, 2
 # layers that fit the image at the larger edges
 PITCHES = ((8.0, 11), (10.0, 11), (12.0, 11), (16.0, 11), (20.0, 11), (30.0, 7), (40.0, 5))
-GROUPS: dict[str, tuple[Case, ...]] = {
+GROUPS: dict[str, tuple[SceneCase, ...]] = {
     "scenes": tuple(
-        Case(pattern, kind) for pattern in ("honeycomb", "round", "elliptical") for kind in KINDS
+        SceneCase(pattern, kind) for pattern in ("honeycomb", "round", "elliptical") for kind in SCENE_KINDS
     ),
-    "blur": tuple(Case(blur_px=blur) for blur in (0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0)),
-    "noise": tuple(Case(noise=noise) for noise in (0.5, 1.0, 2.0, 4.0, 8.0, 12.0)),
-    "pitch": tuple(Case(pitch_px=pitch, layers=layers) for pitch, layers in PITCHES),
+    "blur": tuple(SceneCase(blur_px=blur) for blur in (0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0)),
+    "noise": tuple(SceneCase(noise=noise) for noise in (0.5, 1.0, 2.0, 4.0, 8.0, 12.0)),
+    "pitch": tuple(SceneCase(pitch_px=pitch, layers=layers) for pitch, layers in PITCHES),
 }
 COLUMNS = (
     "case", "preset", "found", "wrong", "inner px", "/ bound", "all px", "/ bound", "bias px", "normalised",
@@ -61,7 +61,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Result:
+class AccuracyResult:
     """A preset on a case, over all noises; see the module. ``wrong``: farther off than 0.3 of the shortest edge."""
 
     group: str
@@ -78,22 +78,22 @@ class Result:
     refine_ms: float
 
 
-def name_of(group: str, case: Case) -> str:
+def case_name(group: str, case: SceneCase) -> str:
     value = {"blur": f"blur {case.blur_px:g} px", "noise": f"noise {case.noise:g}/255"}
     value |= {"pitch": f"edges of {case.pitch_px:g} px", "scenes": f"{case.pattern}, {case.kind}"}
     return value[group]
 
 
-def measure(group: str, case: Case, seeds: int) -> Iterator[Result]:
+def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyResult]:
     """All presets on the same images."""
     scene = case.scene()
     inner = inner_markers(scene.layout)
-    bounds = bounds_px(scene, inner, np.ones_like(inner))
+    bounds = bound_rms_px(scene, inner, np.ones_like(inner))
     seen = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
     visible = seen[0].truth.visible
     true = seen[0].truth.marker_xy_px
     for preset in PRESETS:
-        extractor = extractor_of(case, preset)
+        extractor = cached_extractor(case, preset)
         read = [extractor.extract(picture.image) for picture in seen]
         errors = np.array([markers.xy_px for markers in read]) - true
         wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
@@ -102,8 +102,8 @@ def measure(group: str, case: Case, seeds: int) -> Iterator[Result]:
         inverse = np.linalg.inv(np.array([markers.cov_px2 for markers in read])[found])
         squares[found] = np.einsum("ni,nij,nj->n", errors[found], inverse, errors[found]) / 2
         good = found & inner
-        yield Result(
-            group, name_of(group, case), preset, float(found[:, visible].mean()), int((wrong & found).sum()),
+        yield AccuracyResult(
+            group, case_name(group, case), preset, float(found[:, visible].mean()), int((wrong & found).sum()),
             rms(errors[good]), bounds[0], rms(errors[found]), bounds[1],
             float(abs(errors[good].mean(axis=0)).max()) if good.any() else float("nan"),
             float(np.sqrt(np.mean(squares[good]))) if good.any() else float("nan"),
@@ -115,7 +115,7 @@ def rms(errors: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(errors**2))) if len(errors) else float("nan")
 
 
-def table(title: str, results: Sequence[Result]) -> Table:
+def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
     shown = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for number, column in enumerate(COLUMNS):
         shown.add_column(column, justify="right" if number > 1 else "left", no_wrap=True)
@@ -128,12 +128,12 @@ def table(title: str, results: Sequence[Result]) -> Table:
     return shown
 
 
-def markdown(results: Sequence[Result]) -> str:
+def markdown(results: Sequence[AccuracyResult]) -> str:
     """A row a case, a column a preset: error in bounds, and the normalised error."""
     head = " | ".join(f"{preset}: of the bound | normalised" for preset in PRESETS)
     lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
     for name in dict.fromkeys(r.case for r in results):
-        mine: dict[Preset, Result] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
+        mine: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
         cells = [name, f"{mine['balanced'].inner_bound_px:.4f}"]
         for preset in PRESETS:
             cells += [
@@ -144,7 +144,7 @@ def markdown(results: Sequence[Result]) -> str:
     return "\n".join(lines)
 
 
-def blocks(results: Sequence[Result]) -> dict[str, str]:
+def documentation_blocks(results: Sequence[AccuracyResult]) -> dict[str, str]:
     """The tables of docs/accuracy.md, by block."""
     return {f"accuracy-{group}": markdown([r for r in results if r.group == group]) for group in GROUPS}
 
@@ -164,17 +164,17 @@ def main(arguments: list[str] | None = None) -> int:
     seeds = QUICK_SEEDS if options.quick else SEEDS
     terminal = Console()
     console = terminal if terminal.is_terminal else Console(width=130)  # a pipe has no width
-    results: list[Result] = []
+    results: list[AccuracyResult] = []
     for group, cases in GROUPS.items():
-        mine = [result for case in cases for result in measure(group, case, seeds)]
-        console.print(table(f"{group}; {seeds} noises", mine))
+        mine = [result for case in cases for result in measure_case(group, case, seeds)]
+        console.print(results_table(f"{group}; {seeds} noises", mine))
         results += mine
-    console.print(sentence(), style="dim", soft_wrap=True)
+    console.print(conditions_text(), style="dim", soft_wrap=True)
     found: dict[str, Any] = {"seeds": seeds, "results": [asdict(result) for result in results]}
     if options.json:
         write_json(options.json, found)
     if options.publish:
-        for path in publish("accuracy", found, blocks(results)):
+        for path in write_published("accuracy", found, documentation_blocks(results)):
             console.print(f"wrote {path}")
     return 0
 

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.support.machine import sentence
+from benchmarks.support.machine import conditions_text
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import (
     Blob,
@@ -33,8 +33,8 @@ from cmpdesign.scene.standard import BLACK_RGB
 from extractor import Extractor, Status, parse_layout
 from extractor.presets import PRESETS, Preset
 
-KINDS = ("cells missing", "dirt", "dark dirt", "blots")
-MEDIAN = np.log(2)  # of the squares per axis, in two dimensions
+DAMAGE_KINDS = ("cells missing", "dirt", "dark dirt", "blots")
+CHI_SQUARE_MEDIAN_2 = np.log(2)  # of the squares per axis, in two dimensions
 LAYERS, DRAWS = 9, 3
 SIZE = (430, 400)
 REACH_MM = 8.0
@@ -45,7 +45,7 @@ SURFACES = {
 }
 
 
-def damages(seed: int) -> Iterator[Damage]:
+def sample_damages(seed: int) -> Iterator[Damage]:
     """Cells that fell out; dirt; dark dirt; two large blots."""
     rng = np.random.default_rng(seed)
 
@@ -62,9 +62,9 @@ def damages(seed: int) -> Iterator[Damage]:
 
 
 @cache
-def squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
-    """Squared errors over covariance per axis: of measured markers by ``KINDS``, of repaired and fitted ones."""
-    found: dict[str, list[float]] = {name: [] for name in (*KINDS, "repaired", "fitted")}
+def normalised_squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
+    """Squared errors over covariance per axis: of measured markers by ``DAMAGE_KINDS``, of repaired and fitted ones."""
+    found: dict[str, list[float]] = {name: [] for name in (*DAMAGE_KINDS, "repaired", "fitted")}
     for pattern in ("honeycomb", "round", "elliptical"):
         layout = standard_layout(pattern, LAYERS)
         extractor = Extractor(parse_layout(layout_to_json(layout)), preset)
@@ -73,12 +73,12 @@ def squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
                 standard_scene(layout), surface=surface, camera=Camera(20.0, 7.3, 10.0 * number, 30.0)
             )
             for seed, damage in enumerate(
-                damage for draw in range(DRAWS) for damage in damages(DRAWS * number + draw)
+                damage for draw in range(DRAWS) for damage in sample_damages(DRAWS * number + draw)
             ):
                 seen = render(replace(plain, damage=damage, seed=seed), size=SIZE)
                 markers = extractor.extract(seen.image)
                 error = markers.xy_px - seen.truth.marker_xy_px
-                kind = KINDS[seed % len(KINDS)]
+                kind = DAMAGE_KINDS[seed % len(DAMAGE_KINDS)]
                 for status, name in (
                     (Status.MEASURED, kind),
                     (Status.REPAIRED, "repaired"),
@@ -93,10 +93,10 @@ def squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
 def main() -> int:
     for preset in PRESETS:
         print(preset)
-        for name, values in squares(preset).items():
-            rms, median = np.sqrt(values.mean()), np.sqrt(np.median(values) / MEDIAN)
+        for name, values in normalised_squares(preset).items():
+            rms, median = np.sqrt(values.mean()), np.sqrt(np.median(values) / CHI_SQUARE_MEDIAN_2)
             print(f"  {name:<14} {len(values):>6} markers   normalised {rms:5.2f}   median {median:5.2f}")
-    print(sentence())
+    print(conditions_text())
     return 0
 
 

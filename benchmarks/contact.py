@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.machine import conditions_text, write_json
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
-from cmpdesign.contact.layer.green import green
+from cmpdesign.contact.layer.green import green_kernels
 from cmpdesign.scene import standard_layout
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ CASES = (
 
 
 @dataclass(frozen=True)
-class Figures:
+class ContactFigures:
     """What one case took, and how far its markers are from where a finer grid has them."""
 
     name: str
@@ -63,21 +63,21 @@ class Figures:
     force_percent: float
 
 
-def solved(case: Case, grid: int) -> tuple[Contact, float, float]:
+def timed_contact(case: Case, grid: int) -> tuple[Contact, float, float]:
     """The contact, the processor's seconds and the clock's."""
     started, began = time.process_time(), time.perf_counter()
     found = solve(LAYER, case.indenter, case.motion, friction=case.friction, size_mm=SIZE_MM, grid=grid)
     return found, time.process_time() - started, time.perf_counter() - began
 
 
-def figures(case: Case, runs: int, markers_mm: Array) -> Figures:
+def measure_contact(case: Case, runs: int, markers_mm: Array) -> ContactFigures:
     """Cold is the first contact on a layer and grid, warm the best of some with its kernels at hand."""
-    green.cache_clear()
-    found, cold, wall = solved(case, GRID)
-    warm = min(solved(case, GRID)[1] for _ in range(runs))
-    fine, *_ = solved(case, FINE)
+    green_kernels.cache_clear()
+    found, cold, wall = timed_contact(case, GRID)
+    warm = min(timed_contact(case, GRID)[1] for _ in range(runs))
+    fine, *_ = timed_contact(case, FINE)
     error = np.linalg.norm(found.surface()(markers_mm) - fine.surface()(markers_mm), axis=1)
-    return Figures(
+    return ContactFigures(
         name=case.name,
         cells_in_contact=int(found.in_contact.sum()),
         applications=found.iterations,
@@ -91,7 +91,7 @@ def figures(case: Case, runs: int, markers_mm: Array) -> Figures:
     )
 
 
-def against_closed_forms() -> dict[str, float]:
+def closed_form_errors() -> dict[str, float]:
     """Percent off, on layers 1e5 mm thick, contact over the middle third of the grid and more."""
     thick = Elastomer(1e5, 1.0)
     a = math.sqrt(10.0 * 0.01)
@@ -108,7 +108,7 @@ def against_closed_forms() -> dict[str, float]:
     return {name: 100 * float(found / exact - 1) for name, (found, exact) in wanted.items()}
 
 
-def table(rows: list[Figures]) -> Table:
+def contact_table(rows: list[ContactFigures]) -> Table:
     """As it is printed."""
     title = (
         f"Contact, {GRID} x {GRID} cells, {SIZE_MM[0]:g} x {SIZE_MM[1]:g} mm, layer of 4 mm, incompressible"
@@ -143,13 +143,13 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     markers = standard_layout("honeycomb", 8).marker_xy_mm * 1.5
     solve(LAYER, Ball(5.0), Motion(0.1), grid=32)  # loads what is loaded on first use
-    rows = [figures(case, 1 if options.quick else 3, markers) for case in CASES]
+    rows = [measure_contact(case, 1 if options.quick else 3, markers) for case in CASES]
     console = Console() if Console().is_terminal else Console(width=110)
-    console.print(table(rows))
-    forms = against_closed_forms()
+    console.print(contact_table(rows))
+    forms = closed_form_errors()
     for name, percent in forms.items():
         console.print(f"{name}: {percent:+.2f} %")
-    console.print(sentence(), style="dim", soft_wrap=True)
+    console.print(conditions_text(), style="dim", soft_wrap=True)
     if options.json:
         write_json(options.json, {"contacts": [asdict(row) for row in rows], "closed_forms_percent": forms})
     slow = [row.name for row in rows if row.cold_s > LIMIT_S]

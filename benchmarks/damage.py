@@ -22,30 +22,37 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.scoring.reading import Result, notable_lines, overlay, read, warm_up, wrong_in
-from benchmarks.suites.scoring.report import one_line
-from benchmarks.suites.stress.drawn import DRAWN
-from benchmarks.suites.stress.frames import PATTERNS, Shot
-from benchmarks.suites.stress.kinds import Case
+from benchmarks.suites.scoring.reading import (
+    CaseResult,
+    draw_overlay,
+    find_wrong_markers,
+    notable_lines,
+    read_case,
+    warm_up,
+)
+from benchmarks.suites.scoring.report import result_line
+from benchmarks.suites.stress.drawn import RANDOM_KINDS
+from benchmarks.suites.stress.frames import PATTERNS, CaseImage
+from benchmarks.suites.stress.kinds import StressCase
 from extractor import Markers
 
 IMAGES, SEED = 2100, 5000
 
 
 @dataclass(frozen=True)
-class Read:
+class DamageResult:
     """One image.
 
     Attributes:
         others: of the wrong markers those that lie nearer to another one's true place than to their own.
     """
 
-    result: Result
+    result: CaseResult
     others: int
 
 
 @dataclass(frozen=True)
-class Total:
+class DamageTotal:
     """All images of one kind. Counts are of markers; unread are images that nothing was read in.
 
     Attributes:
@@ -68,54 +75,58 @@ class Total:
     seeds: tuple[tuple[str, int], ...]
 
 
-def drawn(images: int, seed: int) -> list[Case]:
+def sample_cases(images: int, seed: int) -> list[StressCase]:
     """The kinds in turn, each in all patterns; every image has a seed of its own, from ``seed`` on."""
-    kinds = [kind.name for kind in DRAWN]
+    kinds = [kind.name for kind in RANDOM_KINDS]
     return [
-        Case(kinds[n % len(kinds)], 0, PATTERNS[n // len(kinds) % len(PATTERNS)], seed + n)
+        StressCase(kinds[n % len(kinds)], 0, PATTERNS[n // len(kinds) % len(PATTERNS)], seed + n)
         for n in range(images)
     ]
 
 
-def name_of(case: Case) -> str:
+def case_name(case: StressCase) -> str:
     return f"{case.kind}/{case.pattern}/{case.seed}"
 
 
-def case_of(name: str) -> Case:
+def parse_case(name: str) -> StressCase:
     """Raises ``ValueError`` where no image is named so."""
     kind, _, rest = name.partition("/")
     pattern, _, seed = rest.partition("/")
-    if kind not in {one.name for one in DRAWN} or pattern not in PATTERNS or not seed.isdigit():
-        raise ValueError(f"no image is named {name!r}; give one as '{DRAWN[0].name}/{PATTERNS[0]}/{SEED}'")
-    return Case(kind, 0, pattern, int(seed))
+    if kind not in {one.name for one in RANDOM_KINDS} or pattern not in PATTERNS or not seed.isdigit():
+        raise ValueError(
+            f"no image is named {name!r}; give one as '{RANDOM_KINDS[0].name}/{PATTERNS[0]}/{SEED}'"
+        )
+    return StressCase(kind, 0, pattern, int(seed))
 
 
-def taken_for_others(shot: Shot, markers: Markers) -> int:
+def count_swapped_markers(shot: CaseImage, markers: Markers) -> int:
     """How many wrong markers lie nearer to another one's true place than to their own."""
-    wrong, truth = wrong_in(shot, markers)
+    wrong, truth = find_wrong_markers(shot, markers)
     places: NDArray[np.float64] = truth.marker_xy_px
     apart = np.linalg.norm(markers.xy_px[wrong][:, None] - places, axis=2)
     return int((apart.argmin(axis=1) != np.flatnonzero(wrong)).sum()) if wrong.any() else 0
 
 
-def _job(case: Case) -> Read:
-    result, shot, markers = read(case, 1, timing=False)
-    return Read(result, taken_for_others(shot, markers) if markers is not None and result.score.wrong else 0)
+def _read_case(case: StressCase) -> DamageResult:
+    result, shot, markers = read_case(case, 1, timing=False)
+    return DamageResult(
+        result, count_swapped_markers(shot, markers) if markers is not None and result.score.wrong else 0
+    )
 
 
-def run(chosen: list[Case], processes: int) -> Iterator[Read]:
+def read_cases(chosen: list[StressCase], processes: int) -> Iterator[DamageResult]:
     """Results as they come."""
     if processes == 1:
         warm_up()
-        yield from map(_job, chosen)
+        yield from map(_read_case, chosen)
         return
     with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
-        yield from pool.imap_unordered(_job, chosen, chunksize=4)
+        yield from pool.imap_unordered(_read_case, chosen, chunksize=4)
 
 
-def with_progress(chosen: list[Case], processes: int) -> list[Read]:
+def with_progress(chosen: list[StressCase], processes: int) -> list[DamageResult]:
     results, started = [], time.perf_counter()
-    for one in run(chosen, processes):
+    for one in read_cases(chosen, processes):
         results.append(one)
         if sys.stderr.isatty() or len(results) % 200 == 0:
             text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
@@ -123,11 +134,11 @@ def with_progress(chosen: list[Case], processes: int) -> list[Read]:
     return sorted(results, key=lambda one: one.result.case.seed)
 
 
-def total_of(kind: str, own: Sequence[Read]) -> Total:
+def total_of_kind(kind: str, own: Sequence[DamageResult]) -> DamageTotal:
     results = [one.result for one in own]
     read_in = [one.score for one in results if not one.reason]
     scores = [one.score for one in results]
-    return Total(
+    return DamageTotal(
         kind=kind,
         images=len(results),
         unread=len(results) - len(read_in),
@@ -139,15 +150,15 @@ def total_of(kind: str, own: Sequence[Read]) -> Total:
         lost=sum(one.lost for one in scores),
         sure=sum(one.sure for one in read_in),
         kept=sum(one.kept for one in read_in),
-        seeds=tuple((name_of(one.case), one.score.wrong) for one in results if one.score.wrong),
+        seeds=tuple((case_name(one.case), one.score.wrong) for one in results if one.score.wrong),
     )
 
 
-def totals(results: Sequence[Read]) -> list[Total]:
+def totals_by_kind(results: Sequence[DamageResult]) -> list[DamageTotal]:
     """A row a kind, and one of all."""
-    kinds = [kind.name for kind in DRAWN]
-    rows = [total_of(kind, [one for one in results if one.result.case.kind == kind]) for kind in kinds]
-    return [*(row for row in rows if row.images), total_of("together", results)]
+    kinds = [kind.name for kind in RANDOM_KINDS]
+    rows = [total_of_kind(kind, [one for one in results if one.result.case.kind == kind]) for kind in kinds]
+    return [*(row for row in rows if row.images), total_of_kind("together", results)]
 
 
 HEAD = (
@@ -156,7 +167,7 @@ HEAD = (
 )
 
 
-def table(rows: Sequence[Total]) -> str:
+def totals_table(rows: Sequence[DamageTotal]) -> str:
     """As printed; ``ids`` are the wrong markers that lie where another one is."""
     lines = [HEAD]
     for row in rows:
@@ -171,25 +182,25 @@ def table(rows: Sequence[Total]) -> str:
     return "\n".join(lines)
 
 
-def alone(case: Case, save: Path | None) -> Result:
+def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
     """Read one image here, print what is wrong in it, and write it with its overlay."""
     import cv2
 
     warm_up()
-    result, shot, markers = read(case, 1, timing=False)
-    print(one_line(result))
+    result, shot, markers = read_case(case, 1, timing=False)
+    print(result_line(result))
     for line in notable_lines(shot, markers):
         print(f"    {line}")
     if save is not None:
         save.mkdir(parents=True, exist_ok=True)
-        stem = name_of(case).replace("/", "-").replace(" ", "_")
+        stem = case_name(case).replace("/", "-").replace(" ", "_")
         cv2.imwrite(str(save / f"{stem}.png"), shot.image)
         if markers is not None:
-            cv2.imwrite(str(save / f"{stem}.overlay.png"), overlay(shot, case, markers))
+            cv2.imwrite(str(save / f"{stem}.overlay.png"), draw_overlay(shot, case, markers))
     return result
 
 
-def write_json(rows: Sequence[Total], path: Path) -> None:
+def write_json(rows: Sequence[DamageTotal], path: Path) -> None:
     beside = path.with_name(path.name + ".part")
     beside.write_text(json.dumps([row.__dict__ for row in rows], indent=1) + "\n", encoding="utf-8")
     beside.replace(path)
@@ -205,15 +216,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
     asked = parser.parse_args(arguments)
-    if asked.only:
+    if asked.with_one_pass:
         try:
-            result = alone(case_of(asked.only), asked.save)
+            result = read_one_image(parse_case(asked.with_one_pass), asked.save)
         except ValueError as error:
             parser.error(str(error))
         return int(result.score.wrong > 0 or result.raised)
     started = time.perf_counter()
-    rows = totals(with_progress(drawn(asked.images, asked.seed), asked.processes))
-    print(table(rows))
+    rows = totals_by_kind(with_progress(sample_cases(asked.images, asked.seed), asked.processes))
+    print(totals_table(rows))
     last = asked.seed + asked.images - 1
     print(f"{asked.images} images, seeds {asked.seed} to {last}; {time.perf_counter() - started:.0f} s")
     if asked.json:

@@ -27,8 +27,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
-from benchmarks.support.published import publish
+from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.support.published import write_published
 from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
@@ -60,7 +60,7 @@ class Speed:
     stages_ms: dict[str, float]
 
 
-def extractor_of(layout: Layout, preset: Preset = "balanced") -> Extractor:
+def make_extractor(layout: Layout, preset: Preset = "balanced") -> Extractor:
     return Extractor(parse_layout(layout_to_json(layout)), preset)
 
 
@@ -72,7 +72,7 @@ def wrong_ids(layout: Layout, markers: Markers, rendered: Rendered) -> int:
     return int((away[measured] > WRONG_SHARE * shortest_edges(layout, true)[measured]).sum())
 
 
-def speed(
+def measure_speed(
     name: str,
     layout: Layout,
     pitch_px: float,
@@ -83,7 +83,7 @@ def speed(
     """Time the extraction of one scene; two runs before the clock starts."""
     scene = standard_scene(layout)
     rendered = render(replace(scene, camera=Camera(pitch_px, rotation_deg=7.3)), size=size)
-    extractor = extractor_of(layout, preset)
+    extractor = make_extractor(layout, preset)
     for _ in range(2):
         markers = extractor.extract(rendered.image)
     total, stages = [], []
@@ -100,23 +100,23 @@ def speed(
     )  # fmt: skip
 
 
-def side_px(megapixels: float) -> tuple[int, int]:
+def image_size_px(megapixels: float) -> tuple[int, int]:
     """4 : 3."""
     height = round((megapixels * 1e6 * 3 / 4) ** 0.5)
     return round(height * 4 / 3), height
 
 
-def over_pixels(runs: int) -> list[Speed]:
+def measure_over_pixels(runs: int) -> list[Speed]:
     """One pattern of 331 markers, the whole picture growing."""
     layout = standard_layout("honeycomb", LAYERS)
-    sizes = [(mp, side_px(mp)) for mp in PIXELS_MP]
-    return [speed(f"{mp:g} MP", layout, PITCH_PX * size[1] / 480, size, runs) for mp, size in sizes]
+    sizes = [(mp, image_size_px(mp)) for mp in PIXELS_MP]
+    return [measure_speed(f"{mp:g} MP", layout, PITCH_PX * size[1] / 480, size, runs) for mp, size in sizes]
 
 
-def over_markers(runs: int) -> list[Speed]:
+def measure_over_markers(runs: int) -> list[Speed]:
     """Patterns of ever more layers with edges of 20 px, the picture as large as the pattern."""
     return [
-        speed(f"{n} layers", standard_layout("honeycomb", n), PITCH_PX, picture_px(n), runs)
+        measure_speed(f"{n} layers", standard_layout("honeycomb", n), PITCH_PX, picture_px(n), runs)
         for n in MARKER_LAYERS
     ]
 
@@ -126,18 +126,18 @@ def picture_px(layers: int) -> tuple[int, int]:
     return side, side
 
 
-def exponent(x: Sequence[float], y: Sequence[float]) -> float:
+def fit_exponent(x: Sequence[float], y: Sequence[float]) -> float:
     """Slope of log y over log x: 1 is linear growth."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def per_unit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
+def fit_line(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Intercept and slope of y over x."""
     slope, intercept = np.polyfit(x, y, 1)
     return float(intercept), float(slope)
 
 
-def table_of(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Table:
+def make_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Table:
     table = Table(
         title=title, box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
     )
@@ -156,7 +156,7 @@ def speed_table(title: str, results: Sequence[Speed], caption: str) -> Table:
         )
         for r in results
     ]  # fmt: skip
-    return table_of(
+    return make_table(
         title, ("scene", "MP", "measured", "wrong", "median ms", "p95 ms", "best ms"), rows, caption
     )
 
@@ -165,7 +165,7 @@ def stage_table(results: Sequence[Speed]) -> Table:
     names = list(dict.fromkeys(name for result in results for name in result.stages_ms))
     rows = [(name, *(f"{result.stages_ms.get(name, 0):.2f}" for result in results)) for name in names]
     rows.append(("total", *(f"{result.median_ms:.2f}" for result in results)))
-    return table_of("Stages, median ms", ("stage", *(result.name for result in results)), rows)
+    return make_table("Stages, median ms", ("stage", *(result.name for result in results)), rows)
 
 
 def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str, Any]:
@@ -173,14 +173,14 @@ def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str
     x, y = [unit(result) for result in results], [result.best_ms for result in results]
     large = len(results) // 2
     stages = {
-        stage: exponent(
+        stage: fit_exponent(
             x[large:], [max(result.stages_ms.get(stage, 0.0), 1e-3) for result in results[large:]]
         )
         for stage in results[-1].stages_ms
     }
-    intercept, slope = per_unit(x, y)
+    intercept, slope = fit_line(x, y)
     return {
-        "exponent": exponent(x, y), "exponent_large": exponent(x[large:], y[large:]), "stages": stages,
+        "exponent": fit_exponent(x, y), "exponent_large": fit_exponent(x[large:], y[large:]), "stages": stages,
         "ms_at_zero": intercept, "ms_per_unit": slope,
     }  # fmt: skip
 
@@ -191,23 +191,25 @@ def growth_table(title: str, largest: Speed, grown: dict[str, Any]) -> Table:
         (stage, f"{ms:.1f}", f"{ms / largest.median_ms:.1%}", f"{grown['stages'][stage]:.2f}")
         for stage, ms in sorted(largest.stages_ms.items(), key=lambda pair: -pair[1])
     ]
-    return table_of(title, ("stage", "ms", "share", "exponent"), rows)
+    return make_table(title, ("stage", "ms", "share", "exponent"), rows)
 
 
-def grown_words(unit: str, fit: dict[str, Any]) -> str:
+def growth_text(unit: str, fit: dict[str, Any]) -> str:
     return (
         f"time ~ {unit}^{fit['exponent']:.2f}, ^{fit['exponent_large']:.2f} over the larger half; straight line "
         f"through the best times: {fit['ms_at_zero']:.1f} ms + {fit['ms_per_unit']:.3g} ms per {unit}"
     )
 
 
-def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
+def run_all(quick: bool) -> tuple[dict[str, Any], list[Table]]:
     """Everything, as data and as tables."""
     runs = 7 if quick else 31
     usual = standard_layout("honeycomb", LAYERS)
-    presets = [speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
-    large = speed("12 MP", standard_layout("honeycomb", 20), 70.0, side_px(12.0), max(3, runs // 4))
-    pixels, markers = over_pixels(max(3, runs // 6)), over_markers(max(3, runs // 6))
+    presets = [measure_speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
+    large = measure_speed(
+        "12 MP", standard_layout("honeycomb", 20), 70.0, image_size_px(12.0), max(3, runs // 4)
+    )
+    pixels, markers = measure_over_pixels(max(3, runs // 6)), measure_over_markers(max(3, runs // 6))
     by_pixels, by_markers = growth(pixels, lambda r: r.megapixels), growth(markers, lambda r: r.markers)
     results = {
         "presets": {preset: asdict(result) for preset, result in zip(PRESETS, presets, strict=True)},
@@ -221,12 +223,12 @@ def run(quick: bool) -> tuple[dict[str, Any], list[Table]]:
         ),
         stage_table([*presets, large]),
         speed_table(
-            "Growth with the image: 331 markers that grow along", pixels, grown_words("MP", by_pixels)
+            "Growth with the image: 331 markers that grow along", pixels, growth_text("MP", by_pixels)
         ),
         growth_table(f"Stages at {pixels[-1].megapixels:.0f} MP", pixels[-1], by_pixels),
         speed_table(
             "Growth with the markers: edges of 20 px, the image grows along", markers,
-            grown_words("marker", by_markers),
+            growth_text("marker", by_markers),
         ),
         growth_table(f"Stages at {markers[-1].markers} markers", markers[-1], by_markers),
     ]  # fmt: skip
@@ -265,16 +267,16 @@ def main(arguments: list[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     cv2.setNumThreads(1)
-    results, tables = run(options.quick)
+    results, tables = run_all(options.quick)
     terminal = Console()
     console = terminal if terminal.is_terminal else Console(width=100)  # a pipe has no width
     for table in tables:
         console.print(table)
-    console.print(sentence(), style="dim", soft_wrap=True)
+    console.print(conditions_text(), style="dim", soft_wrap=True)
     if options.json:
         write_json(options.json, results)
     if options.publish:
-        for path in publish("extraction", results, markdown(results)):
+        for path in write_published("extraction", results, markdown(results)):
             console.print(f"wrote {path}")
     return 0
 

@@ -19,31 +19,31 @@ from scipy.spatial import cKDTree
 
 from cmpdesign.design.design import Design, load_design
 from cmpdesign.layout.build import build_layout
-from cmpdesign.products.laser.as_made import as_made
+from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
-from cmpdesign.products.laser.job import Job, Pass, make_job
+from cmpdesign.products.laser.job import LaserJob, LaserPass, make_job
 from cmpdesign.products.laser.paths.beam import Points
-from cmpdesign.products.laser.paths.order import ordered
-from cmpdesign.products.laser.paths.strokes import loops
-from cmpdesign.products.laser.product import product
-from cmpdesign.products.laser.setup import complete
+from cmpdesign.products.laser.paths.order import order_cells
+from cmpdesign.products.laser.paths.strokes import loop_strokes
+from cmpdesign.products.laser.product import make_laser
+from cmpdesign.products.laser.setup import complete_setup
 
 VPYPE_HOME = Path(sys.prefix) / "vpype"
 PX_IN_MM = 96 / 25.4
 
 
-def design(layers: int, **options: str) -> Design:
+def make_design(layers: int, **options: str) -> Design:
     """A honeycomb of 1.5 mm, on a bed that is large enough; 3 n^2 + 1 cells are carved of n layers."""
     given = {"layers": str(layers), "pitch_mm": "1.5", "laser.machine": "co2-40w", "fiducials.count": "0"}
     return load_design("honeycomb", given | {key.replace("__", "."): value for key, value in options.items()})
 
 
-def job_of(made: Design) -> Job:
-    return make_job(made.name, build_layout(made), complete(made.laser))
+def make_laser_job(made: Design) -> LaserJob:
+    return make_job(made.name, build_layout(made), complete_setup(made.laser))
 
 
-def travel_mm(job: Job) -> float:
+def travel_mm(job: LaserJob) -> float:
     """Dark way between the cells of every pass, as they are burnt."""
     total = 0.0
     for one in job.cell_passes:
@@ -63,14 +63,14 @@ def nearest_bound_mm(entries_mm: Points) -> float:
     return float(nearest.sum() - nearest.max())
 
 
-def as_in_layout(one: Pass) -> Pass:
+def pass_in_layout_order(one: LaserPass) -> LaserPass:
     """The pass with its closed paths in the layout's order, each from its first corner on."""
     assert one.cavities is not None
     cells = one.cavities.selected(np.argsort(one.cavities.cell))
-    return replace(one, walls=loops(cells.loops_mm, np.arange(len(cells.cell))))
+    return replace(one, walls=loop_strokes(cells.loops_mm, np.arange(len(cells.cell))))
 
 
-def vpype_mm(job: Job, *options: str) -> tuple[float, float]:
+def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
     """Dark way in mm and seconds of vpype's linesort on the same paths, given cell by cell as in the layout."""
     program = VPYPE_HOME / "bin" / "vpype"
     if not program.exists():
@@ -86,7 +86,9 @@ def vpype_mm(job: Job, *options: str) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cells.svg"
         path.write_text(
-            drawing_to_svg(replace(job_drawing(job), passes=tuple(map(as_in_layout, job.cell_passes))))
+            drawing_to_svg(
+                replace(job_drawing(job), passes=tuple(map(pass_in_layout_order, job.cell_passes)))
+            )
         )
         started = time.perf_counter()
         command = [str(program), "read", str(path), "linesort", *options, "stat"]
@@ -96,13 +98,13 @@ def vpype_mm(job: Job, *options: str) -> tuple[float, float]:
     return float(total.split(":")[1]) / PX_IN_MM, seconds
 
 
-def travel() -> None:
+def print_travel() -> None:
     """2,000 cells in three colors (and one white), paths as the job burns them."""
-    job = job_of(design(26, laser__corner="plain", laser__holes="false"))
+    job = make_laser_job(make_design(26, laser__corner="plain", laser__holes="false"))
     entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
     started = time.perf_counter()
     for cells in entries:
-        ordered(cells, "travel")
+        order_cells(cells, "travel")
     seconds = time.perf_counter() - started
     bound = sum(nearest_bound_mm(cells) for cells in entries)
     plain, plain_s = vpype_mm(job)
@@ -117,7 +119,7 @@ def travel() -> None:
     assert ours < 0.88 * best, "at least 12 % below"
 
 
-def formats() -> None:
+def print_format_times() -> None:
     """Layout in hand; everything in the folder laser/, in memory. CPU time is what an idle core takes."""
     print("\ntime to everything in laser/ (figures, 4 formats, sheet, coupon), corners overcut")
     print(f"{'cells':>8}{'files':>8}{'MB':>8}{'CPU s':>8}{'wall s':>8}{'limit s':>9}")
@@ -133,19 +135,21 @@ def formats() -> None:
             )
         )
         for layers, limit in ((26, 3.0), (82, 30.0)):
-            made = design(layers, laser__machine=str(machine), fiducials__count="3")
+            made = make_design(layers, laser__machine=str(machine), fiducials__count="3")
             layout = build_layout(made)
             started, begun = time.perf_counter(), time.process_time()
-            files = product(made, layout).files
+            files = make_laser(made, layout).files
             wall, seconds = time.perf_counter() - started, time.process_time() - begun
             size = sum(len(content) for content in files.values()) / 1e6
-            cells = sum(len(one.walls) for one in make_job("", layout, complete(made.laser)).cell_passes)
+            cells = sum(
+                len(one.walls) for one in make_job("", layout, complete_setup(made.laser)).cell_passes
+            )
             print(f"{cells:8d}{len(files):8d}{size:8.1f}{seconds:8.2f}{wall:8.2f}{limit:9.0f}")
             assert seconds < limit
-            assert files == product(made, layout).files, "the same bytes twice"
+            assert files == make_laser(made, layout).files, "the same bytes twice"
 
 
-def areas() -> None:
+def print_areas() -> None:
     """Area against the nominal cell of 1.5 mm, what a corner loses, what is burnt beside."""
     print("\nas made at the front, honeycomb of 1.5 mm")
     print(
@@ -154,8 +158,10 @@ def areas() -> None:
     )
     for kerf in (0.03, 0.05, 0.1, 0.16, 0.25):
         for corner in ("plain", "overcut"):
-            job = job_of(design(4, laser__corner=corner, laser__kerf_mm=str(kerf), laser__taper_deg="0"))
-            front = as_made(job)[1].front
+            job = make_laser_job(
+                make_design(4, laser__corner=corner, laser__kerf_mm=str(kerf), laser__taper_deg="0")
+            )
+            front = measure_as_made(job)[1].front
             lengths = [
                 front.corner_loss_mm,
                 front.burnt_beside_mm,
@@ -171,10 +177,10 @@ def areas() -> None:
 
 def main() -> None:
     print(json.dumps({"python": sys.version.split()[0]}))
-    product(design(3), build_layout(design(3)))  # compiles what is compiled on first use
-    areas()
-    travel()
-    formats()
+    make_laser(make_design(3), build_layout(make_design(3)))  # compiles what is compiled on first use
+    print_areas()
+    print_travel()
+    print_format_times()
 
 
 if __name__ == "__main__":

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.suites.article.graph import connect
-from benchmarks.suites.article.numbering import lattice_of as article_lattice
-from benchmarks.suites.article.numbering import number as article_number
+from benchmarks.suites.article.graph import connect_corners
+from benchmarks.suites.article.numbering import make_lattice_tables as article_lattice
+from benchmarks.suites.article.numbering import number_triangles as article_number
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import (
     Camera,
@@ -43,7 +43,7 @@ LAYERS = 10
 
 
 @dataclass(frozen=True)
-class Condition:
+class NumberingCondition:
     """One kind of image; ``pitch_px``, ``blur_px``, ``noise`` as a camera gives them."""
 
     name: str
@@ -56,25 +56,29 @@ class Condition:
 
 
 CONDITIONS = (
-    Condition("plain"),
+    NumberingCondition("plain"),
     *(
-        Condition(f"{share:.0%} of the cells missing", Damage(missing_share=share))
+        NumberingCondition(f"{share:.0%} of the cells missing", Damage(missing_share=share))
         for share in (0.01, 0.05, 0.1, 0.2)
     ),
-    Condition("a scratch, half an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 0.75),))),
-    Condition("a scratch, an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 1.5),))),
-    Condition("twist by 30 degrees", surface=Surface((Twist(6.0, 30.0),))),
-    Condition("pinch", surface=Surface((Press(4.0, -1.5),))),
-    Condition("tilt 60 degrees", tilt_deg=60.0),
-    Condition("blur of a tenth of an edge", blur_px=2.0),
-    Condition("blur of a fifth of an edge", blur_px=4.0),
-    Condition("pitch 8 px", pitch_px=8.0),
-    Condition("noise 20/255", noise=20.0),
+    NumberingCondition(
+        "a scratch, half an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 0.75),))
+    ),
+    NumberingCondition(
+        "a scratch, an edge wide", Damage(scratches=(Scratch((-20.0, 3.0), (20.0, 6.0), 1.5),))
+    ),
+    NumberingCondition("twist by 30 degrees", surface=Surface((Twist(6.0, 30.0),))),
+    NumberingCondition("pinch", surface=Surface((Press(4.0, -1.5),))),
+    NumberingCondition("tilt 60 degrees", tilt_deg=60.0),
+    NumberingCondition("blur of a tenth of an edge", blur_px=2.0),
+    NumberingCondition("blur of a fifth of an edge", blur_px=4.0),
+    NumberingCondition("pitch 8 px", pitch_px=8.0),
+    NumberingCondition("noise 20/255", noise=20.0),
 )
 
 
 @dataclass
-class Count:
+class CellCount:
     """Cells over all images of a condition."""
 
     visible: int = 0
@@ -95,9 +99,9 @@ class Count:
             self.wrong += int(not right)
 
 
-def compare(condition: Condition) -> tuple[Count, Count]:
+def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount]:
     """The article's way and the extractor's on the same images."""
-    article, mesh = Count(), Count()
+    article, mesh = CellCount(), CellCount()
     inks = standard_scene().inks
     for pattern in PATTERNS:
         layout = standard_layout(pattern, LAYERS)
@@ -119,7 +123,7 @@ def compare(condition: Condition) -> tuple[Count, Count]:
             image, truth = np.asarray(rendered.image, np.uint8), rendered.truth
             stages = extractor.extract(image).stages
             triangles = stages["triangles"]
-            numbering = article_number(image, triangles, connect(triangles), lattice)
+            numbering = article_number(image, triangles, connect_corners(triangles), lattice)
             found = np.full(len(triangles.ink), -1) if numbering is None else numbering.cell_of_triangle
             article.add(found, triangles.corner_px.mean(axis=1), reference, truth)
             attached = stages.get("attach")
@@ -136,7 +140,7 @@ def main() -> None:
     for name in ("condition", "visible", "corners: right", "wrong", "centers: right", "wrong"):
         table.add_column(name, justify="left" if name == "condition" else "right")
     for condition in CONDITIONS:
-        article, mesh = compare(condition)
+        article, mesh = compare_methods(condition)
         row = [f"{article.visible}"]
         for count in (article, mesh):
             row += [f"{100 * count.right / count.visible:.2f} %", f"{count.wrong}"]

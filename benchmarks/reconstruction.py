@@ -30,7 +30,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.machine import conditions_text, write_json
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
@@ -64,7 +64,7 @@ STATES: dict[str, tuple[Ball, Motion] | None] = {
 
 
 @dataclass(frozen=True)
-class Result:
+class ReconstructionResult:
     """One sensor and state. Triples are x, y, z."""
 
     sensor: str
@@ -84,7 +84,7 @@ class Result:
     reconstruct_ms: float
 
 
-def cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
+def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
     """Left and right half, from the back."""
     width, height = size[0] // 2, size[1]
     return tuple(
@@ -104,12 +104,12 @@ def cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tupl
     )
 
 
-def rig_of(views: tuple[Pinhole, ...]) -> Rig:
+def make_rig(views: tuple[Pinhole, ...]) -> Rig:
     """Intrinsics only: the poses are to be found."""
     return Rig(tuple(View(v.name, v.focal_px, v.centre_px, v.distortion, v.area_px) for v in views))
 
 
-def scene(layout: Layout, camera: tuple[Pinhole, ...], surface: Surface | None, seed: int) -> Scene:
+def make_scene(layout: Layout, camera: tuple[Pinhole, ...], surface: Surface | None, seed: int) -> Scene:
     return Scene(
         layout=layout,
         camera=camera,
@@ -122,22 +122,26 @@ def scene(layout: Layout, camera: tuple[Pinhole, ...], surface: Surface | None, 
     )
 
 
-def implied_um(placed: list[View], xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]) -> tuple[float, ...]:
+def implied_deviation_um(
+    placed: list[View], xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]
+) -> tuple[float, ...]:
     """RMS deviation per axis that pixel covariances imply where the views' poses are exact."""
     pixels = np.stack([view.project(xyz) for view in placed])
     cov = triangulate(placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
     return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
 
 
-def measure(name: str, frames: int) -> list[Result]:
+def measure_sensor(name: str, frames: int) -> list[ReconstructionResult]:
     """All states of one sensor."""
     size, angle_deg, distance_mm = SENSORS[name]
     layout = build_layout(load_design("tac3d"))
     reference = parse_layout(layout_to_json(layout))
-    views = cameras(size, angle_deg, distance_mm)
-    extractor = ViewExtractor(reference, rig_of(views))
+    views = make_cameras(size, angle_deg, distance_mm)
+    extractor = ViewExtractor(reference, make_rig(views))
     reconstructor = Reconstructor(
-        reference, extractor.rig, extractor.extract(render(scene(layout, views, None, 1000), size=size).image)
+        reference,
+        extractor.rig,
+        extractor.extract(render(make_scene(layout, views, None, 1000), size=size).image),
     )
     placed = [
         View(
@@ -156,14 +160,21 @@ def measure(name: str, frames: int) -> list[Result]:
     for state, contact in STATES.items():
         surface = None if contact is None else solve(LAYER, *contact).surface()
         results.append(
-            _state(
-                name, state, scene(layout, views, surface, 0), size, frames, extractor, reconstructor, placed
+            _measure_state(
+                name,
+                state,
+                make_scene(layout, views, surface, 0),
+                size,
+                frames,
+                extractor,
+                reconstructor,
+                placed,
             )
         )
     return results
 
 
-def _state(
+def _measure_state(
     name: str,
     state: str,
     shown: Scene,
@@ -172,7 +183,7 @@ def _state(
     extractor: ViewExtractor,
     reconstructor: Reconstructor,
     placed: list[View],
-) -> Result:
+) -> ReconstructionResult:
     errors, cov, stated, moved, virtual, tilts, times = [], [], [], [], [], [], []
     flat = np.column_stack([reconstructor.layout.xy_mm, np.zeros(len(reconstructor.layout.xy_mm))])
     for seed in range(frames):
@@ -186,20 +197,20 @@ def _state(
         errors.append(shape.xyz_mm - true)
         cov.append(shape.cov_mm2)
         known = np.isfinite(shape.xyz_mm[:, 0])
-        stated.append(implied_um(placed, true, np.stack([m.cov_px2 for m in markers]), known))
+        stated.append(implied_deviation_um(placed, true, np.stack([m.cov_px2 for m in markers]), known))
         moved.append(shape.displacement_mm - (true - flat))
         virtual.append((shape.virtual_xyz_mm - shot.truth.virtual_xyz_mm).reshape(-1, 3))
         tilts.append(_angles_deg(shape.normals, reconstructor, shown))
     error, covs = np.concatenate(errors), np.concatenate(cov)
     seen = np.isfinite(error[:, 0])
-    image = implied_um(
+    image = implied_deviation_um(
         placed, true, np.stack([_image_bound(shown, v, size) for v in shown.camera]), seen[: len(true)]
     )  # type: ignore[union-attr]
     found = rms_um(error)
     stated_um = tuple(float(v) for v in np.sqrt(np.mean(np.square(stated), axis=0)))
     squares = np.einsum("ni,nij,nj->n", error[seen], np.linalg.inv(covs[seen]), error[seen]) / 3
     extract_ms, reconstruct_ms = 1e3 * np.median(times, axis=0)
-    return Result(
+    return ReconstructionResult(
         sensor=name,
         state=state,
         frames=frames,
@@ -207,8 +218,8 @@ def _state(
         error_um=found,
         stated_um=stated_um,
         image_um=image,
-        ratio_stated=ratio(found, stated_um),
-        ratio_image=ratio(found, image),
+        ratio_stated=bound_ratio(found, stated_um),
+        ratio_image=bound_ratio(found, image),
         normalised=float(np.sqrt(squares.mean())),
         displacement_um=rms_um(np.concatenate(moved)),
         virtual_um=rms_um(np.concatenate(virtual)),
@@ -239,12 +250,12 @@ def rms_um(error_mm: Array) -> tuple[float, ...]:
     return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(error_mm**2, axis=0)))
 
 
-def ratio(error_um: tuple[float, ...], bound_um: tuple[float, ...]) -> float:
+def bound_ratio(error_um: tuple[float, ...], bound_um: tuple[float, ...]) -> float:
     """RMS over the three axes, each in units of its bound."""
     return float(np.sqrt(np.mean(np.square(error_um) / np.square(bound_um))))
 
 
-def table(results: list[Result]) -> Table:
+def results_table(results: list[ReconstructionResult]) -> Table:
     shown = Table(box=SIMPLE_HEAD, title=results[0].sensor)
     for heading in (
         "state", "reported", "error um", "stated um", "image um", "err/stated", "err/image", "err/cov",
@@ -275,10 +286,10 @@ def main() -> None:
     frames = QUICK_FRAMES if options.quick else FRAMES
     console, results = Console(width=190), []
     for name in SENSORS:
-        found = measure(name, frames)
-        console.print(table(found))
+        found = measure_sensor(name, frames)
+        console.print(results_table(found))
         results += found
-    console.print(sentence())
+    console.print(conditions_text())
     if options.json:
         write_json(options.json, {"results": [asdict(result) for result in results]})
 

@@ -31,8 +31,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
-from benchmarks.support.scanlines import Error, Window, error
+from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.support.scanlines import ImageWindow, RenderError, measure_render_error
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.scene import Dent, Pinhole, Scene, composed, render, standard_layout, standard_scene
 
@@ -53,7 +53,7 @@ class Speed:
     cpu_ms: float
 
 
-def scenes(grid: int = 256) -> dict[str, Scene]:
+def make_scenes(grid: int = 256) -> dict[str, Scene]:
     """The pictures that are judged, by name; the flat one is the standard scene with 10 layers."""
     layout = standard_layout(layers=10)
     flat = standard_scene(layout)
@@ -87,7 +87,7 @@ def scenes(grid: int = 256) -> dict[str, Scene]:
     }
 
 
-def steep(flat: Scene) -> Scene:
+def steep_scene(flat: Scene) -> Scene:
     """A dent seen from the side: half a percent of the pattern turns away."""
     camera = Pinhole.looking(
         SIZE, distance_mm=36, field_of_view_deg=42, tilt_deg=50, roll_deg=TURN_DEG, back=True
@@ -95,7 +95,7 @@ def steep(flat: Scene) -> Scene:
     return replace(flat, camera=camera, surface=composed(Dent(1.2, 2.0, (0.3, 0.4))))
 
 
-def speed(name: str, scene: Scene, repeats: int) -> Speed:
+def measure_speed(name: str, scene: Scene, repeats: int) -> Speed:
     """With the blur and noise of the standard scene; the first picture, which loads code, does not count."""
     render(scene, size=SIZE)
     wall, cpu = [], []
@@ -107,7 +107,7 @@ def speed(name: str, scene: Scene, repeats: int) -> Speed:
     return Speed(name, float(np.median(wall)), float(np.percentile(wall, 95)), float(np.median(cpu)))
 
 
-def tables(errors: Sequence[Error], speeds: Sequence[Speed]) -> list[Table]:
+def result_tables(errors: Sequence[RenderError], speeds: Sequence[Speed]) -> list[Table]:
     judged = Table(box=SIMPLE_HEAD, title="the renderer's own error")
     for heading in ("scene", "blur px", "grey RMS", "largest", "edge RMS px", "largest", "gridlines"):
         judged.add_column(heading, justify="left" if heading == "scene" else "right")
@@ -137,23 +137,24 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="also write the results here")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    window = Window(260, 180, 120, 120) if options.quick else Window(220, 140, 200, 200)
-    judged = scenes()
+    window = ImageWindow(260, 180, 120, 120) if options.quick else ImageWindow(220, 140, 200, 200)
+    judged = make_scenes()
     # The two views' first one lies in the left half.
     windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in judged}
     errors = [
-        error(name, scene, blur_px, windows[name], SIZE)
+        measure_render_error(name, scene, blur_px, windows[name], SIZE)
         for name, scene in judged.items()
         for blur_px in (1.0, 0.0)
     ]
-    timed = {**judged, "steep, parts hidden": steep(judged["flat"])}
+    timed = {**judged, "steep, parts hidden": steep_scene(judged["flat"])}
     speeds = [
-        speed(name, scene, QUICK_REPEATS if options.quick else REPEATS) for name, scene in timed.items()
+        measure_speed(name, scene, QUICK_REPEATS if options.quick else REPEATS)
+        for name, scene in timed.items()
     ]
     console = Console(width=100)
-    for table in tables(errors, speeds):
+    for table in result_tables(errors, speeds):
         console.print(table)
-    console.print(sentence())
+    console.print(conditions_text())
     if options.json:
         write_json(
             options.json,

@@ -22,7 +22,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.machine import conditions_text, write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 CLI = "from cmpdesign.cli import main; main()"
@@ -55,7 +55,7 @@ print(json.dumps({"markers": len(layout.marker_xy_mm), "seconds": seconds, "peak
 
 
 @dataclass(frozen=True)
-class Process:
+class ProcessTime:
     """Wall-clock seconds of one command over several runs."""
 
     command: str
@@ -64,7 +64,7 @@ class Process:
 
 
 @dataclass(frozen=True)
-class Largest:
+class LargestBuild:
     """Building 200 layers: the fastest run, and the process's peak memory."""
 
     pattern: str
@@ -73,31 +73,31 @@ class Largest:
     peak_mb: float
 
 
-def python(code: str, arguments: Sequence[str], folder: Path) -> str:
+def run_python(code: str, arguments: Sequence[str], folder: Path) -> str:
     """Run code in a process of its own; its output."""
     start = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
     command = [sys.executable, "-c", start + code, *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
-def process(command: str, runs: int, folder: Path) -> Process:
+def measure_process(command: str, runs: int, folder: Path) -> ProcessTime:
     """Time a command; the first run, which reads the files from disk, is not counted."""
     arguments = COMMANDS[command]
     seconds = []
     for _ in range(runs + 1):
         start = time.perf_counter()
-        python("pass" if arguments is None else CLI, arguments or [], folder)
+        run_python("pass" if arguments is None else CLI, arguments or [], folder)
         seconds.append(time.perf_counter() - start)
-    return Process(command, float(np.median(seconds[1:])), min(seconds[1:]))
+    return ProcessTime(command, float(np.median(seconds[1:])), min(seconds[1:]))
 
 
-def largest(pattern: str, runs: int, folder: Path) -> Largest:
-    results = [json.loads(python(LARGEST, [pattern], folder)) for _ in range(runs)]
+def measure_largest(pattern: str, runs: int, folder: Path) -> LargestBuild:
+    results = [json.loads(run_python(LARGEST, [pattern], folder)) for _ in range(runs)]
     best = min(results, key=lambda result: float(result["seconds"]))
-    return Largest(pattern, best["markers"], best["seconds"], best["peak_mb"])
+    return LargestBuild(pattern, best["markers"], best["seconds"], best["peak_mb"])
 
 
-def process_table(results: Sequence[Process]) -> Table:
+def process_table(results: Sequence[ProcessTime]) -> Table:
     table = Table(title="Whole processes", box=SIMPLE_HEAD, title_justify="left")
     table.add_column("command", no_wrap=True)
     for name in ("median s", "best s"):
@@ -107,7 +107,7 @@ def process_table(results: Sequence[Process]) -> Table:
     return table
 
 
-def largest_table(results: Sequence[Largest]) -> Table:
+def largest_table(results: Sequence[LargestBuild]) -> Table:
     table = Table(title="200 layers in a fresh process", box=SIMPLE_HEAD, title_justify="left")
     table.add_column("pattern", no_wrap=True)
     for name in ("markers", "best s", "peak MB"):
@@ -125,15 +125,15 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     runs = 3 if options.quick else 15
     with tempfile.TemporaryDirectory() as folder:
-        processes = [process(command, runs, Path(folder)) for command in COMMANDS]
+        processes = [measure_process(command, runs, Path(folder)) for command in COMMANDS]
         layouts = [
-            largest(pattern, max(1, runs // 5), Path(folder))
+            measure_largest(pattern, max(1, runs // 5), Path(folder))
             for pattern in ("honeycomb", "round", "elliptical")
         ]
     console = Console()
     console.print(process_table(processes))
     console.print(largest_table(layouts))
-    console.print(sentence(), style="dim", soft_wrap=True)
+    console.print(conditions_text(), style="dim", soft_wrap=True)
     if options.json:
         write_json(
             options.json,

@@ -31,7 +31,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial import cKDTree
 
-from benchmarks.support.machine import sentence, write_json
+from benchmarks.support.machine import conditions_text, write_json
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
@@ -60,7 +60,7 @@ SIZE = (640, 480)
 
 
 @dataclass(frozen=True)
-class Block:
+class ErrorBlock:
     """Errors of some frames: RMS per axis in px and wrong ids, of the tracker and of optical flow."""
 
     first: int
@@ -74,13 +74,13 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Result:
+class TrackingResult:
     """A sequence: its blocks, how frames were started, and times of the tracker in ms."""
 
     name: str
     frames: int
     markers: int
-    blocks: list[Block]
+    blocks: list[ErrorBlock]
     warm_frames: int
     cold_frames: int
     not_tracked: int
@@ -91,7 +91,7 @@ class Result:
     largest_step_px: float
 
 
-def sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendered]:
+def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendered]:
     """Frame 0 is at rest; a black frame is rendered black."""
     rng = np.random.default_rng(1)
     offset = np.zeros(2)
@@ -136,7 +136,7 @@ def wrong_ids(xy_px: NDArray[np.float64], true_px: NDArray[np.float64]) -> int:
     return int((cKDTree(true_px).query(xy_px[found])[1] != found).sum())
 
 
-class Flow:
+class OpticalFlow:
     """Pyramidal Lucas-Kanade, from the true places in the first frame; a point that it loses stays where it was."""
 
     def __init__(self, image: NDArray[np.uint8], true_px: NDArray[np.float64]) -> None:
@@ -158,7 +158,7 @@ class Flow:
         return np.asarray(self._points[:, 0], dtype=np.float64)
 
 
-def tracked(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[tuple[Rendered, Tracked, float]]:
+def track_frames(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[tuple[Rendered, Tracked, float]]:
     """Every frame as tracked and its processor time in ms; frames come in a row, as from a camera, rendered before."""
     count = 0
     while part := list(islice(frames, AHEAD)):
@@ -171,14 +171,16 @@ def tracked(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[tuple[Rend
         yield from found
 
 
-def measure(name: str, layout: Layout, count: int, jerky: bool) -> Result:
+def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> TrackingResult:
     """Track the sequence both ways."""
     tracker = Tracker(parse_layout(layout_to_json(layout)))
     rows: list[tuple[float, float, int, int, float, int]] = []
     times: dict[str, list[float]] = {"warm": [], "cpu": [], "cold": []}
-    flow: Flow | None = None
+    flow: OpticalFlow | None = None
     flow_s, step_px, failed, before = 0.0, 0.0, 0, None
-    for index, (rendered, frame, cpu) in enumerate(tracked(tracker, sequence(layout, count, jerky))):
+    for index, (rendered, frame, cpu) in enumerate(
+        track_frames(tracker, render_sequence(layout, count, jerky))
+    ):
         true, image = rendered.truth.marker_xy_px, np.asarray(rendered.image, np.uint8)
         if frame.start is StartKind.WARM:
             times["warm"].append(frame.elapsed_ms)
@@ -186,7 +188,7 @@ def measure(name: str, layout: Layout, count: int, jerky: bool) -> Result:
         elif frame.start is StartKind.COLD and index:  # the very first one loads code
             times["cold"].append(frame.elapsed_ms)
         failed += frame.status is not FrameStatus.TRACKED
-        flow = flow or Flow(image, true)
+        flow = flow or OpticalFlow(image, true)
         start = time.perf_counter()
         flowed = flow.track(image)
         flow_s += time.perf_counter() - start
@@ -203,11 +205,11 @@ def measure(name: str, layout: Layout, count: int, jerky: bool) -> Result:
             step_px if before is None else max(step_px, float(np.linalg.norm(true - before, axis=1).max()))
         )
         before = true
-    return Result(
+    return TrackingResult(
         name=name,
         frames=count,
         markers=len(layout.marker_layer),
-        blocks=_blocks(np.array(rows)),
+        blocks=_error_blocks(np.array(rows)),
         warm_frames=len(times["warm"]),
         cold_frames=len(times["cold"]) + 1,
         not_tracked=failed,
@@ -224,12 +226,12 @@ def percentiles(values: Sequence[float]) -> dict[str, float]:
     return dict(zip(("p50", "p95", "p99"), (float(v) for v in found), strict=True))
 
 
-def _blocks(rows: NDArray[np.float64]) -> list[Block]:
+def _error_blocks(rows: NDArray[np.float64]) -> list[ErrorBlock]:
     blocks = []
     for part in np.array_split(np.arange(len(rows)), BLOCKS):
         seen = rows[part][np.isfinite(rows[part, 0])]
         blocks.append(
-            Block(
+            ErrorBlock(
                 first=int(part[0]),
                 last=int(part[-1]),
                 rms_px=float(np.sqrt(seen[:, 0].mean())),
@@ -243,13 +245,13 @@ def _blocks(rows: NDArray[np.float64]) -> list[Block]:
     return blocks
 
 
-def growth(rms_px: Sequence[float]) -> float:
+def error_growth(rms_px: Sequence[float]) -> float:
     """The second half's RMS over the first one's."""
     halves = np.split(np.square(rms_px), 2)
     return float(np.sqrt(halves[1].mean() / halves[0].mean()))
 
 
-def tables(result: Result) -> list[Table]:
+def result_tables(result: TrackingResult) -> list[Table]:
     errors = Table(box=SIMPLE_HEAD, title=f"{result.name}: {result.frames} frames, {result.markers} markers")
     for heading in ("frames", "RMS px", "worst px", "lost", "wrong ids", "flow: RMS px", "wrong ids"):
         errors.add_column(heading, justify="right")
@@ -258,7 +260,9 @@ def tables(result: Result) -> list[Table]:
         errors.add_row(
             f"{block.first}-{block.last}", *numbers, f"{block.flow_rms_px:.3f}", f"{block.flow_wrong}"
         )
-    ratios = [growth([getattr(block, name) for block in result.blocks]) for name in ("rms_px", "flow_rms_px")]
+    ratios = [
+        error_growth([getattr(block, name) for block in result.blocks]) for name in ("rms_px", "flow_rms_px")
+    ]
     errors.add_row("2nd half / 1st", f"{ratios[0]:.2f}", "", "", "", f"{ratios[1]:.2f}", "")
     speed = Table(
         box=SIMPLE_HEAD, caption=f"largest step between frames {result.largest_step_px:.1f} px (pitch 20 px)"
@@ -276,7 +280,7 @@ def tables(result: Result) -> list[Table]:
     return [errors, speed]
 
 
-def plot(results: Sequence[Result], path: Path) -> None:
+def plot_errors(results: Sequence[TrackingResult], path: Path) -> None:
     """Error over frames, both ways, on a logarithmic scale."""
     import matplotlib
 
@@ -310,19 +314,19 @@ def main() -> None:
     count = QUICK_FRAMES if options.quick else FRAMES
     layout = standard_layout(layers=10)
     results = [
-        measure("smooth", layout, count, False),
-        measure("with jumps and black frames", layout, count, True),
+        measure_sequence("smooth", layout, count, False),
+        measure_sequence("with jumps and black frames", layout, count, True),
     ]
     console = Console(width=100)
     for result in results:
-        for table in tables(result):
+        for table in result_tables(result):
             console.print(table)
-    console.print(sentence())
+    console.print(conditions_text())
     figures: dict[str, Any] = {"sequences": [asdict(result) for result in results]}
     if options.json:
         write_json(options.json, figures)
     if options.plot:
-        plot(results, options.plot)
+        plot_errors(results, options.plot)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ RUNS = 7
 
 
 @dataclass(frozen=True)
-class Score:
+class DemoScore:
     """Markers against the ground truth.
 
     Attributes:
@@ -46,7 +46,7 @@ class Score:
     max_px: float
 
 
-def score(markers: Markers, truth: Truth) -> Score:
+def score_markers(markers: Markers, truth: Truth) -> DemoScore:
     """Compare an extraction with the scene's truth."""
     from scipy.spatial import cKDTree
 
@@ -56,7 +56,7 @@ def score(markers: Markers, truth: Truth) -> Score:
     measured = status == 1
     error = markers.xy_px[measured] - truth.marker_xy_px[measured]
     seen = status[truth.visible]
-    return Score(
+    return DemoScore(
         visible=len(seen),
         measured=int((seen == 1).sum()),
         repaired=int((seen >= 2).sum()),
@@ -78,11 +78,11 @@ def main() -> int:
         if code:
             return int(code)
     console().print()
-    console().print(_table(), soft_wrap=False)
+    console().print(_measure_table(), soft_wrap=False)
     return 0
 
 
-def _table() -> Table:
+def _measure_table() -> Table:
     """The sample once more, warm: figures against the truth, and the median run's stages."""
     from cmpdesign.files.images import read_image
     from cmpdesign.scene import load_truth
@@ -92,10 +92,12 @@ def _table() -> Table:
     runs = [extractor.extract(image) for _ in range(RUNS)]
     markers = sorted(runs, key=lambda run: sum(run.timings_ms.values()))[RUNS // 2]
     height, width = image.shape[:2]
-    return _drawn(score(markers, load_truth(OUT / "truth.npz")), markers, f"{width} x {height} px")
+    return _make_table(
+        score_markers(markers, load_truth(OUT / "truth.npz")), markers, f"{width} x {height} px"
+    )
 
 
-def _drawn(figures: Score, markers: Markers, size: str) -> Table:
+def _make_table(figures: DemoScore, markers: Markers, size: str) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.input import prepare
+from extractor.image.input import convert_to_bgr
 from extractor.layout.reference import Reference
 from extractor.result import Markers, Status
 
@@ -35,10 +35,10 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     Returns:
         (H * s, W * s, 3) uint8 BGR, enlarged by a whole number s where the image is small.
     """
-    base = _base(image)
-    scale = _scale(base)
+    base = _bgr_picture(image)
+    scale = _enlargement(base)
     canvas = _enlarged(base, scale, 0.7)
-    points = _at(markers.xy_px, scale)
+    points = _picture_coordinates(markers.xy_px, scale)
     _draw_edges(canvas, reference, points)
     _draw_reference(canvas, reference, points)
     _draw_fiducials(canvas, reference, points)
@@ -46,23 +46,23 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     radius = float(np.clip(edge / 9, 1.5, 6.0))
     for status, color in STATUS_BGR.items():
         for x, y in points[markers.status == status]:
-            _dot(canvas, x, y, radius, color)
+            _draw_dot(canvas, x, y, radius, color)
     if edge >= ID_EDGE_PX:
         _draw_ids(canvas, points, edge)
-    _caption(canvas, _summary(markers))
+    _draw_caption(canvas, _summary(markers))
     return canvas
 
 
 def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> dict[str, Picture]:
     """One picture for every stage that was reached, in order."""
-    base = _base(image)
-    scale = _scale(base)
+    base = _bgr_picture(image)
+    scale = _enlargement(base)
     results = markers.stages
     pictures: dict[str, Picture] = {}
     if results.get("target") is not None:
         pictures["target"] = _draw_target(base, scale, results["target"])
     if results.get("segment") is not None:
-        pictures["segment"] = _fit(INK_BGR[results["segment"].label], base, scale)
+        pictures["segment"] = _resized_to_picture(INK_BGR[results["segment"].label], base, scale)
     if "seeds" in results:
         pictures["seeds"] = _draw_seeds(base, scale, results["segment"], results["seeds"])
     if "grow" in results:
@@ -77,15 +77,15 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
     return pictures
 
 
-def _base(image: NDArray[Any]) -> Picture:
-    bgr = prepare(image)
+def _bgr_picture(image: NDArray[Any]) -> Picture:
+    bgr = convert_to_bgr(image)
     if bgr is not None:
         return bgr
     gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
     return cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[return-value]
 
 
-def _scale(base: Picture) -> int:
+def _enlargement(base: Picture) -> int:
     return max(1, round(SHORT_SIDE_PX / int(min(base.shape[:2]))))
 
 
@@ -96,17 +96,17 @@ def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
     return cv2.convertScaleAbs(big, alpha=brightness)  # type: ignore[return-value]
 
 
-def _fit(picture: Picture, base: Picture, scale: int) -> Picture:
+def _resized_to_picture(picture: Picture, base: Picture, scale: int) -> Picture:
     size = (base.shape[1] * scale, base.shape[0] * scale)
     return cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)  # type: ignore[return-value]
 
 
-def _at(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+def _picture_coordinates(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
     """Image coordinates (pixel centres at integers) in the enlarged picture."""
     return (xy_px + 0.5) * scale - 0.5
 
 
-def _dot(
+def _draw_dot(
     canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1
 ) -> None:
     one = 1 << SHIFT
@@ -115,7 +115,7 @@ def _dot(
     )
 
 
-def _lines(
+def _draw_lines(
     canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1
 ) -> None:
     """Closed polygons or open two-point lines: (N, K, 2)."""
@@ -125,15 +125,15 @@ def _lines(
 
 def _draw_edges(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
     lines = points[reference.edges]
-    _lines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], (190, 190, 190))
+    _draw_lines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], (190, 190, 190))
 
 
 def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
     corners = points[reference.cell_corners[reference.reference_cell]]
     if np.isfinite(corners).all():
-        _lines(canvas, corners[None], WHITE_BGR, 2)
+        _draw_lines(canvas, corners[None], WHITE_BGR, 2)
         x, y = points[reference.reference_marker]
-        _dot(canvas, x, y, 9.0, WHITE_BGR, 2)
+        _draw_dot(canvas, x, y, 9.0, WHITE_BGR, 2)
 
 
 def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
@@ -148,7 +148,7 @@ def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.fl
     ring = 0.5 * reference.fiducial_diameter_mm * np.stack([np.cos(around), np.sin(around)], axis=1)
     rings = (reference.fiducials_mm[:, None] + ring).reshape(-1, 1, 2)
     drawn = np.asarray(cv2.perspectiveTransform(rings, carry), np.float64).reshape(-1, len(ring), 2)
-    _lines(canvas, drawn, WHITE_BGR, 2)
+    _draw_lines(canvas, drawn, WHITE_BGR, 2)
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
@@ -176,7 +176,7 @@ def _summary(markers: Markers) -> str:
     return f"{found} of {len(markers.status)} markers, seen from the {side}"
 
 
-def _caption(canvas: Picture, text: str) -> None:
+def _draw_caption(canvas: Picture, text: str) -> None:
     height, width = canvas.shape[:2]
     size = float(np.clip(width / 1600, 0.4, 1.0))
     cv2.rectangle(canvas, (0, height - round(34 * size)), (width, height), (25, 25, 25), -1)
@@ -186,21 +186,23 @@ def _caption(canvas: Picture, text: str) -> None:
 
 def _draw_target(base: Picture, scale: int, target: Any) -> Picture:
     height, width = base.shape[:2]
-    big = cv2.resize(target.mask, None, fx=target.shrink, fy=target.shrink, interpolation=cv2.INTER_NEAREST)
+    big = cv2.resize(target.mask, None, fx=target.tile_px, fy=target.tile_px, interpolation=cv2.INTER_NEAREST)
     mask = cv2.resize(big, (width, height), interpolation=cv2.INTER_NEAREST)
     return _enlarged(np.where(mask[..., None] > 0, base, base // 4).astype(np.uint8), scale, 1.0)
 
 
 def _draw_seeds(base: Picture, scale: int, segmentation: Any, seeds: Any) -> Picture:
-    canvas = _fit((INK_BGR[segmentation.label] // 2).astype(np.uint8), base, scale)
-    for x, y in _at(seeds.xy.astype(np.float64), _work_scale(base, scale, segmentation.label)):
-        _dot(canvas, x, y, 4.0, WHITE_BGR)
+    canvas = _resized_to_picture((INK_BGR[segmentation.label] // 2).astype(np.uint8), base, scale)
+    for x, y in _picture_coordinates(
+        seeds.xy.astype(np.float64), _work_scale(base, scale, segmentation.label)
+    ):
+        _draw_dot(canvas, x, y, 4.0, WHITE_BGR)
     return canvas
 
 
 def _draw_regions(base: Picture, scale: int, regions: Any) -> Picture:
     ink = np.concatenate([[0], regions.ink]).astype(np.uint8)
-    return _fit(INK_BGR[ink[regions.owner]], base, scale)
+    return _resized_to_picture(INK_BGR[ink[regions.region_map]], base, scale)
 
 
 def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
@@ -208,7 +210,7 @@ def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
     return float(scale * round(base.shape[1] / work.shape[1]))
 
 
-def _bright(ink: int) -> tuple[int, int, int]:
+def _bright_color(ink: int) -> tuple[int, int, int]:
     blue, green, red = (min(int(level) + 60, 255) for level in INK_BGR[ink])
     return blue, green, red
 
@@ -216,34 +218,39 @@ def _bright(ink: int) -> tuple[int, int, int]:
 def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
     canvas = _enlarged(base, scale, 0.4)
     for ink in (1, 2, 3):
-        _lines(canvas, _at(triangles.corner_px[triangles.ink == ink], scale), _bright(ink), 2)
+        _draw_lines(
+            canvas,
+            _picture_coordinates(triangles.corner_px[triangles.ink == ink], scale),
+            _bright_color(ink),
+            2,
+        )
     return canvas
 
 
 def _draw_mesh(base: Picture, scale: int, cells: Any, mesh: Any) -> Picture:
     """Markers and black cells as triangles between three centers: those that turn clockwise are yellow."""
     canvas = _enlarged(base, scale, 0.4)
-    centers = _at(cells.center_px, scale)
+    centers = _picture_coordinates(cells.center_px, scale)
     for turn, color in ((-1, (150, 150, 150)), (1, (80, 255, 255))):
-        corners = centers[mesh.faces[mesh.turn == turn]]
+        corners = centers[mesh.faces[mesh.orientation == turn]]
         middle = corners.mean(axis=1, keepdims=True)
-        _lines(canvas, middle + 0.8 * (corners - middle), color)
+        _draw_lines(canvas, middle + 0.8 * (corners - middle), color)
     for ink in (1, 2, 3):
         for x, y in centers[cells.ink == ink]:
-            _dot(canvas, x, y, 4.0, _bright(ink))
+            _draw_dot(canvas, x, y, 4.0, _bright_color(ink))
     return canvas
 
 
 def _draw_spiral(base: Picture, scale: int, reference: Reference, xy_px: NDArray[np.float64]) -> Picture:
     """The order of the search: from the white cell's bottom corner around every layer, blue to red."""
     canvas = _enlarged(base, scale, 0.4)
-    points = _at(xy_px, scale)
+    points = _picture_coordinates(xy_px, scale)
     found = np.flatnonzero(np.isfinite(points[:, 0]))
     shades = cv2.applyColorMap(
         np.linspace(0, 255, max(len(found), 1)).astype(np.uint8)[:, None], cv2.COLORMAP_TURBO
     )
     for start, end, shade in zip(found[:-1], found[1:], shades[:, 0], strict=False):
         if end == start + 1:
-            _lines(canvas, points[[start, end]][None], tuple(int(c) for c in shade), 2)  # type: ignore[arg-type]
+            _draw_lines(canvas, points[[start, end]][None], tuple(int(c) for c in shade), 2)  # type: ignore[arg-type]
     _draw_reference(canvas, reference, points)
     return canvas

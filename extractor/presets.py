@@ -10,7 +10,7 @@ Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 
-class Steps(NamedTuple):
+class Schedule(NamedTuple):
     """What a preset does.
 
     Attributes:
@@ -31,22 +31,22 @@ class Steps(NamedTuple):
         in_dirt: no more steps around markers than these.
     """
 
-    profiles: tuple[int, int]
-    finest: float
-    sharp: float
+    max_profile_rows: tuple[int, int]
+    reduction_blur_px: float
+    sharp_blur_share: float
     reduced: float
-    effort: float
-    enough: float
+    max_synthesis_effort: float
+    converged_deviations: float
     near: float
-    few: float
+    max_moving_share: float
     patience: int
-    many: float
-    most: float
-    in_dirt: int
+    max_partial_share: float
+    max_partial_share_in_dirt: float
+    max_steps_in_dirt: int
 
 
-STEPS: dict[Preset, Steps] = {
-    "fast": Steps((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0, 1),
-    "balanced": Steps((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.3, 0.05, 1),
-    "accurate": Steps((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0, 9),
+SCHEDULES: dict[Preset, Schedule] = {
+    "fast": Schedule((2, 64), 0.5, 0.0875, np.inf, 0.0, 0.0, 0.0, 0.0, 1, 1.0, 1.0, 1),
+    "balanced": Schedule((6, 64), 0.5, 0.085, 2, 1.95, 5.0, 0.08, 0.0125, 1, 0.3, 0.05, 1),
+    "accurate": Schedule((8, 8), 1.2, 0.0, 1, 26.0, 0.7, 0.0, 0.0, 2, 1.0, 1.0, 9),
 }

@@ -23,10 +23,10 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = os.environ["RA
 import cv2
 from rich.console import Console
 
-from benchmarks.suites.comparison.measure import CASES, Result, measure
-from benchmarks.suites.comparison.report import markdown, scene_table
-from benchmarks.support.machine import sentence, write_json
-from benchmarks.support.published import publish
+from benchmarks.suites.comparison.measure import CASES, MethodResult, measure_case
+from benchmarks.suites.comparison.report import comparison_markdown, scene_table
+from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.support.published import write_published
 
 REPETITIONS, QUICK_REPETITIONS = 11, 3
 
@@ -46,16 +46,18 @@ def main(arguments: list[str] | None = None) -> int:
     repetitions = QUICK_REPETITIONS if options.quick else REPETITIONS
     terminal = Console()
     console = terminal if terminal.is_terminal else Console(width=150)  # a pipe has no width
-    results: list[Result] = []
+    results: list[MethodResult] = []
     for case in CASES:
-        results += measure(case, repetitions)
+        results += measure_case(case, repetitions)
         console.print(scene_table(case.name, results, f"{repetitions} repetitions"))
-    console.print(sentence(), style="dim", soft_wrap=True)
+    console.print(conditions_text(), style="dim", soft_wrap=True)
     found = {"repetitions": repetitions, "results": [asdict(result) for result in results]}
     if options.json:
         write_json(options.json, found)
     if options.publish:
-        for path in publish("comparison", found, {"comparison": markdown(results), "conditions": sentence()}):
+        for path in write_published(
+            "comparison", found, {"comparison": comparison_markdown(results), "conditions": conditions_text()}
+        ):
             console.print(f"wrote {path}")
     return 0
 

@@ -17,19 +17,27 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.suites.scoring.reading import Result, notable_lines, overlay, read, warm_up
-from benchmarks.suites.scoring.report import failures, one_line, plot, rows_of, summary, table, write_json
-from benchmarks.suites.stress.conditions import BY_NAME, KINDS, cases, matching
-from benchmarks.suites.stress.kinds import Case
+from benchmarks.suites.scoring.reading import CaseResult, draw_overlay, notable_lines, read_case, warm_up
+from benchmarks.suites.scoring.report import (
+    condition_rows,
+    failure_lines,
+    plot_conditions,
+    result_line,
+    results_table,
+    summary_text,
+    write_json,
+)
+from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases, matching_cases
+from benchmarks.suites.stress.kinds import StressCase
 
 RUNS, FEW_RUNS = 15, 5  # of an image, and of one of many alike; a median of five is off by 0.03
 
 
-def _job(job: tuple[Case, int]) -> Result:
-    return read(*job)[0]
+def _read_case(job: tuple[StressCase, int]) -> CaseResult:
+    return read_case(*job)[0]
 
 
-def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
+def read_cases(chosen: list[StressCase], processes: int, runs: int) -> Iterator[CaseResult]:
     """Results as they come, the large images first."""
     last = [case for case in chosen if BY_NAME[case.kind].group != "view"]
     first = [case for case in chosen if BY_NAME[case.kind].group == "view"]
@@ -39,12 +47,12 @@ def run(chosen: list[Case], processes: int, runs: int) -> Iterator[Result]:
         for case in [*first[::-1], *last]
     ]
     with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
-        yield from pool.imap_unordered(_job, jobs)
+        yield from pool.imap_unordered(_read_case, jobs)
 
 
-def with_progress(chosen: list[Case], processes: int, runs: int) -> list[Result]:
+def with_progress(chosen: list[StressCase], processes: int, runs: int) -> list[CaseResult]:
     results, started = [], time.perf_counter()
-    for result in run(chosen, processes, runs):
+    for result in read_cases(chosen, processes, runs):
         results.append(result)
         if sys.stderr.isatty() or len(results) % 200 == 0:
             text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
@@ -52,16 +60,16 @@ def with_progress(chosen: list[Case], processes: int, runs: int) -> list[Result]
     return results
 
 
-def one_by_one(chosen: list[Case], save: Path | None) -> list[Result]:
+def read_one_by_one(chosen: list[StressCase], save: Path | None) -> list[CaseResult]:
     """Read here, printing a line a case; write its image and overlay."""
     import cv2
 
     warm_up()
     results = []
     for case in chosen:
-        result, shot, markers = read(case, 1)
+        result, shot, markers = read_case(case, 1)
         results.append(result)
-        print(one_line(result))
+        print(result_line(result))
         for line in notable_lines(shot, markers):
             print(f"    {line}")
         if save is not None:
@@ -69,7 +77,7 @@ def one_by_one(chosen: list[Case], save: Path | None) -> list[Result]:
             stem = case.name.replace("/", "-").replace(" ", "_")
             cv2.imwrite(str(save / f"{stem}.png"), shot.image)
             if markers is not None:
-                cv2.imwrite(str(save / f"{stem}.overlay.png"), overlay(shot, case, markers))
+                cv2.imwrite(str(save / f"{stem}.overlay.png"), draw_overlay(shot, case, markers))
     return results
 
 
@@ -90,22 +98,22 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
 
     started = time.perf_counter()
-    if asked.only:
-        chosen = matching(asked.only)
+    if asked.with_one_pass:
+        chosen = matching_cases(asked.with_one_pass)
         if not chosen:
-            parser.error(f"no case is named {asked.only!r}; the kinds are {', '.join(BY_NAME)}")
-        results = one_by_one(chosen, asked.save)
+            parser.error(f"no case is named {asked.with_one_pass!r}; the kinds are {', '.join(BY_NAME)}")
+        results = read_one_by_one(chosen, asked.save)
     else:
-        results = with_progress(cases(quick=asked.quick), asked.processes, 1 if asked.quick else RUNS)
-    rows = rows_of(results, KINDS)
+        results = with_progress(make_cases(quick=asked.quick), asked.processes, 1 if asked.quick else RUNS)
+    rows = condition_rows(results, KINDS)
     if asked.table or not asked.quick:
-        print(table(rows))
-    print("\n".join(failures(rows)))
-    print(f"{summary(rows)}; {len(BY_NAME)} kinds; {time.perf_counter() - started:.0f} s")
+        print(results_table(rows))
+    print("\n".join(failure_lines(rows)))
+    print(f"{summary_text(rows)}; {len(BY_NAME)} kinds; {time.perf_counter() - started:.0f} s")
     if asked.json:
         write_json(rows, asked.json)
     if asked.plot:
-        plot(rows, KINDS, asked.plot)
+        plot_conditions(rows, KINDS, asked.plot)
     return int(any(row.wrong or row.raised for row in rows))
 
 

@@ -14,18 +14,18 @@ from typing import Any
 from cmpdesign.files.atomic import write_file
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-MEASURED = ROOT / "docs" / "measured"
-BEGIN, END = "<!-- {}: written by make bench -->", "<!-- end of {} -->"
+MEASURED_FOLDER = ROOT / "docs" / "measured"
+BLOCK_BEGIN, BLOCK_END = "<!-- {}: written by make bench -->", "<!-- end of {} -->"
 
 
-def filled(text: str, blocks: Mapping[str, str]) -> str:
+def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
     """The page with those of the blocks that it has written anew.
 
     Raises:
         ValueError: a block begins and does not end, or begins twice.
     """
     for name, lines in blocks.items():
-        begin, end = BEGIN.format(name), END.format(name)
+        begin, end = BLOCK_BEGIN.format(name), BLOCK_END.format(name)
         if begin not in text:
             continue
         before, _, rest = text.partition(begin)
@@ -38,33 +38,33 @@ def filled(text: str, blocks: Mapping[str, str]) -> str:
     return text
 
 
-def pages_with(blocks: Mapping[str, str]) -> dict[Path, str]:
+def updated_pages(blocks: Mapping[str, str]) -> dict[Path, str]:
     """README and the pages of docs/ that have one of the blocks: path -> text with them written anew."""
     found = {}
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         text = path.read_text(encoding="utf-8")
-        if any(BEGIN.format(name) in text for name in blocks):
-            found[path] = filled(text, blocks)
+        if any(BLOCK_BEGIN.format(name) in text for name in blocks):
+            found[path] = replace_blocks(text, blocks)
     return found
 
 
-def publish(name: str, results: Mapping[str, Any], blocks: Mapping[str, str]) -> list[Path]:
+def write_published(name: str, results: Mapping[str, Any], blocks: Mapping[str, str]) -> list[Path]:
     """Write docs/measured/NAME.json and the blocks of all pages; what was written."""
-    from benchmarks.support.machine import conditions
+    from benchmarks.support.machine import machine_conditions
 
-    path = MEASURED / f"{name}.json"
-    text = json.dumps({"conditions": conditions(), **results}, indent=1, sort_keys=True) + "\n"
+    path = MEASURED_FOLDER / f"{name}.json"
+    text = json.dumps({"conditions": machine_conditions(), **results}, indent=1, sort_keys=True) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, text.encode())
     written = [path]
-    for page, new in pages_with(blocks).items():
+    for page, new in updated_pages(blocks).items():
         if new != page.read_text(encoding="utf-8"):
             write_file(page, new.encode())
             written.append(page)
     return written
 
 
-def measured(name: str) -> dict[str, Any]:
+def read_measured(name: str) -> dict[str, Any]:
     """What docs/measured/NAME.json holds."""
-    found = json.loads((MEASURED / f"{name}.json").read_text(encoding="utf-8"))
+    found = json.loads((MEASURED_FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return dict(found)

@@ -1,6 +1,7 @@
 """A picture of a scene by another way than the renderer's, and how far the renderer is from it.
 
-Every cell's sides are followed by ``POINTS`` points each and cut with ``LINES`` scan lines a pixel; what a pixel's box
+Every cell's sides are followed by ``POINTS_PER_SIDE`` points each and cut with ``LINES_PER_PX`` scan lines a pixel;
+what a pixel's box
 and the blur make of each crossing is a closed form. No splines, no contour integrals, no adaptive chords: nothing of
 ``cmpdesign.scene.coverage`` and ``paths``. It is poor where a side runs along the scan lines.
 """
@@ -17,18 +18,18 @@ from scipy.special import ndtr
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import Optics, Scene, Sensor, render
-from cmpdesign.scene.drawing.view import View, views
+from cmpdesign.scene.drawing.view import SceneView, scene_views
 
 Points = NDArray[np.float64]
 
-POINTS, LINES = 512, 48
+POINTS_PER_SIDE, LINES_PER_PX = 512, 48
 REACH_SIGMA = 7.0
 BAND_ROWS = 30  # at once, for the memory's sake
 MIDDLE_PX = 3.5  # around a gridline's middle: the pixels that tell where it lies
 
 
 @dataclass(frozen=True)
-class Window:
+class ImageWindow:
     """A part of the image: first column and row, width and height."""
 
     x: int
@@ -38,7 +39,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Error:
+class RenderError:
     """Of one picture in a window: 8-bit steps and px."""
 
     name: str
@@ -50,33 +51,35 @@ class Error:
     edges: int
 
 
-def reference(scene: Scene, view: View, window: Window) -> Points:
+def reference_image(scene: Scene, view: SceneView, window: ImageWindow) -> Points:
     """(height, width, 3) BGR in 8-bit steps: the inks over black, seen by every pixel of the window."""
     bands = []
     for top in range(0, window.height, BAND_ROWS):
         rows = min(BAND_ROWS, window.height - top)
-        bands.append(_band(scene, view, Window(window.x, window.y + top, window.width, rows)))
+        bands.append(_reference_band(scene, view, ImageWindow(window.x, window.y + top, window.width, rows)))
     return np.concatenate(bands)
 
 
-def _band(scene: Scene, view: View, window: Window) -> Points:
+def _reference_band(scene: Scene, view: SceneView, window: ImageWindow) -> Points:
     layout, blur = scene.layout, scene.blur_px
     cells = np.flatnonzero(layout.cell_color != BLACK)
     black = np.asarray(scene.ink(BLACK)[::-1], dtype=np.float64)
     over = np.array([np.subtract(scene.ink(int(c))[::-1], black) for c in layout.cell_color[cells]])
-    start, end, owner = _sides(layout, cells, view, window, blur)
+    start, end, owner = _cell_sides(layout, cells, view, window, blur)
     reach = REACH_SIGMA * blur + 1
     first = window.y - reach
-    count = int(np.ceil((window.height - 1 + 2 * reach) * LINES))
-    crossing, line = _crossings(start, end, first, count)
-    x = start[crossing, 0] + (first + (line + 0.5) / LINES - start[crossing, 1]) * (
+    count = int(np.ceil((window.height - 1 + 2 * reach) * LINES_PER_PX))
+    crossing, line = _scan_line_crossings(start, end, first, count)
+    x = start[crossing, 0] + (first + (line + 0.5) / LINES_PER_PX - start[crossing, 1]) * (
         (end - start)[crossing, 0] / (end - start)[crossing, 1]
     )
-    sign = np.sign((end - start)[crossing, 1]) * -_orientation(layout, view)
+    sign = np.sign((end - start)[crossing, 1]) * -_layout_orientation(layout, view)
     columns = window.x + np.arange(window.width)
-    seen = _step(columns[None, :] - x[:, None], blur)
+    seen = _blurred_step(columns[None, :] - x[:, None], blur)
     rows = window.y + np.arange(window.height)
-    down = _box(rows[:, None] - (first + (np.arange(count) + 0.5) / LINES), blur) / LINES
+    down = (
+        _blurred_box(rows[:, None] - (first + (np.arange(count) + 0.5) / LINES_PER_PX), blur) / LINES_PER_PX
+    )
     image = np.empty((window.height, window.width, 3))
     for channel in range(3):
         weight = sign * over[owner[crossing], channel]
@@ -85,12 +88,12 @@ def _band(scene: Scene, view: View, window: Window) -> Points:
     return image
 
 
-def _sides(
-    layout: Layout, cells: NDArray[np.int64], view: View, window: Window, blur_px: float
+def _cell_sides(
+    layout: Layout, cells: NDArray[np.int64], view: SceneView, window: ImageWindow, blur_px: float
 ) -> tuple[Points, Points, NDArray[np.int64]]:
     """Straight pieces (N, 2) px of the sides of cells that the window can see; ``owner`` counts ``cells``."""
     corners = layout.marker_xy_mm[layout.cell_corners[cells]]
-    share = (np.arange(POINTS) / POINTS)[:, None]
+    share = (np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE)[:, None]
     ahead = np.roll(corners, -1, axis=1)
     around = corners[:, :, None] * (1 - share) + ahead[:, :, None] * share
     px = view.image_from_layout(around.reshape(-1, 2)).reshape(len(cells), -1, 2)
@@ -106,26 +109,26 @@ def _sides(
     )
 
 
-def _crossings(
+def _scan_line_crossings(
     start: Points, end: Points, first: float, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Which piece crosses which scan line; the lines lie at first + (i + 0.5) / LINES."""
     low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
-    begin = np.clip(np.ceil((low - first) * LINES - 0.5), 0, count).astype(np.int64)
-    stop = np.clip(np.ceil((high - first) * LINES - 0.5), 0, count).astype(np.int64)
+    begin = np.clip(np.ceil((low - first) * LINES_PER_PX - 0.5), 0, count).astype(np.int64)
+    stop = np.clip(np.ceil((high - first) * LINES_PER_PX - 0.5), 0, count).astype(np.int64)
     number = stop - begin
     piece = np.repeat(np.arange(len(start)), number)
     return piece, np.arange(len(piece)) - np.repeat(np.cumsum(number) - number, number) + begin[piece]
 
 
-def _orientation(layout: Layout, view: View) -> float:
+def _layout_orientation(layout: Layout, view: SceneView) -> float:
     """1 where the cells' corners, counter-clockwise in the layout, go from x to y in the image."""
     a, b, c = view.image_from_layout(layout.marker_xy_mm[layout.cell_corners[0, :3]])
     return float(np.sign((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]))
 
 
-def _step(distance: Points, blur_px: float) -> Points:
-    """What a pixel ``distance`` inside a half plane shows: the integral of ``_box``."""
+def _blurred_step(distance: Points, blur_px: float) -> Points:
+    """What a pixel ``distance`` inside a half plane shows: the integral of ``_blurred_box``."""
     if blur_px == 0:
         return np.clip(distance + 0.5, 0, 1)
 
@@ -135,23 +138,25 @@ def _step(distance: Points, blur_px: float) -> Points:
     return blur_px * (ramp((distance + 0.5) / blur_px) - ramp((distance - 0.5) / blur_px))
 
 
-def _box(distance: Points, blur_px: float) -> Points:
+def _blurred_box(distance: Points, blur_px: float) -> Points:
     """A pixel's box, blurred by a Gaussian, along one axis."""
     if blur_px == 0:
         return (np.abs(distance) < 0.5).astype(np.float64)
     return np.asarray(ndtr((distance + 0.5) / blur_px) - ndtr((distance - 0.5) / blur_px))
 
 
-def error(name: str, scene: Scene, blur_px: float, window: Window, size: tuple[int, int]) -> Error:
+def measure_render_error(
+    name: str, scene: Scene, blur_px: float, window: ImageWindow, size: tuple[int, int]
+) -> RenderError:
     """The renderer's own error in a window; of several views the first one's."""
     clean = replace(scene, sensor=Sensor(bits=16), optics=Optics(blur_px))
-    view = views(clean, size)[0]
+    view = scene_views(clean, size)[0]
     rows, columns = slice(window.y, window.y + window.height), slice(window.x, window.x + window.width)
     drawn = render(clean, size=size).image[rows, columns] / 257
-    true = reference(clean, view, window)
-    shifts = edge_shifts(drawn - true, true, clean.layout, view, window)
+    true = reference_image(clean, view, window)
+    shifts = fit_edge_offsets(drawn - true, true, clean.layout, view, window)
     difference = drawn - true
-    return Error(
+    return RenderError(
         name,
         blur_px,
         grey_rms=float(np.sqrt((difference**2).mean())),
@@ -162,7 +167,9 @@ def error(name: str, scene: Scene, blur_px: float, window: Window, size: tuple[i
     )
 
 
-def edge_shifts(difference: Points, true: Points, layout: Layout, view: View, window: Window) -> Points:
+def fit_edge_offsets(
+    difference: Points, true: Points, layout: Layout, view: SceneView, window: ImageWindow
+) -> Points:
     """How far, in px along its normal, every gridline inside the window has moved, by least squares."""
     ends = layout.marker_xy_mm[layout.edges]
     middle = view.image_from_layout(ends.mean(axis=1)) - (window.x, window.y)

@@ -22,7 +22,7 @@ from extractor.presets import Preset
 
 WRONG_SHARE = 0.3  # of the shortest edge: farther from the truth a marker is wrong, not imprecise
 TILT_DEG = 35.0
-KINDS = ("flat", "tilt", "bulge", "twist")
+SCENE_KINDS = ("flat", "tilt", "bulge", "twist")
 SURFACES = {
     "bulge": composed(Press(radius_mm=5.0, depth_mm=1.2)),
     "twist": composed(Twist(radius_mm=5.0, angle_deg=18.0)),
@@ -31,7 +31,7 @@ BOARD_LAYERS = 10  # 21 x 21 squares
 
 
 @dataclass(frozen=True)
-class Case:
+class SceneCase:
     """A pattern and how it is seen. Lengths in px of the image, noise in grey levels."""
 
     pattern: str = "honeycomb"
@@ -61,23 +61,23 @@ class Case:
 
         ``plain``: in black and white only; else with the square pattern's red cell.
         """
-        return replace(self.scene(checkerboard(plain)), background=Plain(INKS["white"]))
+        return replace(self.scene(checkerboard_layout(plain)), background=Plain(INKS["white"]))
 
 
 standard_layout = cache(built_layout)
 
 
 @cache
-def reference_of(pattern: str, layers: int) -> Reference:
+def cached_reference(pattern: str, layers: int) -> Reference:
     return parse_layout(layout_to_json(standard_layout(pattern, layers)))
 
 
-def extractor_of(case: Case, preset: Preset = "balanced") -> Extractor:
-    return Extractor(reference_of(case.pattern, case.layers), preset)
+def cached_extractor(case: SceneCase, preset: Preset = "balanced") -> Extractor:
+    return Extractor(cached_reference(case.pattern, case.layers), preset)
 
 
 @cache
-def checkerboard(plain: bool) -> Layout:
+def checkerboard_layout(plain: bool) -> Layout:
     """The square pattern without its black border, as detectors of checkerboards need white around the board."""
     layout = build_layout(load_design("square", {"layers": str(BOARD_LAYERS), "pitch_mm": "1.0"}))
     color = layout.cell_color.copy()
@@ -106,7 +106,7 @@ def shortest_edges(layout: Layout, true_px: NDArray[np.float64]) -> NDArray[np.f
     return shortest
 
 
-def bounds_px(scene: Scene, *choices: NDArray[np.bool_]) -> list[float]:
+def bound_rms_px(scene: Scene, *choices: NDArray[np.bool_]) -> list[float]:
     """The exact Cramer-Rao bound of choices of markers: RMS per axis, px; those that are not visible are left out."""
     trace = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
     return [float(np.sqrt(np.nanmean(trace[chosen]) / 2)) for chosen in choices]

@@ -20,7 +20,7 @@ from cmpdesign.cli.commands import (
     track,
     verify,
 )
-from cmpdesign.cli.terminal import BAD_INPUT, is_expected, print_error
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, is_expected, print_error
 
 
 class OneLineErrors(TyperGroup):
@@ -33,7 +33,7 @@ class OneLineErrors(TyperGroup):
             if not is_expected(error):
                 raise
             print_error(error)
-            raise typer.Exit(BAD_INPUT) from None
+            raise typer.Exit(EXIT_BAD_INPUT) from None
 
 
 app = typer.Typer(

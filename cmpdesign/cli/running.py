@@ -12,26 +12,26 @@ from cmpdesign.cli.terminal import console, print_warning
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
-    from cmpdesign.tracking.run import Run
+    from cmpdesign.tracking.run import TrackingRun
 
-NOT_TRACKED = 1
-INTERRUPTED = 130
+EXIT_NOT_TRACKED = 1
+EXIT_INTERRUPTED = 130
 
 
-def go(run: Run, doing: str) -> None:
+def run_with_progress(run: TrackingRun, doing: str) -> None:
     """Run to the end, or to the first Ctrl-C, with a bar that says what is being done.
 
     Raises:
         OutputError: something could not be written.
     """
-    from cmpdesign.tracking.run import stopped_by_hand
+    from cmpdesign.tracking.run import stop_on_signal
 
-    with stopped_by_hand(run.stop), _progress(run, doing) as watch:
+    with stop_on_signal(run.stop), _progress_bar(run, doing) as watch:
         run.go(watch)
 
 
 @contextmanager
-def _progress(run: Run, doing: str) -> Iterator[Callable[[Any], None]]:
+def _progress_bar(run: TrackingRun, doing: str) -> Iterator[Callable[[Any], None]]:
     """A bar on stderr where a terminal shows it: frames, and how many are tracked."""
     terminal = console(stderr=True)
     if not terminal.is_terminal:
@@ -54,17 +54,17 @@ def _progress(run: Run, doing: str) -> Iterator[Callable[[Any], None]]:
         )
 
 
-def finish(run: Run) -> None:
+def exit_with_status(run: TrackingRun) -> None:
     """The exit code: 0 done, 1 ended early or nothing tracked, 130 stopped by hand."""
     if run.stop.asked:
         by_design = run.source.name.startswith("camera")  # there is no other way to end a camera's run
-        raise typer.Exit(0 if by_design else INTERRUPTED)
+        raise typer.Exit(0 if by_design else EXIT_INTERRUPTED)
     if not run.tally.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:
         print_warning(f"{run.ended_early}; these are written")
     if run.ended_early or not run.tally.tracked:
-        raise typer.Exit(NOT_TRACKED)
+        raise typer.Exit(EXIT_NOT_TRACKED)
 
 
 def require_positive(option: str, value: float | None) -> None:

@@ -10,7 +10,7 @@ from cmpdesign.errors import CmpDesignError
 if TYPE_CHECKING:
     from rich.console import Console
 
-BAD_INPUT = 2
+EXIT_BAD_INPUT = 2
 
 
 def console(stderr: bool = False) -> Console:
@@ -28,19 +28,19 @@ def is_expected(error: BaseException) -> bool:
     return isinstance(error, CmpDesignError)
 
 
-def one_line(error: BaseException) -> str:
+def error_on_one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
 def print_error(error: BaseException) -> None:
-    print(f"error: {one_line(error)}", file=sys.stderr)
+    print(f"error: {error_on_one_line(error)}", file=sys.stderr)
 
 
 def print_warning(text: str) -> None:
     print(f"warning: {text}", file=sys.stderr)
 
 
-def printable(path: object) -> str:
+def printable_path(path: object) -> str:
     """A path as it may go to a terminal."""
     text = str(path)
     return text if text.isprintable() else ascii(text)

@@ -8,16 +8,21 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.friction.increment import TOLERANCE, TOLERANCE_RUBBING, Problem, State
+from cmpdesign.contact.friction.increment import (
+    GAP_TOLERANCE,
+    GAP_TOLERANCE_FRICTION,
+    ContactProblem,
+    ContactState,
+)
 from cmpdesign.contact.result import Contact
-from cmpdesign.contact.strain import LINEAR_UP_TO, largest_strain
+from cmpdesign.contact.strain import LINEAR_STRAIN_LIMIT, largest_strain
 
 Array = NDArray[np.float64]
 # Cells over which a contact's pressure should at least be spread.
-FEWEST_CELLS = 12
+MIN_CONTACT_CELLS = 12
 
 
-def report(problem: Problem, state: State, young_mpa: float) -> Contact:
+def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: float) -> Contact:
     """The contact of a state: forces, strain and warnings worked out, fields turned to (ny, nx, 3).
 
     The state is that of a layer of 1 MPa; tractions and forces are scaled to ``young_mpa``.
@@ -34,9 +39,9 @@ def report(problem: Problem, state: State, young_mpa: float) -> Contact:
         in_contact=state.in_contact,
         slipping=state.in_contact & (friction >= (1 - 1e-9) * state.limit_mpa),
         force_n=young_mpa * traction.sum(axis=(1, 2)) * grid.step_mm**2,
-        moment_nmm=young_mpa * _moment(problem, state),
+        moment_nmm=young_mpa * _contact_moment(problem, state),
         largest_strain=strain,
-        warnings=tuple(_warnings(problem, state, strain)),
+        warnings=tuple(_contact_warnings(problem, state, strain)),
         iterations=state.iterations,
         residual_mm=state.residual_mm,
         thickness_mm=problem.elastomer.thickness_mm,
@@ -46,7 +51,7 @@ def report(problem: Problem, state: State, young_mpa: float) -> Contact:
     return found
 
 
-def _moment(problem: Problem, state: State) -> Array:
+def _contact_moment(problem: ContactProblem, state: ContactState) -> Array:
     """About the object's centre where it now is, arms in the plane of the flat surface."""
     (x0, y0), (dx, dy) = problem.indenter.centre_mm, state.motion.shear_mm
     x, y = problem.grid.xy_mm + state.displacement_mm[:2] - np.reshape((x0 + dx, y0 + dy), (2, 1, 1))
@@ -54,7 +59,7 @@ def _moment(problem: Problem, state: State) -> Array:
     return np.array([np.sum(y * fz), -np.sum(x * fz), np.sum(x * fy - y * fx)])
 
 
-def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
+def _contact_warnings(problem: ContactProblem, state: ContactState, strain: float) -> Iterator[str]:
     step, thickness = problem.grid.step_mm, problem.elastomer.thickness_mm
     if not state.in_contact.any():
         if state.motion.press_mm > 0:
@@ -63,12 +68,13 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
                 "or press more"
             )
         return
-    if strain > LINEAR_UP_TO:
+    if strain > LINEAR_STRAIN_LIMIT:
         yield (
-            f"the largest strain is {strain:.2g}, above {LINEAR_UP_TO:g}: linear theory is an estimate there, not a "
+            f"the largest strain is {strain:.2g}, above {LINEAR_STRAIN_LIMIT:g}: linear theory is an "
+            f"estimate there, not a "
             "prediction; press or shear less, or take a thicker layer or an object with rounder edges"
         )
-    if folds(state.displacement_mm, step):
+    if has_fold(state.displacement_mm, step):
         yield "the surface folds over itself: its map has a negative Jacobian; press or shear less"
     yield from _grid_warnings(problem, state.in_contact)
     if step > thickness:
@@ -76,7 +82,7 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
             f"the grid's step of {step:.3g} mm is above the thickness of {thickness:.3g} mm; "
             f"take grid above {math.ceil(max(problem.grid.shape) * step / thickness)} or a smaller size_mm"
         )
-    allowed = (TOLERANCE_RUBBING if problem.friction > 0 else TOLERANCE) * state.motion.press_mm
+    allowed = (GAP_TOLERANCE_FRICTION if problem.friction > 0 else GAP_TOLERANCE) * state.motion.press_mm
     if state.residual_mm > allowed:
         yield (
             f"the solver left a gap of {state.residual_mm:.2g} mm, above {allowed:.2g} mm; "
@@ -84,16 +90,16 @@ def _warnings(problem: Problem, state: State, strain: float) -> Iterator[str]:
         )
 
 
-def _grid_warnings(problem: Problem, touched: NDArray[np.bool_]) -> Iterator[str]:
+def _grid_warnings(problem: ContactProblem, touched: NDArray[np.bool_]) -> Iterator[str]:
     step, radius = problem.grid.step_mm, problem.indenter.smallest_radius_mm
     if radius < step:
         yield (
             f"the object's sharpest edge has a radius of {radius:.3g} mm, below the grid's step of {step:.3g} mm: "
             "stress and strain there depend on the grid; take a finer grid or a rounder edge"
         )
-    if np.count_nonzero(touched) < FEWEST_CELLS:
+    if np.count_nonzero(touched) < MIN_CONTACT_CELLS:
         yield (
-            f"the contact covers {np.count_nonzero(touched)} cells of {step:.3g} mm, below {FEWEST_CELLS}; "
+            f"the contact covers {np.count_nonzero(touched)} cells of {step:.3g} mm, below {MIN_CONTACT_CELLS}; "
             "take a finer grid or a smaller size_mm"
         )
     at_edge = np.count_nonzero(touched) - np.count_nonzero(touched[1:-1, 1:-1])
@@ -104,7 +110,7 @@ def _grid_warnings(problem: Problem, touched: NDArray[np.bool_]) -> Iterator[str
         )
 
 
-def folds(displacement_mm: Array, step_mm: float) -> bool:
+def has_fold(displacement_mm: Array, step_mm: float) -> bool:
     """Whether the map of the plane by (3, ny, nx) has a Jacobian that is not positive somewhere."""
     ux_y, ux_x = np.gradient(displacement_mm[0], step_mm)
     uy_y, uy_x = np.gradient(displacement_mm[1], step_mm)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.grid import Grid
+from cmpdesign.contact.grid import ContactGrid
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,7 +48,7 @@ class Contact:
 
     def surface(self) -> Relief:
         """The surface as a smooth function of the layout frame."""
-        return relief(self)
+        return make_relief(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Relief:
     Beyond the solved area the displacement falls smoothly to zero within one thickness (at least 6 cells).
     """
 
-    grid: Grid
+    grid: ContactGrid
     coefficients: Array = field(repr=False)
 
     def __call__(self, xy_mm: Array, /) -> Array:
@@ -77,7 +77,7 @@ class Relief:
         return found
 
 
-def relief(contact: Contact) -> Relief:
+def make_relief(contact: Contact) -> Relief:
     """The spline, with the displacement led to zero around the solved area."""
     from scipy.ndimage import spline_filter
 
@@ -91,7 +91,7 @@ def relief(contact: Contact) -> Relief:
     fade = np.outer(*(np.concatenate([ramp, np.ones(n), ramp[::-1]]) for n in (ny, nx)))
     padded = [np.pad(contact.displacement_mm[..., axis], rim, mode="edge") * fade for axis in range(3)]
     around = step * (np.arange(rim) + 1)
-    grid = Grid(
+    grid = ContactGrid(
         np.concatenate([contact.x_mm[0] - around[::-1], contact.x_mm, contact.x_mm[-1] + around]),
         np.concatenate([contact.y_mm[0] - around[::-1], contact.y_mm, contact.y_mm[-1] + around]),
         step,

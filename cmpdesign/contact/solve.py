@@ -9,11 +9,16 @@ import numpy as np
 
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import ContactError, require
-from cmpdesign.contact.friction.increment import Problem, State, advance, untouched
-from cmpdesign.contact.grid import make_grid
+from cmpdesign.contact.friction.increment import (
+    ContactProblem,
+    ContactState,
+    solve_increment,
+    state_without_contact,
+)
+from cmpdesign.contact.grid import make_contact_grid
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects.objects import Indenter
-from cmpdesign.contact.report import report
+from cmpdesign.contact.report import contact_from_state
 from cmpdesign.contact.result import Contact
 
 
@@ -47,9 +52,9 @@ def solve(
     if motion.tangential:
         tangential = 1 if friction == 0 or motion.press_mm == 0 else steps
         way += [motion.part(1.0, i / tangential) for i in range(1, tangential + 1)]
-    problem = _problem(elastomer, indenter, friction, size_mm, grid)
-    *_, last = _states(problem, way)
-    return report(problem, last, elastomer.young_mpa)
+    problem = _make_problem(elastomer, indenter, friction, size_mm, grid)
+    *_, last = _solve_states(problem, way)
+    return contact_from_state(problem, last, elastomer.young_mpa)
 
 
 def solve_path(
@@ -65,22 +70,22 @@ def solve_path(
 
     Any way will do: deeper and back, to and fro; what sticks and slips depends on it. Other arguments as in ``solve``.
     """
-    problem = _problem(elastomer, indenter, friction, size_mm, grid)
-    for state in _states(problem, motions):
-        yield report(problem, state, elastomer.young_mpa)
+    problem = _make_problem(elastomer, indenter, friction, size_mm, grid)
+    for state in _solve_states(problem, motions):
+        yield contact_from_state(problem, state, elastomer.young_mpa)
 
 
-def _problem(
+def _make_problem(
     elastomer: Elastomer, indenter: Indenter, friction: float, size_mm: tuple[float, float], grid: int
-) -> Problem:
+) -> ContactProblem:
     require(friction >= 0, "friction", friction, "0 or more (math.inf sticks)")
     # Young's modulus scales forces and nothing else: solved with 1 MPa, whatever it is.
     layer = replace(elastomer, young_mpa=1.0)
-    return Problem(layer, indenter, float(friction), make_grid(size_mm, grid))
+    return ContactProblem(layer, indenter, float(friction), make_contact_grid(size_mm, grid))
 
 
-def _states(problem: Problem, motions: Sequence[Motion]) -> Iterator[State]:
-    state = untouched(Motion(0.0), problem.grid.shape)
+def _solve_states(problem: ContactProblem, motions: Sequence[Motion]) -> Iterator[ContactState]:
+    state = state_without_contact(Motion(0.0), problem.grid.shape)
     if not np.isfinite(problem.indenter.height_mm(*problem.grid.xy_mm)).any():
         x, y = problem.indenter.centre_mm
         raise ContactError(
@@ -88,5 +93,5 @@ def _states(problem: Problem, motions: Sequence[Motion]) -> Iterator[State]:
             "move centre_mm, or take a larger size_mm or grid"
         )
     for motion in motions:
-        state = advance(problem, state, motion)
+        state = solve_increment(problem, state, motion)
         yield state

@@ -9,7 +9,7 @@ from cmpdesign.contact.elastomer import Elastomer
 
 Array = NDArray[np.float64]
 # There, a neo-Hookean layer's displacement is off the linear one's by 5 %, and a compressed block is 12 % stiffer.
-LINEAR_UP_TO = 0.1
+LINEAR_STRAIN_LIMIT = 0.1
 
 
 def surface_strain(

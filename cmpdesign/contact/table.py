@@ -20,7 +20,7 @@ from cmpdesign.contact.result import Contact
 from cmpdesign.contact.solve import solve
 from cmpdesign.units import parse_angle_deg, parse_length_mm
 
-KINDS: Mapping[str, type[Indenter]] = {
+INDENTER_KINDS: Mapping[str, type[Indenter]] = {
     kind.__name__.lower(): kind for kind in (Ball, Cube, Cylinder, Punch, Rib, Ring, Wedge, HeightMap)
 }
 SignedLength = Annotated[float, BeforeValidator(parse_length_mm)]
@@ -51,7 +51,7 @@ class ContactSetup:
         return solve(**given)
 
 
-class _Table(BaseModel):
+class _ContactTable(BaseModel):
     model_config = STRICT
 
     elastomer: dict[str, Any]
@@ -77,45 +77,46 @@ def contact_from(table: Mapping[str, Any], folder: str | Path = ".") -> ContactS
     Raises:
         ContactError: an unknown, missing or impossible value, on one line with its place in the table.
     """
-    read = _checked(_Table, table, "contact")
+    read = _validate_table(_ContactTable, table, "contact")
     given = {name: getattr(read, name) for name in ("friction", "size_mm", "grid", "steps")}
     return ContactSetup(
-        elastomer=_made(Elastomer, read.elastomer, "contact.elastomer"),
-        indenter=_indenter(read.indenter, Path(folder)),
-        motion=_made(Motion, read.motion, "contact.motion"),
+        elastomer=_make_from_table(Elastomer, read.elastomer, "contact.elastomer"),
+        indenter=_make_indenter(read.indenter, Path(folder)),
+        motion=_make_from_table(Motion, read.motion, "contact.motion"),
         **given,
     )
 
 
-def _indenter(table: Mapping[str, Any], folder: Path) -> Indenter:
+def _make_indenter(table: Mapping[str, Any], folder: Path) -> Indenter:
     rest = dict(table)
     kind = rest.pop("kind", None)
-    if kind not in KINDS:
+    if kind not in INDENTER_KINDS:
         raise ContactError(
-            f"contact.indenter.kind is {kind!r}{_nearest(str(kind), KINDS)}; there are {', '.join(KINDS)}"
+            f"contact.indenter.kind is {kind!r}{_suggest_name(str(kind), INDENTER_KINDS)}; there are "
+            f"{', '.join(INDENTER_KINDS)}"
         )
-    if KINDS[kind] is not HeightMap:
-        made: Indenter = _made(KINDS[kind], rest, "contact.indenter")
+    if INDENTER_KINDS[kind] is not HeightMap:
+        made: Indenter = _make_from_table(INDENTER_KINDS[kind], rest, "contact.indenter")
         return made
     placed = ("centre_mm", "turn_deg")
     fields = {"path": (str, ...), "depth_mm": (SignedLength | None, None)}
-    fields |= {name: _field(HeightMap, name) for name in ("pixel_mm", *placed)}
-    read = _checked(create_model("HeightMap", __config__=STRICT, **fields), rest, "contact.indenter")  # type: ignore[call-overload]
+    fields |= {name: _pydantic_field(HeightMap, name) for name in ("pixel_mm", *placed)}
+    read = _validate_table(create_model("HeightMap", __config__=STRICT, **fields), rest, "contact.indenter")  # type: ignore[call-overload]
     values = read.model_dump()
     return HeightMap.read(folder / values.pop("path"), **values)
 
 
-def _made(kind: type[Any], table: Mapping[str, Any], where: str) -> Any:
+def _make_from_table(kind: type[Any], table: Mapping[str, Any], where: str) -> Any:
     """A dataclass of numbers from a table with its fields' names."""
-    fields = {field.name: _field(kind, field.name) for field in dataclasses.fields(kind)}
-    read = _checked(create_model(kind.__name__, __config__=STRICT, **fields), table, where)  # type: ignore[call-overload]
+    fields = {field.name: _pydantic_field(kind, field.name) for field in dataclasses.fields(kind)}
+    read = _validate_table(create_model(kind.__name__, __config__=STRICT, **fields), table, where)  # type: ignore[call-overload]
     try:
         return kind(**read.model_dump())
     except ContactError as error:
         raise ContactError(f"{where}: {error}") from None
 
 
-def _field(kind: type[Any], name: str) -> tuple[Any, Any]:
+def _pydantic_field(kind: type[Any], name: str) -> tuple[Any, Any]:
     """A field's type and default for pydantic: the unit is in its name, and it is a pair if its default is."""
     found = {field.name: field for field in dataclasses.fields(kind)}[name]
     number: Any = {"mm": SignedLength, "deg": SignedAngle}.get(name.rpartition("_")[2], float)
@@ -124,23 +125,23 @@ def _field(kind: type[Any], name: str) -> tuple[Any, Any]:
     return number, ... if found.default is dataclasses.MISSING else found.default
 
 
-def _checked(model: type[Model], table: Mapping[str, Any], where: str) -> Model:
+def _validate_table(model: type[Model], table: Mapping[str, Any], where: str) -> Model:
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        raise ContactError("; ".join(_told(item, model, where) for item in error.errors())) from None
+        raise ContactError("; ".join(_error_message(item, model, where) for item in error.errors())) from None
 
 
-def _told(item: Any, model: type[BaseModel], where: str) -> str:
+def _error_message(item: Any, model: type[BaseModel], where: str) -> str:
     path = ".".join([where, *(str(part) for part in item["loc"])])
     if item["type"] == "extra_forbidden":
-        return f"{path} is unknown{_nearest(str(item['loc'][-1]), model.model_fields)}"
+        return f"{path} is unknown{_suggest_name(str(item['loc'][-1]), model.model_fields)}"
     if item["type"] == "missing":
         return f"{path} is missing"
     message = item["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return f"{path} = {item['input']!r}: {message}"
 
 
-def _nearest(word: str, known: Mapping[str, object]) -> str:
+def _suggest_name(word: str, known: Mapping[str, object]) -> str:
     found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     return f" (did you mean {found[0]}?)" if found else ""

@@ -17,7 +17,7 @@ from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.quantities import Angle, Color, Length, LengthOrZero
 from cmpdesign.design.sheet_options import SheetOptions
 from cmpdesign.errors import DesignError
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS
 
 # An ellipse flatter than 4 : 1 brings cells with corners below 15 degrees, which neither print nor read.
@@ -26,14 +26,14 @@ SMALLEST_PITCH_MM = 0.001
 MAX_VIRTUAL_PER_EDGE = 100
 
 
-class _Strict(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __init__(self, **data: Any) -> None:
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise DesignError(_one_line(error, type(self))) from None
+            raise DesignError(_validation_message(error, type(self))) from None
 
 
 class Palette(BaseModel):
@@ -48,7 +48,7 @@ class Palette(BaseModel):
     white: Color = "#f5f5f5"
 
 
-class Design(_Strict):
+class Design(_StrictModel):
     """Validated parameters of a pattern. Lengths in mm; texts such as "60mil" are converted.
 
     A size is given in one of these ways; every other combination is refused with the way to mend it:
@@ -129,9 +129,10 @@ class Design(_Strict):
     @field_validator("pattern")
     @classmethod
     def _known_pattern(cls, value: str) -> str:
-        if value not in patterns():
+        if value not in registered_patterns():
             raise ValueError(
-                f"{value!r} is no pattern{_nearest(value, patterns())}; there are {', '.join(patterns())}"
+                f"{value!r} is no pattern{_suggest_name(value, registered_patterns())}; there are "
+                f"{', '.join(registered_patterns())}"
             )
         return value
 
@@ -190,9 +191,11 @@ class Design(_Strict):
 
     def _option_problem(self) -> str:
         for option in ("aspect", "spacing"):
-            if getattr(self, option) is None or option in patterns()[self.pattern].options:
+            if getattr(self, option) is None or option in registered_patterns()[self.pattern].options:
                 continue
-            takers = ", ".join(name for name, pattern in patterns().items() if option in pattern.options)
+            takers = ", ".join(
+                name for name, pattern in registered_patterns().items() if option in pattern.options
+            )
             return f"{option} is an option of the pattern {takers}, not of {self.pattern}; leave it out"
         return ""
 
@@ -224,7 +227,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = 
     except tomllib.TOMLDecodeError as error:
         raise DesignError(f"{path}: is no valid TOML: {error}") from None
     try:
-        _override(data, overrides or {})
+        _update_overrides(data, overrides or {})
         data.setdefault("name", path.stem)
         return Design(**data)
     except DesignError as error:
@@ -236,7 +239,7 @@ def design_schema() -> dict[str, Any]:
     schema = Design.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "cmpdesign design"
-    schema["properties"]["pattern"]["enum"] = list(patterns())
+    schema["properties"]["pattern"]["enum"] = list(registered_patterns())
     return schema
 
 
@@ -245,21 +248,23 @@ def design_schema_text() -> str:
     return json.dumps(design_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def _override(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
+def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
     for dotted, text in overrides.items():
         *tables, field = dotted.split(".")
         target = data
         for table in tables:
             target = target.setdefault(table, {})
             if not isinstance(target, dict):
-                raise DesignError(f"{dotted}: {table} is not a table{_nearest(dotted, Design.model_fields)}")
+                raise DesignError(
+                    f"{dotted}: {table} is not a table{_suggest_name(dotted, Design.model_fields)}"
+                )
         if text == "none":
             target.pop(field, None)
         else:
-            target[field] = _plain(text)
+            target[field] = _parse_toml_value(text)
 
 
-def _plain(text: str) -> object:
+def _parse_toml_value(text: str) -> object:
     """The TOML value that the text spells, or the text itself: "3" is a number, "60mil" is a text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
@@ -267,20 +272,20 @@ def _plain(text: str) -> object:
         return text
 
 
-def _nearest(word: str, known: Mapping[str, object]) -> str:
+def _suggest_name(word: str, known: Mapping[str, object]) -> str:
     found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     return f" (did you mean {found[0]}?)" if found else ""
 
 
-def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
+def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
     """What pydantic found, in one line that names each field, its value and what it takes."""
     parts = []
     for item in error.errors():
         path = ".".join(str(part) for part in item["loc"])
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
-            fields = _fields_at(model, item["loc"][:-1])
-            parts.append(f"{path} is unknown{_nearest(str(item['loc'][-1]), fields)}")
+            fields = _table_fields(model, item["loc"][:-1])
+            parts.append(f"{path} is unknown{_suggest_name(str(item['loc'][-1]), fields)}")
         elif item["type"] == "missing":
             parts.append(f"{path} is missing")
         elif item["type"] == "value_error":
@@ -294,7 +299,7 @@ def _one_line(error: ValidationError, model: type[BaseModel]) -> str:
     return "; ".join(parts)
 
 
-def _fields_at(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
+def _table_fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
     """The fields of the table that a path of names leads to."""
     for name in path:
         table = model.model_fields[str(name)].annotation

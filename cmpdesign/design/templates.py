@@ -37,7 +37,7 @@ def find_design(name_or_path: str | Path) -> Path:
     Raises:
         DesignError: neither a template nor a file.
     """
-    return _found(name_or_path, templates())
+    return _find_template(name_or_path, templates())
 
 
 def find_scene(name_or_path: str | Path) -> Path:
@@ -46,10 +46,10 @@ def find_scene(name_or_path: str | Path) -> Path:
     Raises:
         DesignError: neither a template nor a file.
     """
-    return _found(name_or_path, scene_templates())
+    return _find_template(name_or_path, scene_templates())
 
 
-def _found(name_or_path: str | Path, known: dict[str, Path]) -> Path:
+def _find_template(name_or_path: str | Path, known: dict[str, Path]) -> Path:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     path = Path(name_or_path)

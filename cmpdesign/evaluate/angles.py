@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate.runner import Options, Trial
+from cmpdesign.evaluate.runner import RunOptions, Trial
 
-RULE = (
+RECOGNITION_RULE = (
     "A cell is recognised when the n corners that stand out most of its contour are convex, each by at least 1.5 px, "
     "and its outline fits them; a corner gets the number of the corner at rest in whose direction it lies."
 )
-SIDES = (3, 4, 6)
-EDGES_PX = (20, 50, 100, 400)
+CELL_SIDES = (3, 4, 6)
+EDGE_LENGTHS_PX = (20, 50, 100, 400)
 STEP_DEG = 1.0
 
 
@@ -26,22 +26,24 @@ def turn_limit_deg(sides: int) -> float:
     return 180 / sides
 
 
-def trials(options: Options) -> list[Trial]:
+def trials(options: RunOptions) -> list[Trial]:
     """One for every shape of cell, size and deformation; nothing in them is random."""
     return [
         Trial(f"{kind}-{sides}-{edge_px}", {"kind": kind, "sides": sides, "edge_px": edge_px})
         for kind in ("shape", "turn")
-        for sides in SIDES
-        for edge_px in EDGES_PX
+        for sides in CELL_SIDES
+        for edge_px in EDGE_LENGTHS_PX
     ]
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The first angle, in steps of ``STEP_DEG``, at which a cell is lost."""
-    from cmpdesign.evaluate.measures.cells import number_holds, shape_holds
+    from cmpdesign.evaluate.measures.cells import is_numbering_kept, is_shape_recognised
 
     holds, limit = (
-        (shape_holds, change_limit_deg) if values["kind"] == "shape" else (number_holds, turn_limit_deg)
+        (is_shape_recognised, change_limit_deg)
+        if values["kind"] == "shape"
+        else (is_numbering_kept, turn_limit_deg)
     )
     sides, edge_px = int(values["sides"]), float(values["edge_px"])
     return {"first_lost_deg": first_lost_deg(lambda angle: holds(sides, edge_px, angle), limit(sides) + 30)}
@@ -69,4 +71,4 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
         )
         name = "shape_change_deg" if trial.values["kind"] == "shape" else "rotation_deg"
         cell[name]["measured"][f"{trial.values['edge_px']}px"] = result["first_lost_deg"]
-    return {"rule": RULE, "cells": document}
+    return {"rule": RECOGNITION_RULE, "cells": document}

@@ -7,8 +7,8 @@ EDGE_ERROR_CHANGE_PERCENT = {"press": -61.2, "press_shear": -58.1}
 # Section IV-B and Fig. 11b: how much larger its response is.
 RESPONSE_CHANGE_PERCENT = {"shear_x": 17.6, "shear_y": 12.2}
 # Table I: successes in ten trials a mode.
-TRIALS = 10
-SUCCESSES = {
+ARTICLE_TRIALS = 10
+ARTICLE_SUCCESSES = {
     "twist": {"square": 7, "multicolor": 9, "multicolor_repair": 10},
     "shear_x": {"square": 6, "multicolor": 7, "multicolor_repair": 10},
     "shear_y": {"square": 6, "multicolor": 10, "multicolor_repair": 10},

@@ -11,17 +11,17 @@ from typing import Any
 from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.precision import MEASURES
-from cmpdesign.evaluate.report.statistics import number, spread
-from cmpdesign.evaluate.runner import Options, Trial, rng
-from cmpdesign.evaluate.simulated.contacts import Load, surface
-from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_of
+from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
+from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface
+from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_for_design
 from cmpdesign.evaluate.simulated.sensor import parse_sensor
 
-REACH_MM = 4.0
+CONTACT_REACH_MM = 4.0
 
 
 @dataclass(frozen=True)
-class Entry:
+class DesignEntry:
     """A design that takes part, and what it is called."""
 
     name: str
@@ -33,7 +33,7 @@ class Entry:
         return json.dumps(self.design.model_dump(mode="json"), sort_keys=True)
 
 
-def entries(designs: Mapping[str, Design]) -> list[Entry]:
+def design_entries(designs: Mapping[str, Design]) -> list[DesignEntry]:
     """The designs in the order given.
 
     Raises:
@@ -41,10 +41,10 @@ def entries(designs: Mapping[str, Design]) -> list[Entry]:
     """
     if not designs:
         raise CmpDesignError("no design to compare; give templates or TOML files")
-    return [Entry(name, design) for name, design in designs.items()]
+    return [DesignEntry(name, design) for name, design in designs.items()]
 
 
-def trials(options: Options, designs: Sequence[Entry]) -> list[Trial]:
+def trials(options: RunOptions, designs: Sequence[DesignEntry]) -> list[Trial]:
     """As many places and lights for every contact of the sensor's set and every design.
 
     Raises:
@@ -64,40 +64,40 @@ def trials(options: Options, designs: Sequence[Entry]) -> list[Trial]:
 @lru_cache(maxsize=8)
 def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
     sensor, design = parse_sensor(sensor_text), Design.model_validate_json(design_text)
-    return instrument_of(sensor, design, preset)  # type: ignore[arg-type]
+    return instrument_for_design(sensor, design, preset)  # type: ignore[arg-type]
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One design under one contact; the place and the light are the same for all designs."""
-    from cmpdesign.evaluate.measures.shapes import compared
-    from cmpdesign.evaluate.simulated.conditions import draw
+    from cmpdesign.evaluate.measures.shapes import measure_reconstruction
+    from cmpdesign.evaluate.simulated.conditions import sample_conditions
 
     one = _instrument(values["sensor"], values["design"], values["preset"])
     load = one.sensor.table.load[values["load"]]
-    random = rng(values["seed"], f"load-{values['load']}", values["index"])
-    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
+    random = trial_rng(values["seed"], f"load-{values['load']}", values["index"])
+    x, y = random.uniform(-CONTACT_REACH_MM, CONTACT_REACH_MM, 2)
     shear = (float(load.shear_mm[0]), float(load.shear_mm[1]))
-    pressed = surface(
-        values["sensor"], Load(load.object, load.press_mm, shear, load.twist_deg), (float(x), float(y))
+    pressed = place_surface(
+        values["sensor"], ContactLoad(load.object, load.press_mm, shear, load.twist_deg), (float(x), float(y))
     )
     clean = one.sensor.table.conditions.model_copy(update={"specks": (0, 0)})
-    drawn = draw(clean, random, one.half_window_mm)
-    return compared(one, pressed, drawn, int(random.integers(2**31)))
+    drawn = sample_conditions(clean, random, one.half_window_mm)
+    return measure_reconstruction(one, pressed, drawn, int(random.integers(2**31)))
 
 
 def figures(
-    trials: Sequence[Trial], results: Sequence[Mapping[str, Any]], designs: Sequence[Entry]
+    trials: Sequence[Trial], results: Sequence[Mapping[str, Any]], designs: Sequence[DesignEntry]
 ) -> dict[str, Any]:
     """report.json's members: one entry a design."""
     document = {}
     for entry in designs:
         found = [r for t, r in zip(trials, results, strict=True) if t.values["design"] == entry.text]
-        errors = {name: spread([one[name] for one in found]).to_json() for name in MEASURES}
-        document[entry.name] = {**costs(entry.design), **errors}
+        errors = {name: sample_statistics([one[name] for one in found]).to_json() for name in MEASURES}
+        document[entry.name] = {**design_costs(entry.design), **errors}
     return {"designs": document}
 
 
-def costs(design: Design) -> dict[str, Any]:
+def design_costs(design: Design) -> dict[str, Any]:
     """What a design is and what it takes to make: density, smallest feature, laser time."""
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.measures import cell_areas_mm2, cell_widths_mm
@@ -106,10 +106,10 @@ def costs(design: Design) -> dict[str, Any]:
     markers = int(layout.present.sum())
     return {
         "pattern": layout.pattern,
-        "pitch_mm": number(float(layout.parameters["pitch_mm"])),
+        "pitch_mm": round_for_json(float(layout.parameters["pitch_mm"])),
         "markers": markers,
-        "markers_per_cm2": number(100 * markers / float(cell_areas_mm2(layout).sum()), 3),
-        "smallest_feature_mm": number(float(cell_widths_mm(layout).min())),
+        "markers_per_cm2": round_for_json(100 * markers / float(cell_areas_mm2(layout).sum()), 3),
+        "smallest_feature_mm": round_for_json(float(cell_widths_mm(layout).min())),
         "laser_time_s": laser_time_s(design),
     }
 
@@ -118,12 +118,12 @@ def laser_time_s(design: Design) -> float | None:
     """How long the design's laser job takes; None where it cannot be made, with its own machine and material."""
     from cmpdesign.errors import DesignError
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.products.laser.figures import timing
+    from cmpdesign.products.laser.figures import pass_timing
     from cmpdesign.products.laser.job import make_job
-    from cmpdesign.products.laser.setup import complete
+    from cmpdesign.products.laser.setup import complete_setup
 
     try:
-        job = make_job(design.name, build_layout(design), complete(design.laser))
+        job = make_job(design.name, build_layout(design), complete_setup(design.laser))
     except DesignError:
         return None
-    return number(sum(timing(job, one).time_s for one in job.passes), 3)
+    return round_for_json(sum(pass_timing(job, one).time_s for one in job.passes), 3)

@@ -10,10 +10,10 @@ from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.designs import Entry
+from cmpdesign.evaluate.designs import DesignEntry
 from cmpdesign.evaluate.journal import Journal
-from cmpdesign.evaluate.report.page import Section, page
-from cmpdesign.evaluate.runner import Options, Trial, Work, run
+from cmpdesign.evaluate.report.page import Section, report_html
+from cmpdesign.evaluate.runner import RunOptions, Trial, Work, run_trials
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
 
@@ -33,13 +33,13 @@ class Experiment:
 
     name: str
     title: str
-    trials: Callable[[Options], list[Trial]]
+    trials: Callable[[RunOptions], list[Trial]]
     work: Work
     figures: Figures
     sections: Callable[[Mapping[str, Any]], list[Section]]
 
 
-def experiment(name: str, designs: Sequence[Entry] = ()) -> Experiment:
+def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experiment:
     """An experiment by its command's name; ``designs`` are those to compare.
 
     Raises:
@@ -52,13 +52,13 @@ def experiment(name: str, designs: Sequence[Entry] = ()) -> Experiment:
         return Experiment(name, title, module.trials, module.work, module.figures, show)
 
     if name == "precision":
-        return kind("Precision", precision, sections.precision)
+        return kind("Precision", precision, sections.precision_sections)
     if name == "response":
-        return kind("Response capability", responses, sections.response)
+        return kind("Response capability", responses, sections.response_sections)
     if name == "reliability":
-        return kind("Reliability", reliability, sections.reliability)
+        return kind("Reliability", reliability, sections.reliability_sections)
     if name == "angles":
-        return kind("Angle thresholds", angles, sections.angles)
+        return kind("Angle thresholds", angles, sections.angle_sections)
     if name == "designs":
         return Experiment(
             name,
@@ -66,13 +66,13 @@ def experiment(name: str, designs: Sequence[Entry] = ()) -> Experiment:
             lambda options: comparison.trials(options, designs),
             comparison.work,
             lambda trials, results: comparison.figures(trials, results, designs),
-            sections.designs,
+            sections.design_sections,
         )
     raise CmpDesignError(f"{name}: no such experiment")
 
 
-def evaluate(
-    one: Experiment, options: Options, folder: Path, *, show: bool = True
+def run_experiment(
+    one: Experiment, options: RunOptions, folder: Path, *, show: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
     """Run what is left to try, and write ``report.json`` and ``report.html``.
 
@@ -88,7 +88,7 @@ def evaluate(
     conditions = {"experiment": one.name, "version": __version__, **options.values}
     todo = one.trials(options)
     with Journal(folder, conditions) as journal:
-        results = run(one.work, todo, journal, workers=options.workers, title=one.name, show=show)
+        results = run_trials(one.work, todo, journal, workers=options.workers, title=one.name, show=show)
     document = {
         "format": "cmp-evaluation",
         "version": 1,
@@ -100,5 +100,5 @@ def evaluate(
         **one.figures(todo, results),
     }
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    html = page(one.title, one.sections(document))
+    html = report_html(one.title, one.sections(document))
     return document, write_folder(folder, {"report.json": text, "report.html": html})

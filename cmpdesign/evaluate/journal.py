@@ -16,10 +16,16 @@ from typing import Any, TextIO
 
 from cmpdesign.errors import CmpDesignError, OutputError
 
-NAME = "journal.jsonl"
-VERSION = 2
+JOURNAL_NAME = "journal.jsonl"
+JOURNAL_VERSION = 2
 # What the results of trials are made by.
-SOURCES = ("extractor", "cmpdesign.evaluate", "cmpdesign.scene", "cmpdesign.contact", "cmpdesign.patterns")
+HASHED_PACKAGES = (
+    "extractor",
+    "cmpdesign.evaluate",
+    "cmpdesign.scene",
+    "cmpdesign.contact",
+    "cmpdesign.patterns",
+)
 
 
 def fingerprint(conditions: Mapping[str, Any]) -> str:
@@ -30,9 +36,9 @@ def fingerprint(conditions: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=1)
 def code_digest() -> str:
-    """SHA-256 (hex) of the Python files of ``SOURCES``, names and content."""
+    """SHA-256 (hex) of the Python files of ``HASHED_PACKAGES``, names and content."""
     found = hashlib.sha256()
-    for package in SOURCES:
+    for package in HASHED_PACKAGES:
         spec = find_spec(package)
         for folder in (spec.submodule_search_locations or ()) if spec else ():
             for path in sorted(Path(folder).rglob("*.py")):
@@ -54,18 +60,22 @@ class Journal:
     """
 
     def __init__(self, folder: Path, conditions: Mapping[str, Any]) -> None:
-        self.path = folder / NAME
-        self._head = {"journal": VERSION, "fingerprint": fingerprint(conditions), "code": code_digest()}
+        self.path = folder / JOURNAL_NAME
+        self._head = {
+            "journal": JOURNAL_VERSION,
+            "fingerprint": fingerprint(conditions),
+            "code": code_digest(),
+        }
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._file = self.path.open("a", encoding="utf-8", newline="\n")
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
         try:
-            _take(self._file, self.path)
+            _lock_journal(self._file, self.path)
             self.results: dict[str, Any] = self._read()
             if not self.path.stat().st_size:
-                self._line(self._head)
+                self._write_line(self._head)
         except OSError as error:
             self.close()
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
@@ -80,7 +90,7 @@ class Journal:
             OutputError: the disk is full or gone; what was noted before is kept.
         """
         try:
-            self._line({"trial": key, "result": result})
+            self._write_line({"trial": key, "result": result})
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
         self.results[key] = result
@@ -96,7 +106,7 @@ class Journal:
     ) -> None:
         self.close()
 
-    def _line(self, document: Mapping[str, Any]) -> None:
+    def _write_line(self, document: Mapping[str, Any]) -> None:
         self._file.write(json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n")
         self._file.flush()
 
@@ -116,10 +126,10 @@ class Journal:
             raise CmpDesignError(
                 f"{self.path} is not the journal of a run ({error}); give another folder"
             ) from error
-        self._compare(head)
+        self._require_same_conditions(head)
         return results
 
-    def _compare(self, head: Any) -> None:
+    def _require_same_conditions(self, head: Any) -> None:
         """Refuse a journal that this run must not go on with."""
         if head == self._head:
             return
@@ -134,7 +144,7 @@ class Journal:
         )
 
 
-def _take(file: TextIO, path: Path) -> None:
+def _lock_journal(file: TextIO, path: Path) -> None:
     """Keep other processes from this journal until it is closed, where the system can.
 
     Raises:

@@ -7,13 +7,13 @@ from typing import Any
 
 from cmpdesign.evaluate import article
 from cmpdesign.evaluate.measures import cube
-from cmpdesign.evaluate.report.statistics import number, spread
-from cmpdesign.evaluate.runner import Options, Trial, rng
-from cmpdesign.evaluate.simulated.contacts import REST, Load, surface
+from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
+from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surface
 
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0
-METHODS = cube.SHOWN
+METHODS = cube.COMPARED_METHODS
 EDGE_MODES = ("press", "press_shear")
 MEASURES = (
     "surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "over_sigma", "over_sigma_median",
@@ -22,7 +22,7 @@ MEASURES = (
 VARIANTS = ("read", "with_virtual", "perfect")
 
 
-def trials(options: Options) -> list[Trial]:
+def trials(options: RunOptions) -> list[Trial]:
     """As many places for every object, and for the cube in both modes."""
     objects = [
         Trial(f"{name}-{i}", {**options.values, "object": name, "index": i})
@@ -32,7 +32,7 @@ def trials(options: Options) -> list[Trial]:
     return objects + cube_trials(EDGE_MODES, options)
 
 
-def cube_trials(modes: Sequence[str], options: Options) -> list[Trial]:
+def cube_trials(modes: Sequence[str], options: RunOptions) -> list[Trial]:
     return [
         Trial(f"cube-{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in modes
@@ -44,19 +44,21 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One object or cube at one place, with both patterns."""
     if "mode" in values:
         return cube.work(values)
-    from cmpdesign.evaluate.measures.shapes import compared
-    from cmpdesign.evaluate.simulated.conditions import middle
-    from cmpdesign.evaluate.simulated.instrument import instrument
+    from cmpdesign.evaluate.measures.shapes import measure_reconstruction
+    from cmpdesign.evaluate.simulated.conditions import mean_conditions
+    from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 
     text = values["sensor"]
-    random = rng(values["seed"], values["object"], values["index"])
+    random = trial_rng(values["seed"], values["object"], values["index"])
     x, y = random.uniform(-REACH_MM, REACH_MM, 2)
-    pressed = surface(text, Load(values["object"], PRESS_MM), (float(x), float(y)))
+    pressed = place_surface(text, ContactLoad(values["object"], PRESS_MM), (float(x), float(y)))
     seed = int(random.integers(2**31))
     found: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
     for method in METHODS:
-        one = instrument(text, method, values["preset"])
-        found[method] = compared(one, pressed, middle(one.sensor.table.conditions), seed)
+        one = instrument_for_method(text, method, values["preset"])
+        found[method] = measure_reconstruction(
+            one, pressed, mean_conditions(one.sensor.table.conditions), seed
+        )
     return found
 
 
@@ -65,33 +67,34 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
     pairs = list(zip(trials, results, strict=True))
     shapes = {
         name: {
-            method: _errors([r[method] for t, r in pairs if t.values.get("object") == name])
+            method: _summarise_errors([r[method] for t, r in pairs if t.values.get("object") == name])
             for method in METHODS
         }
         for name in OBJECTS
     }
     edges = {
-        mode: edge_figures([r for t, r in pairs if t.values.get("mode") == mode], mode) for mode in EDGE_MODES
+        mode: summarise_edge_errors([r for t, r in pairs if t.values.get("mode") == mode], mode)
+        for mode in EDGE_MODES
     }
     return {"shape_error_mm": shapes, "edge_fit_error_mm": edges}
 
 
-def _errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    return {name: spread([one[name] for one in found]).to_json() for name in MEASURES}
+def _summarise_errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    return {name: sample_statistics([one[name] for one in found]).to_json() for name in MEASURES}
 
 
-def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
+def summarise_edge_errors(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
     """The mean edge fitting error of both patterns, its distribution, and what else would have come out."""
     document: dict[str, Any] = {}
     for method in METHODS:
         errors = edge_errors_mm(found, method, "read")
-        document[method] = number(spread(errors).mean)
+        document[method] = round_for_json(sample_statistics(errors).mean)
     document["change_percent"] = article.change_percent(document["square"], document["multicolor"])
     document["article_change_percent"] = article.EDGE_ERROR_CHANGE_PERCENT[mode]
     document["distribution"] = {
         method: {
-            "error": spread(edge_errors_mm(found, method, "read")).to_json(),
-            "side_mm": [number(one[method]["read"]["side_mm"] or float("nan")) for one in found],
+            "error": sample_statistics(edge_errors_mm(found, method, "read")).to_json(),
+            "side_mm": [round_for_json(one[method]["read"]["side_mm"] or float("nan")) for one in found],
         }
         for method in METHODS
     }
@@ -99,7 +102,8 @@ def edge_figures(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any
     for name, measure in (("mean_extent", "mean_extent_mm"), ("by_depth", "side_by_depth_mm")):
         variants[name] = {m: edge_errors_mm(found, m, "read", measure) for m in METHODS}
     document["variants"] = {
-        name: {m: number(spread(errors).mean) for m, errors in one.items()} for name, one in variants.items()
+        name: {m: round_for_json(sample_statistics(errors).mean) for m, errors in one.items()}
+        for name, one in variants.items()
     }
     for one in document["variants"].values():
         one["change_percent"] = article.change_percent(one["square"], one["multicolor"])
@@ -111,4 +115,4 @@ def edge_errors_mm(
 ) -> list[float]:
     """By how much the fitted square's side misses the cube's, where there is one."""
     sides = [one[method][variant][measure] for one in found]
-    return [abs(side - cube.SIDE_MM) for side in sides if side is not None]
+    return [abs(side - cube.CUBE_SIDE_MM) for side in sides if side is not None]

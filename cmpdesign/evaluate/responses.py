@@ -8,15 +8,15 @@ from typing import Any
 from cmpdesign.evaluate import article
 from cmpdesign.evaluate.measures import cube
 from cmpdesign.evaluate.precision import cube_trials
-from cmpdesign.evaluate.report.statistics import number, spread
-from cmpdesign.evaluate.runner import Options, Trial
+from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluate.runner import RunOptions, Trial
 
-METHODS = cube.SHOWN
+METHODS = cube.COMPARED_METHODS
 CASES = {"shear_x": "press_shear_x", "shear_y": "press_shear"}
 work = cube.work
 
 
-def trials(options: Options) -> list[Trial]:
+def trials(options: RunOptions) -> list[Trial]:
     """As many places of the cube for both directions."""
     return cube_trials(tuple(CASES.values()), options)
 
@@ -26,9 +26,15 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
     document: dict[str, Any] = {}
     for case, mode in CASES.items():
         found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
-        means = {method: number(spread(values(found, method, "read")).mean) for method in METHODS}
+        means = {
+            method: round_for_json(sample_statistics(response_values(found, method, "read")).mean)
+            for method in METHODS
+        }
         others = {
-            variant: {method: number(spread(values(found, method, variant)).mean) for method in METHODS}
+            variant: {
+                method: round_for_json(sample_statistics(response_values(found, method, variant)).mean)
+                for method in METHODS
+            }
             for variant in ("with_virtual", "perfect")
         }
         for one in others.values():
@@ -37,12 +43,15 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
             **means,
             "change_percent": article.change_percent(means["square"], means["multicolor"]),
             "article_change_percent": article.RESPONSE_CHANGE_PERCENT[case],
-            "distribution": {method: spread(values(found, method, "read")).to_json() for method in METHODS},
+            "distribution": {
+                method: sample_statistics(response_values(found, method, "read")).to_json()
+                for method in METHODS
+            },
             "variants": others,
         }
     return {"response": document}
 
 
-def values(found: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
+def response_values(found: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
     """The responses of a method, where it has one."""
     return [one[method][variant]["response"] for one in found if one[method][variant]["response"] is not None]

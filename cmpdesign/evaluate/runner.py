@@ -30,7 +30,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """What a user chooses for a run.
 
     Attributes:
@@ -63,12 +63,12 @@ class Options:
 Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
-def rng(seed: int, name: str, index: int) -> np.random.Generator:
+def trial_rng(seed: int, name: str, index: int) -> np.random.Generator:
     """The stream of random numbers of one trial: the same whichever process draws it, and when."""
     return np.random.default_rng([seed, zlib.crc32(name.encode("utf-8")), index])
 
 
-def run(
+def run_trials(
     work: Work, trials: Sequence[Trial], journal: Journal, *, workers: int, title: str, show: bool = True
 ) -> list[Mapping[str, Any]]:
     """The results of all trials, in their order; those that the journal holds are not tried again.
@@ -86,26 +86,24 @@ def run(
     if len({trial.key for trial in trials}) < len(trials):
         raise CmpDesignError("two trials have the same name")
     open_trials = [trial for trial in trials if trial.key not in journal.results]
-    with _bar(title, len(trials), len(trials) - len(open_trials), show) as advance:
-        for key, result in _results(work, open_trials, workers):
+    with _progress_bar(title, len(trials), len(trials) - len(open_trials), show) as advance:
+        for key, result in _iterate_results(work, open_trials, workers):
             journal.add(key, result)
             advance()
     return [journal.results[trial.key] for trial in trials]
 
 
-def _results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tuple[str, Any]]:
+def _iterate_results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tuple[str, Any]]:
     """(key, result) as they come in."""
     if workers == 1 or len(trials) < 2:
         for trial in trials:
-            yield trial.key, _tried(work, trial.values)
+            yield trial.key, _run_trial(work, trial.values)
         return
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
-    with ProcessPoolExecutor(
-        workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent
-    ) as pool:
-        keys = {pool.submit(_tried, work, dict(trial.values)): trial.key for trial in trials}
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_ignore_interrupts) as pool:
+        keys = {pool.submit(_run_trial, work, dict(trial.values)): trial.key for trial in trials}
         try:
             for done in as_completed(keys):
                 yield keys[done], done.result()
@@ -113,12 +111,12 @@ def _results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tupl
             pool.shutdown(cancel_futures=True)
 
 
-def _leave_interrupts_to_the_parent() -> None:
+def _ignore_interrupts() -> None:
     """Ctrl-C reaches all processes of a terminal; a worker ends its trial, and its parent gives it no other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _tried(work: Work, values: Mapping[str, Any]) -> Any:
+def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
     """One result, through JSON, so that it is the same whether it comes from here or from the journal.
 
     On one thread: the processes share the cores, and sums come out the same however many there are.
@@ -137,7 +135,7 @@ def _tried(work: Work, values: Mapping[str, Any]) -> Any:
 
 
 @contextmanager
-def _bar(title: str, total: int, done: int, show: bool) -> Iterator[Callable[[], None]]:
+def _progress_bar(title: str, total: int, done: int, show: bool) -> Iterator[Callable[[], None]]:
     """A progress bar on stderr where a terminal shows it."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

@@ -11,8 +11,8 @@ from cmpdesign.evaluate.report.page import Plot, Section, Table
 
 Document = Mapping[str, Any]
 
-WHY_TITLE = "Why our figures differ from the article's"
-WHY = (
+DIFFERENCES_TITLE = "Why our figures differ from the article's"
+DIFFERENCES = (
     "The article measured two manufactured sensors at ten places; here one sensor is simulated with "
     "either pattern, whose edges are as drawn: no color has run, no two squares stick but by the blur of "
     "the lens.",
@@ -20,7 +20,7 @@ WHY = (
     "assumed: the article states none of them. The elastomer is linear, and loads of this size strain it "
     "by far more than linear theory predicts well.",
 )
-WHY_PRECISION = (
+DIFFERENCES_PRECISION = (
     "A press is seen alike: the square pattern's markers stand in rows 1.5 mm apart, the triangles' rows "
     "are staggered, so that their edge points come nearer to the cube's edges. Read without any error, "
     "they would show the same.",
@@ -28,11 +28,11 @@ WHY_PRECISION = (
     "millimetres outside the cube's face, whatever the pattern. Edge points chosen by their depth lie "
     "under the face again.",
 )
-WHY_RESPONSE = (
+DIFFERENCES_RESPONSE = (
     "With the friction assumed the cube's face sticks: the markers under it move with it, and around it "
     "the layer follows. So the response is near 1 for either pattern, and little is left to differ.",
 )
-WHY_RELIABILITY = (
+DIFFERENCES_RELIABILITY = (
     "The square pattern is read by adaptive threshold, erosion, contours and sub-pixel corners. What the "
     "former method did in detail the article does not say; a reader that tries several erosions loses "
     "less to sticking.",
@@ -42,15 +42,15 @@ WHY_RELIABILITY = (
 )
 
 
-def text(value: float | None, digits: int = 3, unit: str = "") -> str:
+def format_number(value: float | None, digits: int = 3, unit: str = "") -> str:
     return "none" if value is None else f"{value:.{digits}f}{unit}"
 
 
-def percent(value: float | None) -> str:
+def format_percent(value: float | None) -> str:
     return "none" if value is None else f"{value:+.1f} %"
 
 
-def conditions(document: Document) -> Section:
+def conditions_section(document: Document) -> Section:
     return Section(
         "Conditions",
         [
@@ -61,14 +61,19 @@ def conditions(document: Document) -> Section:
     )
 
 
-def why(more: Sequence[str]) -> Section:
-    return Section(WHY_TITLE, points=[*more, *WHY])
+def differences_section(more: Sequence[str]) -> Section:
+    return Section(DIFFERENCES_TITLE, points=[*more, *DIFFERENCES])
 
 
-def reliability(document: Document) -> list[Section]:
+def reliability_sections(document: Document) -> list[Section]:
     modes = document["modes"]
     rows = [
-        [f"{mode.replace('_', ' ')}: {method.replace('_', ' ')}", *_share(one), *_others(one), _article(one)]
+        [
+            f"{mode.replace('_', ' ')}: {method.replace('_', ' ')}",
+            *_success_cells(one),
+            *_criteria_cells(one),
+            _article_cell(one),
+        ]
         for mode, methods in modes.items()
         for method, one in methods.items()
     ]
@@ -87,9 +92,9 @@ def reliability(document: Document) -> list[Section]:
         ),
         rows,
     )
-    plot = Plot("Shares of successful trials, with 95 % intervals.", plots.shares(modes, METHODS))
+    plot = Plot("Shares of successful trials, with 95 % intervals.", plots.plot_success_rates(modes, METHODS))
     return [
-        conditions(document),
+        conditions_section(document),
         Section(
             "Successful extractions",
             [
@@ -102,37 +107,37 @@ def reliability(document: Document) -> list[Section]:
             tables=[table],
             plots=[plot],
         ),
-        why(WHY_RELIABILITY),
+        differences_section(DIFFERENCES_RELIABILITY),
     ]
 
 
-def _share(one: Document) -> list[str]:
+def _success_cells(one: Document) -> list[str]:
     low, high = one["interval_95"]
     share = one["share"]
     counts = f"{one['successful']} of {one['trials']}"
     return [counts, f"{100 * share:.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %"]
 
 
-def _others(one: Document) -> list[str]:
+def _criteria_cells(one: Document) -> list[str]:
     other = one["by_criterion"]
     return [
         f"{100 * other['area_95']['share']:.1f} %",
         f"{100 * other['no_wrong']['share']:.1f} %",
-        text(one["right_in_area_percent"]["mean"], 2, " %"),
+        format_number(one["right_in_area_percent"]["mean"], 2, " %"),
         str(one["wrong_markers"]),
     ]
 
 
-def _article(one: Document) -> str:
+def _article_cell(one: Document) -> str:
     return f"{one['article']['successful']} of {one['article']['trials']}" if "article" in one else ""
 
 
-def precision(document: Document) -> list[Section]:
+def precision_sections(document: Document) -> list[Section]:
     return [
-        conditions(document),
+        conditions_section(document),
         _edge_section(document["edge_fit_error_mm"]),
         _shape_section(document),
-        why(WHY_PRECISION),
+        differences_section(DIFFERENCES_PRECISION),
     ]
 
 
@@ -140,10 +145,18 @@ def _change_rows(cases: Document) -> list[Sequence[str]]:
     """Both patterns and the change from one to the other by label, the article's beside, variants below."""
     rows: list[Sequence[str]] = []
     for label, one in cases.items():
-        cells = [text(one["square"]), text(one["multicolor"]), percent(one["change_percent"])]
-        rows.append([label, *cells, percent(one["article_change_percent"])])
+        cells = [
+            format_number(one["square"]),
+            format_number(one["multicolor"]),
+            format_percent(one["change_percent"]),
+        ]
+        rows.append([label, *cells, format_percent(one["article_change_percent"])])
         for name, other in one["variants"].items():
-            cells = [text(other["square"]), text(other["multicolor"]), percent(other["change_percent"])]
+            cells = [
+                format_number(other["square"]),
+                format_number(other["multicolor"]),
+                format_percent(other["change_percent"]),
+            ]
             rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
     return rows
 
@@ -169,7 +182,7 @@ def _edge_section(edges: Document) -> Section:
             "points; the square around them, lying as the cube does, has the larger of their width and height."
         ],
         tables=[table],
-        plots=[Plot("Every place's error, and the means.", plots.boxes(sides, "error, mm"))],
+        plots=[Plot("Every place's error, and the means.", plots.plot_values(sides, "error, mm"))],
     )
 
 
@@ -186,10 +199,13 @@ def _shape_section(document: Document) -> Section:
     rows = [
         [
             f"{name}: {method}",
-            *(text(_um(one[key]["mean"]), 1) for key in ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm")),
-            text(_um(one["marker_median_mm"]["mean"]), 1),
-            *(text(one[key]["mean"], 2) for key in ("over_sigma", "over_sigma_median")),
-            *(_whole(one[key]["mean"]) for key in ("covered", "measured")),
+            *(
+                format_number(_to_um(one[key]["mean"]), 1)
+                for key in ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm")
+            ),
+            format_number(_to_um(one["marker_median_mm"]["mean"]), 1),
+            *(format_number(one[key]["mean"], 2) for key in ("over_sigma", "over_sigma_median")),
+            *(_format_whole_percent(one[key]["mean"]) for key in ("covered", "measured")),
         ]
         for name, methods in shapes.items()
         for method, one in methods.items()
@@ -207,7 +223,7 @@ def _shape_section(document: Document) -> Section:
     )
     table = Table("Errors in micrometres, means over the places.", headings, rows)
     errors = {
-        name: {method: _um(one["surface_rms_mm"]["mean"]) for method, one in methods.items()}
+        name: {method: _to_um(one["surface_rms_mm"]["mean"]) for method, one in methods.items()}
         for name, methods in shapes.items()
     }
     return Section(
@@ -219,19 +235,19 @@ def _shape_section(document: Document) -> Section:
             "the reconstruction states of itself: 1 where it is true. At rest nothing is pressed."
         ],
         tables=[table],
-        plots=[Plot("Error of the reconstructed surface, RMS.", plots.bars(errors, "RMS, µm"))],
+        plots=[Plot("Error of the reconstructed surface, RMS.", plots.plot_bars(errors, "RMS, µm"))],
     )
 
 
-def _um(value: float | None) -> float | None:
+def _to_um(value: float | None) -> float | None:
     return None if value is None else 1000 * value
 
 
-def _whole(share: float | None) -> str:
+def _format_whole_percent(share: float | None) -> str:
     return "none" if share is None else f"{100 * share:.1f} %"
 
 
-def response(document: Document) -> list[Section]:
+def response_sections(document: Document) -> list[Section]:
     rows = _change_rows({case.replace("_", " "): one for case, one in document["response"].items()})
     table = Table(
         "Mean displacement of the edge points over the shear of 1 mm.",
@@ -241,9 +257,9 @@ def response(document: Document) -> list[Section]:
     means = {
         case: {m: one[m] for m in ("square", "multicolor")} for case, one in document["response"].items()
     }
-    plot = Plot("Response by direction.", plots.bars(means, "displacement / shear"))
+    plot = Plot("Response by direction.", plots.plot_bars(means, "displacement / shear"))
     return [
-        conditions(document),
+        conditions_section(document),
         Section(
             "Response",
             [
@@ -253,11 +269,11 @@ def response(document: Document) -> list[Section]:
             tables=[table],
             plots=[plot],
         ),
-        why(WHY_RESPONSE),
+        differences_section(DIFFERENCES_RESPONSE),
     ]
 
 
-def angles(document: Document) -> list[Section]:
+def angle_sections(document: Document) -> list[Section]:
     sections = []
     for name, title, equation in (
         ("shape_change_deg", "Shape change", "eq. 1: 360 / n"),
@@ -271,13 +287,17 @@ def angles(document: Document) -> list[Section]:
         formula = {sides: one["formula"] for sides, one in cells.items()}
         sizes = list(next(iter(measured.values())))
         rows = [
-            [f"n = {n}", text(formula[n], 1), *(text(measured[n][size], 1) for size in sizes)]
+            [
+                f"n = {n}",
+                format_number(formula[n], 1),
+                *(format_number(measured[n][size], 1) for size in sizes),
+            ]
             for n in measured
         ]
         table = Table(
             "The first angle lost, in degrees.", ("cell", equation, *(f"{size} px" for size in sizes)), rows
         )
-        plot = Plot("First angle lost; dashed: the formula.", plots.thresholds(measured, formula))
+        plot = Plot("First angle lost; dashed: the formula.", plots.plot_lost_angles(measured, formula))
         sections.append(Section(title, tables=[table], plots=[plot]))
     rule = [
         document["rule"],
@@ -287,21 +307,21 @@ def angles(document: Document) -> list[Section]:
     return [Section("Rule", rule), *sections]
 
 
-def designs(document: Document) -> list[Section]:
+def design_sections(document: Document) -> list[Section]:
     found = document["designs"]
     rows = [
         [
             name,
             one["pattern"],
-            text(one["pitch_mm"]),
+            format_number(one["pitch_mm"]),
             str(one["markers"]),
-            text(one["markers_per_cm2"], 1),
-            text(_um(one["surface_rms_mm"]["mean"]), 1),
-            text(_um(one["marker_rms_mm"]["mean"]), 1),
-            text(_um(one["marker_median_mm"]["mean"]), 1),
-            *(_whole(one[key]["mean"]) for key in ("covered", "measured")),
-            text(one["smallest_feature_mm"]),
-            text(one["laser_time_s"], 0),
+            format_number(one["markers_per_cm2"], 1),
+            format_number(_to_um(one["surface_rms_mm"]["mean"]), 1),
+            format_number(_to_um(one["marker_rms_mm"]["mean"]), 1),
+            format_number(_to_um(one["marker_median_mm"]["mean"]), 1),
+            *(_format_whole_percent(one[key]["mean"]) for key in ("covered", "measured")),
+            format_number(one["smallest_feature_mm"]),
+            format_number(one["laser_time_s"], 0),
         ]
         for name, one in found.items()
     ]
@@ -320,12 +340,12 @@ def designs(document: Document) -> list[Section]:
         "laser, s",
     )
     points = {
-        name: (one["markers_per_cm2"], _um(one["surface_rms_mm"]["mean"]) or 0.0)
+        name: (one["markers_per_cm2"], _to_um(one["surface_rms_mm"]["mean"]) or 0.0)
         for name, one in found.items()
         if one["surface_rms_mm"]["mean"] is not None
     }
     return [
-        conditions(document),
+        conditions_section(document),
         Section(
             "Designs",
             [
@@ -335,6 +355,6 @@ def designs(document: Document) -> list[Section]:
                 "Pictures in which nothing was read count as 0 % covered and measured, and not in the errors."
             ],
             tables=[Table("Means over all contacts and places.", headings, rows)],
-            plots=[Plot("Error against density.", plots.error_over_density(points))],
+            plots=[Plot("Error against density.", plots.plot_error_over_density(points))],
         ),
     ]

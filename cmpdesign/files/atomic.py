@@ -18,12 +18,12 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         OutputError: the file cannot be written.
     """
     path = Path(path)
-    with _clear_errors(path):
+    with _as_output_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _refuse_folder(path)
+        _require_no_folder(path)
         with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=path.parent) as stage:
             staged = Path(stage) / path.name
-            _write_through(staged, content)
+            _write_and_sync(staged, content)
             staged.replace(path)
 
 
@@ -42,13 +42,13 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
     """
     folder = Path(folder)
     paths = [folder / name for name in files]
-    with _clear_errors(folder):
+    with _as_output_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            _refuse_folder(path)
+            _require_no_folder(path)
         with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=folder) as stage:
             for number, content in enumerate(files.values()):
-                _write_through(Path(stage) / str(number), content)
+                _write_and_sync(Path(stage) / str(number), content)
             for path in paths:
                 path.parent.mkdir(parents=True, exist_ok=True)
             for number, path in enumerate(paths):
@@ -56,7 +56,7 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
     return paths
 
 
-def _write_through(path: Path, content: str | bytes) -> None:
+def _write_and_sync(path: Path, content: str | bytes) -> None:
     """Write and sync: a full disk shows here, not after the rename."""
     data = content.encode("utf-8") if isinstance(content, str) else content
     with path.open("wb") as file:
@@ -65,13 +65,13 @@ def _write_through(path: Path, content: str | bytes) -> None:
         os.fsync(file.fileno())
 
 
-def _refuse_folder(path: Path) -> None:
+def _require_no_folder(path: Path) -> None:
     if path.is_dir():
         raise IsADirectoryError(21, "is a folder; give a file's name", str(path))
 
 
 @contextmanager
-def _clear_errors(path: Path) -> Iterator[None]:
+def _as_output_error(path: Path) -> Iterator[None]:
     try:
         yield
     except OutputError:

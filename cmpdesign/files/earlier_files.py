@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 LIST_NAME = ".cmpdesign-files.json"
 
 
-def with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict[str, str | bytes]:
+def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict[str, str | bytes]:
     """The files, and in each of these folders that they fill the list of those in it.
 
     Args:
@@ -25,7 +25,7 @@ def with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict
     result = dict(files)
     for folder in folders:
         made = {
-            path.removeprefix(folder): _digest(data)
+            path.removeprefix(folder): _content_digest(data)
             for path, data in files.items()
             if path.startswith(folder)
         }
@@ -35,7 +35,7 @@ def with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict
     return result
 
 
-def stale_files(output: Path, files: Mapping[str, str | bytes]) -> list[Path]:
+def find_stale_files(output: Path, files: Mapping[str, str | bytes]) -> list[Path]:
     """What earlier builds' lists name, this build does not make, and nobody has changed.
 
     Args:
@@ -48,14 +48,14 @@ def stale_files(output: Path, files: Mapping[str, str | bytes]) -> list[Path]:
             continue
         folder = (output / name).parent
         kept = {output / other for other in files}
-        for path, digest in _listed(output / name).items():
+        for path, digest in _read_file_list(output / name).items():
             stale = folder / path
             if stale not in kept and _is_below(stale, folder) and _is_unchanged(stale, digest):
                 found.append(stale)
     return sorted(found)
 
 
-def remove(paths: Iterable[Path]) -> list[Path]:
+def remove_files(paths: Iterable[Path]) -> list[Path]:
     """Remove files, and their folders where that leaves them empty; those that went."""
     removed = []
     for path in paths:
@@ -67,7 +67,7 @@ def remove(paths: Iterable[Path]) -> list[Path]:
     return removed
 
 
-def _listed(path: Path) -> dict[str, str]:
+def _read_file_list(path: Path) -> dict[str, str]:
     """An earlier list; none where there is none, or one that cannot be understood."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -89,10 +89,10 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 def _is_unchanged(path: Path, digest: str) -> bool:
     try:
-        return path.is_file() and _digest(path.read_bytes()) == digest
+        return path.is_file() and _content_digest(path.read_bytes()) == digest
     except OSError:
         return False
 
 
-def _digest(content: str | bytes) -> str:
+def _content_digest(content: str | bytes) -> str:
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()

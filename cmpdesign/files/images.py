@@ -50,10 +50,10 @@ def read_image(path: str | Path) -> Image:
         raise ImageFileError(
             f"{path}: is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
         )
-    return _as_bgr(pixels, path)
+    return _to_bgr(pixels, path)
 
 
-def _as_bgr(pixels: NDArray[Any], path: Path) -> Image:
+def _to_bgr(pixels: NDArray[Any], path: Path) -> Image:
     height, width = pixels.shape[:2]
     channels = pixels.shape[2] if pixels.ndim == 3 else 1
     if height < SMALLEST_PX or width < SMALLEST_PX:

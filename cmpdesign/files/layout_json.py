@@ -57,18 +57,19 @@ def layout_to_json(layout: Layout) -> str:
             "y": layout.fiducials_mm[:, 1].tolist(),
             "diameter_mm": layout.fiducial_diameter_mm,
         }
-    return _members(document, "") + "\n"
+    return _format_object(document, "") + "\n"
 
 
-def _members(value: Mapping[str, Any], indent: str) -> str:
+def _format_object(value: Mapping[str, Any], indent: str) -> str:
     """An object with one member a line; lists stay on theirs."""
     inner = indent + "  "
     lines = [
-        f"{inner}{_compact(key)}: {_members(item, inner) if isinstance(item, Mapping) else _compact(item)}"
+        f"{inner}{_format_value(key)}: "
+        f"{_format_object(item, inner) if isinstance(item, Mapping) else _format_value(item)}"
         for key, item in value.items()
     ]
     return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
 
 
-def _compact(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

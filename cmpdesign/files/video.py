@@ -13,7 +13,7 @@ from cmpdesign.errors import OutputError
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}  # FFV1 is lossless
 
 
-class Video:
+class VideoWriter:
     """Writes beside the file's place; ``close`` completes it.
 
     Args:

@@ -12,10 +12,10 @@ from cmpdesign.design.design import Design
 from cmpdesign.design.fiducials import fiducial_positions
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import DECIMALS, Layout
-from cmpdesign.layout.outline import Points, mitres, rotation
-from cmpdesign.layout.sizing import centre, clip_outline, resolve, rim
-from cmpdesign.patterns import Shape, patterns
-from cmpdesign.patterns.graphs import Mesh
+from cmpdesign.layout.outline import Points, corner_offsets, rotation_matrix
+from cmpdesign.layout.sizing import clip_outline, pattern_centre, resolve_size, rim_corners
+from cmpdesign.patterns import PatternShape, registered_patterns
+from cmpdesign.patterns.graphs import MarkerGraph
 from cmpdesign.patterns.numbering import Ints
 
 
@@ -35,26 +35,26 @@ def build_layout(design: Design) -> Layout:
     >>> layout.size_mm
     (32.309401076, 27.980762114)
     """
-    shape, pitch_mm = resolve(design)
-    pattern = patterns()[design.pattern]
+    shape, pitch_mm = resolve_size(design)
+    pattern = registered_patterns()[design.pattern]
     mesh = pattern.graph.mesh(shape.layers)
-    turn = rotation(design.rotation_deg).T
+    turn = rotation_matrix(design.rotation_deg).T
     xy_mm = pitch_mm * (pattern.positions(mesh.layer, mesh.index, shape) @ turn)
-    centre_mm = pitch_mm * (centre(design, shape) @ turn)
+    centre_mm = pitch_mm * (pattern_centre(design, shape) @ turn)
 
     if design.clip == "none":
-        corners = rim(design, shape)
-        outline_mm = pitch_mm * corners + design.border_mm * mitres(corners)
+        corners = rim_corners(design, shape)
+        outline_mm = pitch_mm * corners + design.border_mm * corner_offsets(corners)
     else:
         outline_mm = clip_outline(design)
-        mesh = _clipped(design, mesh, xy_mm - centre_mm)
+        mesh = _clip_graph(design, mesh, xy_mm - centre_mm)
 
     return Layout(
         pattern=design.pattern,
-        parameters=_parameters(design, shape, pitch_mm),
+        parameters=_layout_parameters(design, shape, pitch_mm),
         marker_layer=mesh.layer.astype(np.int32),
         marker_index=mesh.index.astype(np.int32),
-        marker_xy_mm=_rounded(xy_mm),
+        marker_xy_mm=_round_points(xy_mm),
         cell_corners=mesh.corners.astype(np.int32),
         cell_color=mesh.color,
         edges=_edges(mesh.corners),
@@ -63,13 +63,13 @@ def build_layout(design: Design) -> Layout:
         reference_marker=mesh.reference_marker,
         palette=design.palette.model_dump(),
         border_mm=design.border_mm,
-        outline_mm=_rounded(outline_mm + centre_mm),
-        fiducials_mm=_rounded(fiducial_positions(design.fiducials, outline_mm + centre_mm)),
+        outline_mm=_round_points(outline_mm + centre_mm),
+        fiducials_mm=_round_points(fiducial_positions(design.fiducials, outline_mm + centre_mm)),
         fiducial_diameter_mm=design.fiducials.diameter_mm if design.fiducials.count else 0.0,
     )
 
 
-def _clipped(design: Design, mesh: Mesh, xy_mm: Points) -> Mesh:
+def _clip_graph(design: Design, mesh: MarkerGraph, xy_mm: Points) -> MarkerGraph:
     """The mesh without the cells that reach over the clip outline less its border; xy from the centre."""
     # A picometre of tolerance: a cell that exactly fills the window is inside it.
     slack_mm = 10**-DECIMALS
@@ -85,7 +85,7 @@ def _clipped(design: Design, mesh: Mesh, xy_mm: Points) -> Mesh:
             f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts the reference "
             "cell away: nothing could be numbered; make the outline larger or the pitch smaller"
         )
-    if not _reference_surrounded(mesh, keep):
+    if not _is_reference_surrounded(mesh, keep):
         raise DesignError(
             f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts cells around "
             "the reference cell away; make the outline larger or the pitch smaller"
@@ -94,7 +94,7 @@ def _clipped(design: Design, mesh: Mesh, xy_mm: Points) -> Mesh:
     return replace(mesh, corners=mesh.corners[keep], color=mesh.color[keep], reference_cell=reference)
 
 
-def _reference_surrounded(mesh: Mesh, keep: NDArray[np.bool_]) -> bool:
+def _is_reference_surrounded(mesh: MarkerGraph, keep: NDArray[np.bool_]) -> bool:
     """True when every cell that shares a side with the reference cell is kept: numbering starts from them."""
     shared = np.isin(mesh.corners, mesh.corners[mesh.reference_cell]).sum(axis=1)
     return bool(keep[shared >= 2].all())
@@ -108,7 +108,7 @@ def _edges(corners: Ints) -> NDArray[np.int32]:
     return np.stack(np.divmod(np.unique(low * base + high), base), axis=-1).astype(np.int32)
 
 
-def _parameters(design: Design, shape: Shape, pitch_mm: float) -> dict[str, Any]:
+def _layout_parameters(design: Design, shape: PatternShape, pitch_mm: float) -> dict[str, Any]:
     """What the design came to: layers, pitch_mm, mirrored, rotation_deg always, the rest where it applies."""
     parameters: dict[str, Any] = {
         "name": design.name,
@@ -117,7 +117,7 @@ def _parameters(design: Design, shape: Shape, pitch_mm: float) -> dict[str, Any]
         "mirrored": design.mirrored,
         "rotation_deg": design.rotation_deg,
     }
-    for option in sorted(patterns()[design.pattern].options):
+    for option in sorted(registered_patterns()[design.pattern].options):
         parameters[option] = getattr(shape, option)
     if design.clip != "none":
         fields = ("clip", "clip_width_mm", "clip_height_mm", "clip_diameter_mm")
@@ -125,6 +125,6 @@ def _parameters(design: Design, shape: Shape, pitch_mm: float) -> dict[str, Any]
     return parameters
 
 
-def _rounded(points: Points) -> Points:
+def _round_points(points: Points) -> Points:
     """Rounded as layouts are, and without negative zeros, so that every machine writes the same digits."""
     return np.round(points, DECIMALS) + 0.0

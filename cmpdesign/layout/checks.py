@@ -82,13 +82,18 @@ def check_design(
     ['smallest cell (inscribed circle): 0.173 mm, limit 0.3 mm; make pitch_mm larger or layers fewer']
     """
     layout = layout or build_layout(design)
-    findings = [*_sizes(layout), *_camera(layout, camera_px), *_structure(design, layout), *_colors(layout)]
+    findings = [
+        *_size_findings(layout),
+        *_camera_findings(layout, camera_px),
+        *_structure_findings(design, layout),
+        *_color_findings(layout),
+    ]
     return sorted(findings, key=lambda finding: finding.severity)
 
 
-def _sizes(layout: Layout) -> Iterator[Finding]:
+def _size_findings(layout: Layout) -> Iterator[Finding]:
     width_mm = float(cell_widths_mm(layout).min())
-    yield from _below(
+    yield from _findings_below(
         "smallest cell (inscribed circle)",
         width_mm,
         CELL_ERROR_MM,
@@ -97,7 +102,7 @@ def _sizes(layout: Layout) -> Iterator[Finding]:
         "make pitch_mm larger or layers fewer",
     )
     angle_deg = float(cell_angles_deg(layout).min())
-    yield from _below(
+    yield from _findings_below(
         "sharpest corner of a cell",
         angle_deg,
         None,
@@ -107,14 +112,14 @@ def _sizes(layout: Layout) -> Iterator[Finding]:
     )
 
 
-def _camera(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:
+def _camera_findings(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:
     width_mm, height_mm = layout.size_mm
     # The picture may lie across the pattern.
     scale = max(
         min(camera_px[0] / width_mm, camera_px[1] / height_mm),
         min(camera_px[1] / width_mm, camera_px[0] / height_mm),
     )
-    yield from _below(
+    yield from _findings_below(
         f"shortest edge in a {camera_px[0]}x{camera_px[1]} picture filled by the pattern",
         scale * float(edge_lengths_mm(layout).min()),
         EDGE_ERROR_PX,
@@ -124,7 +129,7 @@ def _camera(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:
     )
 
 
-def _structure(design: Design, layout: Layout) -> Iterator[Finding]:
+def _structure_findings(design: Design, layout: Layout) -> Iterator[Finding]:
     layers, pitch_mm = int(layout.parameters["layers"]), float(layout.parameters["pitch_mm"])
     triangular = layout.cell_corners.shape[1] == 3
     if triangular and layers < 2:
@@ -136,7 +141,7 @@ def _structure(design: Design, layout: Layout) -> Iterator[Finding]:
             "use two layers or more, or orientation rests on two cells",
             "warning",
         )
-    yield from _below(
+    yield from _findings_below(
         "black border",
         layout.border_mm,
         None,
@@ -144,7 +149,7 @@ def _structure(design: Design, layout: Layout) -> Iterator[Finding]:
         "mm",
         "make border_mm larger, or the rim's gridlines lack contrast",
     )
-    yield from _below(
+    yield from _findings_below(
         "share of markers inside the clip outline",
         float(layout.present.mean()),
         None,
@@ -154,12 +159,12 @@ def _structure(design: Design, layout: Layout) -> Iterator[Finding]:
     )
 
 
-def _colors(layout: Layout) -> Iterator[Finding]:
+def _color_findings(layout: Layout) -> Iterator[Finding]:
     inks = [RED, GREEN, BLUE] if layout.cell_corners.shape[1] == 3 else [RED]
     hsv = {color: _hsv(layout, color) for color in range(len(COLORS))}
     for first, second in combinations(inks, 2):
         apart = abs(hsv[first][0] - hsv[second][0])
-        yield from _below(
+        yield from _findings_below(
             f"hue distance of {COLORS[first]} and {COLORS[second]}",
             min(apart, 360 - apart),
             HUE_ERROR_DEG,
@@ -168,13 +173,13 @@ def _colors(layout: Layout) -> Iterator[Finding]:
             "choose inks further apart",
         )
     for color in inks:
-        yield from _below(
+        yield from _findings_below(
             f"saturation of {COLORS[color]}", hsv[color][1], SATURATION_ERROR, None, "", "choose a purer ink"
         )
     black = _rgb(layout, BLACK)
     for color in [*inks, WHITE]:
         contrast = float((_rgb(layout, color) - black).max())
-        yield from _below(
+        yield from _findings_below(
             f"contrast of {COLORS[color]} against black",
             contrast,
             CONTRAST_ERROR,
@@ -182,7 +187,7 @@ def _colors(layout: Layout) -> Iterator[Finding]:
             "of 255",
             "choose a brighter ink or a darker black",
         )
-    yield from _below(
+    yield from _findings_below(
         "brightness of white", hsv[WHITE][2], WHITE_VALUE_ERROR, None, "", "choose a brighter white"
     )
     if hsv[WHITE][1] > WHITE_SATURATION_ERROR:
@@ -196,7 +201,7 @@ def _colors(layout: Layout) -> Iterator[Finding]:
         )
 
 
-def _below(
+def _findings_below(
     subject: str, value: float, error: float | None, warning: float | None, unit: str, remedy: str
 ) -> Iterator[Finding]:
     """A finding when the value lies below a limit; the stricter limit that it passes is the one named."""

@@ -11,7 +11,7 @@ Points = NDArray[np.float64]
 CIRCLE_POINTS = 360
 
 
-def without_collinear(polygon: Points) -> Points:
+def drop_collinear_points(polygon: Points) -> Points:
     """The polygon's true corners: points on a straight side are left out."""
     before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
     turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
@@ -20,7 +20,7 @@ def without_collinear(polygon: Points) -> Points:
     return corners
 
 
-def mitres(polygon: Points) -> Points:
+def corner_offsets(polygon: Points) -> Points:
     """(K, 2): how far each corner moves when every side moves outward by one."""
     side = np.roll(polygon, -1, axis=0) - polygon
     normal = np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
@@ -29,18 +29,18 @@ def mitres(polygon: Points) -> Points:
     return moves
 
 
-def rectangle(width_mm: float, height_mm: float) -> Points:
+def rectangle_outline(width_mm: float, height_mm: float) -> Points:
     """A rectangle around the origin."""
     return np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width_mm / 2, height_mm / 2)
 
 
-def circle(diameter_mm: float) -> Points:
+def circle_outline(diameter_mm: float) -> Points:
     """A polygon inscribed in the circle around the origin."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
     return diameter_mm / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def rotation(angle_deg: float) -> NDArray[np.float64]:
+def rotation_matrix(angle_deg: float) -> NDArray[np.float64]:
     """(2, 2) matrix R: ``points @ R.T`` turns counter-clockwise; exact at multiples of 90 degrees."""
     quarters, rest = divmod(angle_deg, 90.0)
     c, s = (1.0, 0.0) if rest == 0 else (np.cos(np.radians(rest)), np.sin(np.radians(rest)))

@@ -18,7 +18,7 @@ from cmpdesign.patterns.colors import COLORS
 
 
 @dataclass(frozen=True)
-class Report:
+class DesignReport:
     """Key figures.
 
     Attributes:
@@ -56,7 +56,7 @@ class Report:
     findings: tuple[Finding, ...]
 
 
-def report(design: Design, layout: Layout) -> Report:
+def design_report(design: Design, layout: Layout) -> DesignReport:
     """The key figures of a design and its layout.
 
     >>> from cmpdesign import build_layout, load_design
@@ -67,7 +67,7 @@ def report(design: Design, layout: Layout) -> Report:
     counts = np.bincount(layout.cell_color, minlength=len(COLORS)).tolist()
     present = int(layout.present.sum())
     virtual = len(layout.edges) * layout.virtual_per_edge
-    return Report(
+    return DesignReport(
         name=design.name,
         pattern=layout.pattern,
         source=design.source,
@@ -88,7 +88,7 @@ def report(design: Design, layout: Layout) -> Report:
     )
 
 
-def report_to_json(figures: Report, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+def report_to_json(figures: DesignReport, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
     """report.json's text; ``products`` (name -> figures) are what the products measured of themselves."""
     document = {
         "format": "cmp-report",

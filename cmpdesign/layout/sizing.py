@@ -9,8 +9,15 @@ import numpy as np
 from cmpdesign.design.design import ASPECT_MAX, ASPECT_MIN, Design
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import DECIMALS
-from cmpdesign.layout.outline import Points, circle, mitres, rectangle, rotation, without_collinear
-from cmpdesign.patterns import Shape, patterns
+from cmpdesign.layout.outline import (
+    Points,
+    circle_outline,
+    corner_offsets,
+    drop_collinear_points,
+    rectangle_outline,
+    rotation_matrix,
+)
+from cmpdesign.patterns import PatternShape, registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS
 
 DEFAULT_ASPECT = 0.75
@@ -18,37 +25,37 @@ DEFAULT_ASPECT = 0.75
 _SIZE_DECIMALS = 12
 
 
-def resolve(design: Design) -> tuple[Shape, float]:
+def resolve_size(design: Design) -> tuple[PatternShape, float]:
     """The pattern's shape and its pitch in mm.
 
     Raises:
         DesignError: the overall size holds no pattern, or the clip outline needs too many layers.
     """
     if design.layers is not None and design.pitch_mm is not None:
-        return _shape(design, design.layers), design.pitch_mm
+        return _make_shape(design, design.layers), design.pitch_mm
     if design.layers is not None:
-        shape = _shape(design, design.layers)
+        shape = _make_shape(design, design.layers)
         return shape, fitting_pitch_mm(design, shape)
-    return _shape(design, _fitting_layers(design)), _given(design.pitch_mm)
+    return _make_shape(design, _fitting_layers(design)), _require_given(design.pitch_mm)
 
 
-def rim(design: Design, shape: Shape) -> Points:
+def rim_corners(design: Design, shape: PatternShape) -> Points:
     """The rim's corners around the pattern's centre for a pitch of one, rotated, counter-clockwise."""
-    pattern = patterns()[design.pattern]
-    corners = without_collinear(pattern.positions(*pattern.graph.rim(shape.layers), shape))
-    return (corners - centre(design, shape)) @ rotation(design.rotation_deg).T
+    pattern = registered_patterns()[design.pattern]
+    corners = drop_collinear_points(pattern.positions(*pattern.graph.rim(shape.layers), shape))
+    return (corners - pattern_centre(design, shape)) @ rotation_matrix(design.rotation_deg).T
 
 
-def centre(design: Design, shape: Shape) -> Points:
+def pattern_centre(design: Design, shape: PatternShape) -> Points:
     """(2,): the pattern's centre for a pitch of one, unrotated; marker 0 is the origin."""
-    pattern = patterns()[design.pattern]
+    pattern = registered_patterns()[design.pattern]
     return np.asarray(pattern.positions(*pattern.graph.centre(shape.layers), shape).mean(axis=0))
 
 
-def fitting_pitch_mm(design: Design, shape: Shape) -> float:
+def fitting_pitch_mm(design: Design, shape: PatternShape) -> float:
     """The largest pitch with which the pattern and its border stay within the overall size."""
-    corners = rim(design, shape)
-    border = design.border_mm * mitres(corners)
+    corners = rim_corners(design, shape)
+    border = design.border_mm * corner_offsets(corners)
     pitches = []
     for axis, limit_mm in enumerate((design.width_mm, design.height_mm)):
         if limit_mm is None:
@@ -81,14 +88,14 @@ def _largest_pitch(corner: Points, border: Points, limit_mm: float) -> float:
     return pitch
 
 
-def _shape(design: Design, layers: int) -> Shape:
-    options = patterns()[design.pattern].options
+def _make_shape(design: Design, layers: int) -> PatternShape:
+    options = registered_patterns()[design.pattern].options
     spacing = (design.spacing or "angle") if "spacing" in options else "angle"
     if "aspect" not in options:
-        return Shape(layers, spacing=spacing)
+        return PatternShape(layers, spacing=spacing)
     if design.aspect is None and design.width_mm is not None and design.height_mm is not None:
-        return Shape(layers, _filling_aspect(design, layers, spacing), spacing)
-    return Shape(layers, DEFAULT_ASPECT if design.aspect is None else design.aspect, spacing)
+        return PatternShape(layers, _filling_aspect(design, layers, spacing), spacing)
+    return PatternShape(layers, DEFAULT_ASPECT if design.aspect is None else design.aspect, spacing)
 
 
 def _filling_aspect(design: Design, layers: int, spacing: str) -> float:
@@ -100,7 +107,7 @@ def _filling_aspect(design: Design, layers: int, spacing: str) -> float:
         )
 
     def too_tall(aspect: float) -> bool:
-        shape = Shape(layers, aspect, spacing)
+        shape = PatternShape(layers, aspect, spacing)
         by_width = design.model_copy(update={"height_mm": None})
         by_height = design.model_copy(update={"width_mm": None})
         return fitting_pitch_mm(by_height, shape) < fitting_pitch_mm(by_width, shape)
@@ -125,27 +132,28 @@ def _fitting_layers(design: Design) -> int:
     def fits(layers: int) -> bool:
         # A picometre of tolerance: 1.5 mm * 10 layers must fit into 30 mm.
         return bool(
-            fitting_pitch_mm(design, _shape(design, layers)) >= _given(design.pitch_mm) - 10**-DECIMALS
+            fitting_pitch_mm(design, _make_shape(design, layers))
+            >= _require_given(design.pitch_mm) - 10**-DECIMALS
         )
 
     if not fits(1):
         raise DesignError(
             f"not one layer of pitch_mm = {design.pitch_mm:g} mm fits the overall size; "
-            f"the largest pitch that fits is {fitting_pitch_mm(design, _shape(design, 1)):.4g} mm"
+            f"the largest pitch that fits is {fitting_pitch_mm(design, _make_shape(design, 1)):.4g} mm"
         )
-    return _last(fits)
+    return _largest_layers(fits)
 
 
 def _covering_layers(design: Design) -> int:
     window = clip_outline(design, design.border_mm)
 
     def leaves_a_gap(layers: int) -> bool:
-        corners = _given(design.pitch_mm) * rim(design, _shape(design, layers))
+        corners = _require_given(design.pitch_mm) * rim_corners(design, _make_shape(design, layers))
         side = np.roll(corners, -1, axis=0) - corners
         to_window = window[:, None, :] - corners[None, :, :]
         return bool((side[:, 0] * to_window[..., 1] - side[:, 1] * to_window[..., 0]).min() < 0)
 
-    layers = _last(leaves_a_gap) + 1 if leaves_a_gap(1) else 1
+    layers = _largest_layers(leaves_a_gap) + 1 if leaves_a_gap(1) else 1
     if layers > MAX_LAYERS:
         raise DesignError(
             f"covering the clip outline with pitch_mm = {design.pitch_mm:g} mm takes more than {MAX_LAYERS} "
@@ -157,13 +165,14 @@ def _covering_layers(design: Design) -> int:
 def clip_outline(design: Design, inset_mm: float = 0.0) -> Points:
     """The clip outline around the pattern's centre, every side moved inward by ``inset_mm``."""
     if design.clip == "circle":
-        return circle(_given(design.clip_diameter_mm) - 2 * inset_mm)
-    return rectangle(
-        _given(design.clip_width_mm) - 2 * inset_mm, _given(design.clip_height_mm) - 2 * inset_mm
+        return circle_outline(_require_given(design.clip_diameter_mm) - 2 * inset_mm)
+    return rectangle_outline(
+        _require_given(design.clip_width_mm) - 2 * inset_mm,
+        _require_given(design.clip_height_mm) - 2 * inset_mm,
     )
 
 
-def _last(holds: Callable[[int], bool]) -> int:
+def _largest_layers(holds: Callable[[int], bool]) -> int:
     """The largest number of layers for which it holds; it holds for 1 and, once it fails, for no more."""
     low, high = 1, MAX_LAYERS + 1
     while high - low > 1:
@@ -172,7 +181,7 @@ def _last(holds: Callable[[int], bool]) -> int:
     return low
 
 
-def _given(value: float | None) -> float:
+def _require_given(value: float | None) -> float:
     """A value that ``Design`` has made sure of."""
     assert value is not None
     return value

@@ -1,4 +1,4 @@
-"""The registry of patterns. A module in this folder that calls ``register`` is tested, drawn and offered."""
+"""The registry of patterns. A module in this folder that calls ``register_pattern`` is tested, drawn and offered."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.patterns.graphs import Graph
+from cmpdesign.patterns.graphs import GraphFamily
 from cmpdesign.patterns.numbering import Ints
 
 
 @dataclass(frozen=True)
-class Shape:
+class PatternShape:
     """What a pattern may ask about a design.
 
     Attributes:
@@ -32,7 +32,7 @@ class Shape:
 
 
 # (layer, index, shape) -> (N, 2) positions for a pitch of one, origin at marker 0, y up.
-Positions = Callable[[Ints, Ints, Shape], NDArray[np.float64]]
+PositionFunction = Callable[[Ints, Ints, PatternShape], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Pattern:
     """A registered pattern: its graph, where its markers lie, the options that only some patterns take."""
 
     name: str
-    graph: Graph
-    positions: Positions
+    graph: GraphFamily
+    positions: PositionFunction
     options: frozenset[str]
 
     @property
@@ -50,28 +50,30 @@ class Pattern:
         return (self.positions.__doc__ or "").strip().partition("\n")[0]
 
 
-_registered: dict[str, Pattern] = {}
+_PATTERNS: dict[str, Pattern] = {}
 
 
-def register(name: str, graph: Graph, options: tuple[str, ...] = ()) -> Callable[[Positions], Positions]:
+def register_pattern(
+    name: str, graph: GraphFamily, options: tuple[str, ...] = ()
+) -> Callable[[PositionFunction], PositionFunction]:
     """Decorate the function that returns a pattern's positions.
 
     Raises:
         ValueError: the name is taken.
     """
 
-    def enter(positions: Positions) -> Positions:
-        if name in _registered:
+    def enter(positions: PositionFunction) -> PositionFunction:
+        if name in _PATTERNS:
             raise ValueError(f"the pattern {name!r} is registered twice")
-        _registered[name] = Pattern(name, graph, positions, frozenset(options))
+        _PATTERNS[name] = Pattern(name, graph, positions, frozenset(options))
         return positions
 
     return enter
 
 
 @cache
-def patterns() -> Mapping[str, Pattern]:
+def registered_patterns() -> Mapping[str, Pattern]:
     """Every registered pattern by name, in alphabetical order."""
     for module in pkgutil.iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
-    return MappingProxyType(dict(sorted(_registered.items())))
+    return MappingProxyType(dict(sorted(_PATTERNS.items())))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.patterns import Shape, register
-from cmpdesign.patterns.graphs import TRIANGULAR
+from cmpdesign.patterns import PatternShape, register_pattern
+from cmpdesign.patterns.graphs import TRIANGULAR_GRAPHS
 from cmpdesign.patterns.numbering import Ints
 
 
-@register("elliptical", TRIANGULAR, options=("aspect", "spacing"))
-def elliptical(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+@register_pattern("elliptical", TRIANGULAR_GRAPHS, options=("aspect", "spacing"))
+def elliptical_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArray[np.float64]:
     """Layers are similar ellipses (the article, fig. 3b), b / a = aspect.
 
     ::

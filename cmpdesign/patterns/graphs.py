@@ -1,6 +1,6 @@
 """What is connected to what, before anything has a position: markers, cells, colors, the rim.
 
-A pattern embeds one of these graphs; ``TRIANGULAR`` is the multicolor CMP, ``SQUARE`` the former one.
+A pattern embeds one of these graphs; ``TRIANGULAR_GRAPHS`` is the multicolor CMP, ``SQUARE_GRAPHS`` the former one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MAX_LAYERS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class MarkerGraph:
     """The graph of a given number of layers.
 
     Attributes:
@@ -37,23 +37,23 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Graph:
+class GraphFamily:
     """A family of meshes, one for every number of layers.
 
     Attributes:
         name: "triangular" or "square".
-        mesh: layers -> ``Mesh``.
+        mesh: layers -> ``MarkerGraph``.
         rim: layers -> (layer, index) arrays of the outermost markers, counter-clockwise, each once.
         centre: layers -> (layer, index) arrays of the markers whose mean is the pattern's centre.
     """
 
     name: str
-    mesh: Callable[[int], Mesh]
+    mesh: Callable[[int], MarkerGraph]
     rim: Callable[[int], tuple[Ints, Ints]]
     centre: Callable[[int], tuple[Ints, Ints]]
 
 
-def _triangular(layers: int) -> Mesh:
+def _triangular_graph(layers: int) -> MarkerGraph:
     layer, index = layer_from_id(np.arange(marker_count(layers)))
     span = np.arange(-layers, layers + 1)
     q, r = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
@@ -73,7 +73,7 @@ def _triangular(layers: int) -> Mesh:
     # From the centre outward, so that a cell's number says roughly where it is.
     order = np.lexsort(np.sort(corners, axis=1).T)
     corners, color = corners[order], color[order]
-    return Mesh(layer, index, corners, color, int(np.flatnonzero(color == WHITE)[0]), 0)
+    return MarkerGraph(layer, index, corners, color, int(np.flatnonzero(color == WHITE)[0]), 0)
 
 
 def _triangular_rim(layers: int) -> tuple[Ints, Ints]:
@@ -85,7 +85,7 @@ def _triangular_centre(layers: int) -> tuple[Ints, Ints]:
     return np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
 
 
-def _square(layers: int) -> Mesh:
+def _square_graph(layers: int) -> MarkerGraph:
     side = 2 * layers + 2
     row, column = (grid.ravel() for grid in np.divmod(np.arange(side * side), side))
     i, j = (grid.ravel() for grid in np.divmod(np.arange((side - 1) ** 2), side - 1))
@@ -95,7 +95,7 @@ def _square(layers: int) -> Mesh:
     color = np.where((i + j) % 2 == 0, WHITE, BLACK).astype(np.uint8)
     reference = layers * (side - 1) + layers
     color[reference] = RED
-    return Mesh(row, column, corners, color, reference, int(top_left[reference]))
+    return MarkerGraph(row, column, corners, color, reference, int(top_left[reference]))
 
 
 def _square_rim(layers: int) -> tuple[Ints, Ints]:
@@ -111,5 +111,5 @@ def _square_centre(layers: int) -> tuple[Ints, Ints]:
     return np.array([layers, layers + 1]), np.array([layers, layers + 1])
 
 
-TRIANGULAR = Graph("triangular", _triangular, _triangular_rim, _triangular_centre)
-SQUARE = Graph("square", _square, _square_rim, _square_centre)
+TRIANGULAR_GRAPHS = GraphFamily("triangular", _triangular_graph, _triangular_rim, _triangular_centre)
+SQUARE_GRAPHS = GraphFamily("square", _square_graph, _square_rim, _square_centre)

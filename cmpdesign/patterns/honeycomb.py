@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.patterns import Shape, register
-from cmpdesign.patterns.graphs import TRIANGULAR
+from cmpdesign.patterns import PatternShape, register_pattern
+from cmpdesign.patterns.graphs import TRIANGULAR_GRAPHS
 from cmpdesign.patterns.numbering import Ints, axial_from_layer
 
 
-@register("honeycomb", TRIANGULAR)
-def honeycomb(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+@register_pattern("honeycomb", TRIANGULAR_GRAPHS)
+def honeycomb_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArray[np.float64]:
     """Equilateral triangles; the layers are regular hexagons (the article, fig. 3a).
 
     ::

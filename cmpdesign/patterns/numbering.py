@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 
 # Axial directions of the six spokes, clockwise from 120 degrees.
-SPOKES: Ints = np.array([(-1, 1), (0, 1), (1, 0), (1, -1), (0, -1), (-1, 0)], dtype=np.int64)
-SPOKES.setflags(write=False)
+SPOKE_DIRECTIONS: Ints = np.array([(-1, 1), (0, 1), (1, 0), (1, -1), (0, -1), (-1, 0)], dtype=np.int64)
+SPOKE_DIRECTIONS.setflags(write=False)
 
 
 def marker_count(layers: int) -> int:
@@ -49,7 +49,7 @@ def axial_from_layer(layer: Ints, index: Ints) -> tuple[Ints, Ints]:
     ring = np.maximum(layer, 1)
     sextant, step = index // ring % 6, index % ring
     # Along sextant s the ring runs parallel to the spoke after next.
-    here, along = SPOKES[sextant], SPOKES[(sextant + 2) % 6]
+    here, along = SPOKE_DIRECTIONS[sextant], SPOKE_DIRECTIONS[(sextant + 2) % 6]
     axial = layer[..., None] * here + step[..., None] * along
     return axial[..., 0], axial[..., 1]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.patterns import Shape, register
-from cmpdesign.patterns.graphs import TRIANGULAR
+from cmpdesign.patterns import PatternShape, register_pattern
+from cmpdesign.patterns.graphs import TRIANGULAR_GRAPHS
 from cmpdesign.patterns.numbering import Ints
 
 
-@register("round", TRIANGULAR)
-def round_(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+@register_pattern("round", TRIANGULAR_GRAPHS)
+def round_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArray[np.float64]:
     """Layers are concentric circles, one pitch apart, their markers at equal angles (the article, fig. 3c).
 
     ::

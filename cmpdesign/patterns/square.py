@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.patterns import Shape, register
-from cmpdesign.patterns.graphs import SQUARE
+from cmpdesign.patterns import PatternShape, register_pattern
+from cmpdesign.patterns.graphs import SQUARE_GRAPHS
 from cmpdesign.patterns.numbering import Ints
 
 
-@register("square", SQUARE)
-def square(layer: Ints, index: Ints, shape: Shape) -> NDArray[np.float64]:
+@register_pattern("square", SQUARE_GRAPHS)
+def square_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArray[np.float64]:
     """A black-and-white checkerboard, red at its centre; markers in rows (the article, section II).
 
     ::

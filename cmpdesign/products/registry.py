@@ -2,7 +2,7 @@
 
 A product is added by one line in ``PRODUCTS``, which names its maker as "module:function"
 so that nothing is imported before it is asked for. The maker takes ``(design, layout)`` and returns a
-``Made``: the files (path relative to the output folder -> content) and, where it has any, figures for
+``ProductFiles``: the files (path relative to the output folder -> content) and, where it has any, figures for
 ``report.json`` (they stand there under the product's name) and findings that the user should hear of.
 """
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from cmpdesign.design.design import Design
     from cmpdesign.layout.checks import Finding
     from cmpdesign.layout.layout import Layout
-    from cmpdesign.layout.report import Report
+    from cmpdesign.layout.report import DesignReport
 
 
 @dataclass(frozen=True)
-class Made:
+class ProductFiles:
     """What a product came to.
 
     Attributes:
@@ -42,7 +42,7 @@ class Made:
     pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
 
-Maker = Callable[["Design", "Layout"], Made]
+Maker = Callable[["Design", "Layout"], ProductFiles]
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,17 @@ class Product:
 
 PREVIEW, REPORT = "preview", "report"
 PRODUCTS: Mapping[str, Product] = {
-    "svg": Product("cmpdesign.products.registry:_svg", "pattern.svg", usual=True),
-    "layout": Product("cmpdesign.products.registry:_layout", "layout.json", usual=True),
+    "svg": Product("cmpdesign.products.registry:_make_svg", "pattern.svg", usual=True),
+    "layout": Product("cmpdesign.products.registry:_make_layout", "layout.json", usual=True),
     # The preview and the report are no ``Maker``s: they show what the others made and measured.
     PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
-    "laser": Product("cmpdesign.products.laser.product:product", "laser/"),
+    "laser": Product("cmpdesign.products.laser.product:make_laser", "laser/"),
     "mold": Product("cmpdesign.products.mold.make:make_mold", "mold/"),
     "mesh": Product("cmpdesign.products.mold.meshes:make_meshes", "mesh/"),
     "print": Product("cmpdesign.products.sheet.print_sheet:make_print_sheet", "print/"),
     REPORT: Product("cmpdesign.layout.report:report_to_json", "report.json", usual=True),
 }
-USUAL = ",".join(name for name, product in PRODUCTS.items() if product.usual)
+USUAL_NAMES = ",".join(name for name, product in PRODUCTS.items() if product.usual)
 
 
 def chosen_products(only: str) -> list[str]:
@@ -96,7 +96,7 @@ def product_folders() -> list[str]:
 
 
 def make_products(
-    names: Sequence[str], design: Design, layout: Layout, report: Report
+    names: Sequence[str], design: Design, layout: Layout, report: DesignReport
 ) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
     """Make the named products.
 
@@ -109,12 +109,12 @@ def make_products(
     Raises:
         CmpDesignError: one of them cannot be made; nothing has been written.
     """
-    made = {name: _maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
+    made = {name: _load_maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
     pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}
     if pictures or PREVIEW in names:
         from cmpdesign.products.drawing.preview import preview_png
 
-        made[PREVIEW] = Made({PRODUCTS[PREVIEW].where: preview_png(layout, pictures)})
+        made[PREVIEW] = ProductFiles({PRODUCTS[PREVIEW].where: preview_png(layout, pictures)})
     in_order = [made[name] for name in PRODUCTS if name in made]
     files = {path: content for product in in_order for path, content in product.files.items()}
     figures = {name: product.figures for name, product in made.items() if product.figures}
@@ -126,20 +126,20 @@ def make_products(
     return files, tuple(findings)
 
 
-def _maker(name: str) -> Maker:
+def _load_maker(name: str) -> Maker:
     module, _, function = PRODUCTS[name].maker.partition(":")
     maker: Maker = getattr(import_module(module), function)
     return maker
 
 
-def _svg(design: Design, layout: Layout) -> Made:
+def _make_svg(design: Design, layout: Layout) -> ProductFiles:
     from cmpdesign.products.drawing.svg import layout_to_svg
 
     text = layout_to_svg(layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror)
-    return Made({PRODUCTS["svg"].where: text})
+    return ProductFiles({PRODUCTS["svg"].where: text})
 
 
-def _layout(design: Design, layout: Layout) -> Made:
+def _make_layout(design: Design, layout: Layout) -> ProductFiles:
     from cmpdesign.files.layout_json import layout_to_json
 
-    return Made({PRODUCTS["layout"].where: layout_to_json(layout)})
+    return ProductFiles({PRODUCTS["layout"].where: layout_to_json(layout)})

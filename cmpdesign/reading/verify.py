@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 MIN_SHARE = 0.9
 # How far samples lie from a cell's centre towards its corners: clear of the blurred edges.
-_REACH = 0.35
+_SAMPLE_REACH = 0.35
 # Share of the inks' chroma: below it a cell shows no color of its own (glare, dust, black).
-_COLORLESS = 0.4
+_MIN_CHROMA_SHARE = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +87,22 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
     """
     if not 0 <= min_share <= 1:
         raise CmpDesignError(f"min_share is {min_share:g}; expected a share from 0 to 1")
-    return judge(reference, image, extractor.extract(image), min_share)
+    return judge_markers(reference, image, extractor.extract(image), min_share)
 
 
-def judge(reference: Reference, image: Image, markers: Markers, min_share: float = MIN_SHARE) -> Verdict:
+def judge_markers(
+    reference: Reference, image: Image, markers: Markers, min_share: float = MIN_SHARE
+) -> Verdict:
     """The verdict on an image that is extracted already."""
     status = markers.status[reference.present]
     lost, measured, repaired, fitted = (int(np.count_nonzero(status == code)) for code in range(4))
     present = len(status)
-    contradictions = color_contradictions(reference, image, markers.xy_px)
+    contradictions = find_color_contradictions(reference, image, markers.xy_px)
     reason = (
-        _not_found(markers)
-        or _wrong_colors(reference, contradictions)
-        or _wrong_side(reference, markers)
-        or _too_few(measured, present, min_share)
+        _not_found_reason(markers)
+        or _wrong_colors_reason(reference, contradictions)
+        or _wrong_side_reason(reference, markers)
+        or _too_few_reason(measured, present, min_share)
     )
     return Verdict(
         verified=reason is None,
@@ -117,7 +119,7 @@ def judge(reference: Reference, image: Image, markers: Markers, min_share: float
     )
 
 
-def _not_found(markers: Markers) -> str | None:
+def _not_found_reason(markers: Markers) -> str | None:
     if np.isfinite(markers.xy_px).all(axis=1).any():
         return None
     words = {
@@ -129,7 +131,7 @@ def _not_found(markers: Markers) -> str | None:
     return words.get(str(markers.reason), "no marker was found")
 
 
-def _wrong_colors(reference: Reference, contradictions: tuple[int, ...]) -> str | None:
+def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) -> str | None:
     if not contradictions:
         return None
     first = contradictions[0]
@@ -138,14 +140,14 @@ def _wrong_colors(reference: Reference, contradictions: tuple[int, ...]) -> str 
     return f"colors contradict the layout: cell {first}, which should be {color}{more}"
 
 
-def _wrong_side(reference: Reference, markers: Markers) -> str | None:
+def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
     if markers.mirrored == reference.mirrored:
         return None
     seen, designed = ("back", "front") if markers.mirrored else ("front", "back")
     return f"the pattern is seen from the {seen}, but designed to be seen from the {designed}"
 
 
-def _too_few(measured: int, present: int, min_share: float) -> str | None:
+def _too_few_reason(measured: int, present: int, min_share: float) -> str | None:
     # Rounding must not refuse 90 of 100 at a share of 0.9.
     if measured >= min_share * present - 1e-9:
         return None
@@ -153,7 +155,9 @@ def _too_few(measured: int, present: int, min_share: float) -> str | None:
     return f"{found}, expected at least {min_share:.1%}"
 
 
-def color_contradictions(reference: Reference, image: Image, xy_px: NDArray[np.float64]) -> tuple[int, ...]:
+def find_color_contradictions(
+    reference: Reference, image: Image, xy_px: NDArray[np.float64]
+) -> tuple[int, ...]:
     """Cells with all corners found whose color in the image is decidedly not the layout's.
 
     The inks are taken from the image: each is the median over the cells that the layout gives that color.
@@ -175,7 +179,7 @@ def color_contradictions(reference: Reference, image: Image, xy_px: NDArray[np.f
     ink_size = np.linalg.norm(ink_chroma, axis=1)
     usual = float(ink_size.min())
     nearest = (chroma @ (ink_chroma / ink_size[:, None]).T).argmax(axis=1)
-    colored = np.linalg.norm(chroma, axis=1) > _COLORLESS * usual
+    colored = np.linalg.norm(chroma, axis=1) > _MIN_CHROMA_SHARE * usual
     wrong = colored & (nearest != color) & (color != WHITE)
     return tuple(cells[wrong].tolist())
 
@@ -190,7 +194,7 @@ def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float
     import cv2
 
     centre = corners.mean(axis=1, keepdims=True)
-    points = np.concatenate([centre, centre + _REACH * (corners - centre)], axis=1).astype(np.float32)
+    points = np.concatenate([centre, centre + _SAMPLE_REACH * (corners - centre)], axis=1).astype(np.float32)
     sampled = cv2.remap(
         image, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )

@@ -50,7 +50,7 @@ def save_truth(truth: Truth, path: str | Path) -> Path:
     Raises:
         OutputError: the file cannot be written; what stood there before is unchanged.
     """
-    return _save(_columns(truth), path)
+    return _save_npz(_truth_columns(truth), path)
 
 
 def save_truths(truths: Sequence[Truth], time_s: Sequence[float], path: str | Path) -> Path:
@@ -64,15 +64,15 @@ def save_truths(truths: Sequence[Truth], time_s: Sequence[float], path: str | Pa
         values = [getattr(truth, item.name) for truth in truths]
         if all(value is not None for value in values):
             columns[item.name] = np.stack(values)
-    return _save(columns, path)
+    return _save_npz(columns, path)
 
 
-def _columns(truth: Truth) -> dict[str, Any]:
+def _truth_columns(truth: Truth) -> dict[str, Any]:
     found = {item.name: getattr(truth, item.name) for item in fields(truth)}
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _save(columns: dict[str, Any], path: str | Path) -> Path:
+def _save_npz(columns: dict[str, Any], path: str | Path) -> Path:
     path = Path(path)
     beside = path.with_name(path.name + ".part")
     try:
@@ -91,10 +91,10 @@ def load_truth(path: str | Path) -> Truth:
     Raises:
         SceneError: the file is not a truth file.
     """
-    columns = _load(path)
+    columns = _load_npz(path)
     if "time_s" in columns:
         raise SceneError(f"{path} holds the truth of a sequence; read it with load_truths")
-    return _truth(columns, path)
+    return _truth_from_columns(columns, path)
 
 
 def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
@@ -103,15 +103,15 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
     Raises:
         SceneError: the file is not the truth file of a sequence.
     """
-    columns = _load(path)
+    columns = _load_npz(path)
     if "time_s" not in columns:
         raise SceneError(f"{path} holds no sequence; read it with load_truth")
     time_s = columns.pop("time_s")
     frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
-    return [_truth(frame, path) for frame in frames], time_s
+    return [_truth_from_columns(frame, path) for frame in frames], time_s
 
 
-def _load(path: str | Path) -> dict[str, Any]:
+def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
@@ -119,7 +119,7 @@ def _load(path: str | Path) -> dict[str, Any]:
         raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error
 
 
-def _truth(columns: dict[str, Any], path: str | Path) -> Truth:
+def _truth_from_columns(columns: dict[str, Any], path: str | Path) -> Truth:
     try:
         mirrored = columns["mirrored"] if columns["mirrored"].ndim else bool(columns["mirrored"])
         return Truth(**{**columns, "mirrored": mirrored, "H": columns.get("H")})

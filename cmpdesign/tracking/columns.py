@@ -20,7 +20,7 @@ REASON = "U120"
 HEAD = ("frame", "time_s", "frame_status", "reason")  # opens every row of a long form
 
 
-class Table(Protocol):
+class FrameTable(Protocol):
     """Frames as arrays, and as a long form of one row for every frame and point.
 
     Attributes:
@@ -38,7 +38,7 @@ class Table(Protocol):
         ...
 
 
-def head(frames: Sequence[Any]) -> Columns:
+def head_columns(frames: Sequence[Any]) -> Columns:
     """What all tables say of a frame."""
     return {
         "frame": np.array([frame.index for frame in frames], np.int64),
@@ -49,7 +49,7 @@ def head(frames: Sequence[Any]) -> Columns:
     }
 
 
-def long_head(columns: Columns, count: int) -> Columns:
+def long_head_columns(columns: Columns, count: int) -> Columns:
     """``HEAD`` for ``count`` rows of every frame."""
     long: Columns = {name: np.repeat(columns[name], count) for name in ("frame", "time_s")}
     long["frame_status"] = np.repeat(np.array(FRAME_STATUS)[columns["frame_status"]], count)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.files.video import CODECS, Video
+from cmpdesign.files.video import CODECS, VideoWriter
 
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
@@ -24,7 +24,7 @@ WHITE_BGR = (255, 255, 255)
 FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
 
 
-class Overlay:
+class OverlayWriter:
     """Writes beside the file's place; ``close`` completes it.
 
     Raises:
@@ -35,7 +35,7 @@ class Overlay:
     def __init__(self, path: Path, reference: Reference, fps: float) -> None:
         if path.suffix not in CODECS:
             raise CmpDesignError(f"--overlay {path}: unknown ending; expected one of {', '.join(CODECS)}")
-        self._video = Video(path, fps)
+        self._video = VideoWriter(path, fps)
         self._reference = reference
         self._size: tuple[int, int] | None = None
 
@@ -43,7 +43,7 @@ class Overlay:
         picture = draw_frame(image, self._reference, frame, rest, self._size or EMPTY_SIZE)
         if self._size is None:
             self._size = (picture.shape[1], picture.shape[0])
-        self._video.add(_fitted(picture, self._size))
+        self._video.add(_fit_picture(picture, self._size))
 
     def close(self) -> None:
         self._video.close()
@@ -65,11 +65,11 @@ def draw_frame(
         picture = draw_markers(image, reference, frame.markers)
         if rest is not None:
             _draw_arrows(picture, rest.xy_px, frame.markers.xy_px, picture.shape[1] // image.shape[1])
-    _caption(picture, _said(frame))
+    _draw_caption(picture, _frame_text(frame))
     return picture
 
 
-def _said(frame: Tracked) -> str:
+def _frame_text(frame: Tracked) -> str:
     time = "" if np.isnan(frame.time_s) else f"  {frame.time_s:.3f} s"
     start = f"  {frame.start}" if frame.start else ""
     reason = f"  {frame.reason}" if frame.reason else ""
@@ -87,7 +87,7 @@ def _draw_arrows(
     cv2.polylines(picture, list(fixed), False, ARROW_BGR, 1, cv2.LINE_AA, FIXED_BITS)
 
 
-def _caption(picture: Picture, text: str) -> None:
+def _draw_caption(picture: Picture, text: str) -> None:
     import cv2
 
     size = float(np.clip(picture.shape[1] / 1600, 0.4, 1.0))
@@ -97,7 +97,7 @@ def _caption(picture: Picture, text: str) -> None:
     cv2.putText(picture, ascii_text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
 
 
-def _fitted(picture: Picture, size: tuple[int, int]) -> Picture:
+def _fit_picture(picture: Picture, size: tuple[int, int]) -> Picture:
     """In the middle of a picture of the video's size, as large as fits."""
     import cv2
 

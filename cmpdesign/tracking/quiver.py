@@ -32,12 +32,12 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     import cv2
 
     known = np.isfinite(frame.displacement_px[:, 0])
-    scale, offset = _frame_of(rest.xy_px)
+    scale, offset = _drawing_scale(rest.xy_px)
     points = (rest.xy_px - offset) * scale + MARGIN_PX
     size = np.nanmax(points, axis=0) + MARGIN_PX
     canvas = np.full((int(size[1]) + FOOT_PX, int(size[0]), 3), 255, np.uint8)
     lines = points[reference.edges]
-    _polylines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], GRID_BGR, 1)
+    _draw_polylines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], GRID_BGR, 1)
     length = np.linalg.norm(frame.displacement_px[known], axis=1)
     largest = float(length.max()) if len(length) else 0.0
     magnification = _magnification(lines, largest * scale)
@@ -45,12 +45,12 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     shade = np.round(255 * length / max(largest, 1e-12)).astype(np.uint8)
     colors = cv2.applyColorMap(shade[:, None], cv2.COLORMAP_VIRIDIS)[:, 0] if len(shade) else shade
     for start, tip, color in zip(points[known], tips, colors, strict=True):
-        _arrow(canvas, start, tip, tuple(int(c) for c in color))
-    _foot(canvas, frame, largest, magnification)
+        _draw_arrow(canvas, start, tip, tuple(int(c) for c in color))
+    _draw_footer(canvas, frame, largest, magnification)
     return canvas
 
 
-def _frame_of(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+def _drawing_scale(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     low, high = np.nanmin(xy_px, axis=0), np.nanmax(xy_px, axis=0)
     return (SIDE_PX - 2 * MARGIN_PX) / max(float((high - low).max()), 1.0), low
 
@@ -60,25 +60,25 @@ def _magnification(lines: NDArray[np.float64], longest: float) -> int:
     return max(1, int(LONGEST_EDGES * edge / max(longest, 1e-9))) if longest > 0 else 1
 
 
-def _polylines(canvas: Picture, lines: NDArray[np.float64], color: Any, thickness: int) -> None:
+def _draw_polylines(canvas: Picture, lines: NDArray[np.float64], color: Any, thickness: int) -> None:
     import cv2
 
     fixed = np.round(lines * (1 << FIXED_BITS)).astype(np.int32)
     cv2.polylines(canvas, list(fixed), False, color, thickness, cv2.LINE_AA, FIXED_BITS)
 
 
-def _arrow(canvas: Picture, start: NDArray[np.float64], tip: NDArray[np.float64], color: Any) -> None:
+def _draw_arrow(canvas: Picture, start: NDArray[np.float64], tip: NDArray[np.float64], color: Any) -> None:
     along = tip - start
     length = float(np.hypot(*along))
     if length < 0.5:
         return
     back = along / length * min(0.35 * length, 9.0)
     side = 0.5 * np.array([-back[1], back[0]])
-    _polylines(canvas, np.stack([start, tip])[None], color, 2)
-    _polylines(canvas, np.stack([tip - back + side, tip, tip - back - side])[None], color, 2)
+    _draw_polylines(canvas, np.stack([start, tip])[None], color, 2)
+    _draw_polylines(canvas, np.stack([tip - back + side, tip, tip - back - side])[None], color, 2)
 
 
-def _foot(canvas: Picture, frame: Tracked, largest_px: float, magnification: int) -> None:
+def _draw_footer(canvas: Picture, frame: Tracked, largest_px: float, magnification: int) -> None:
     import cv2
 
     height, width = canvas.shape[:2]

@@ -11,37 +11,37 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
-from cmpdesign.tracking.overlay import Overlay
-from cmpdesign.tracking.sinks import Sink
-from cmpdesign.tracking.sources import Source, open_source
+from cmpdesign.tracking.overlay import OverlayWriter
+from cmpdesign.tracking.sinks import FrameSink
+from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:
     from extractor import Markers, Reference
 
 
 @dataclass(eq=False)
-class Stop:
+class StopRequest:
     """Set from outside, looked at between two frames, so that no frame is torn."""
 
     asked: bool = False
 
 
 @dataclass(eq=False)
-class Run:
+class TrackingRun:
     """One run's parts. ``tally`` and ``ended_early`` tell how it went.
 
     ``tracker`` makes a frame of an image, a time stamp and a problem; ``tally`` counts frames: a ``Tracker`` and a
     ``Tally``, or a ``ShapeTracker`` and a ``ShapeTally``.
     """
 
-    source: Source
+    source: FrameSource
     tracker: Any
-    sink: Sink
+    sink: FrameSink
     tally: Any
-    overlay: Overlay | None = None
+    overlay: OverlayWriter | None = None
     limit: int | None = None
     ended_early: str = ""
-    stop: Stop = field(default_factory=Stop)
+    stop: StopRequest = field(default_factory=StopRequest)
 
     def go(self, watch: Callable[[Any], None]) -> None:
         """Track to the end; ``watch`` sees every frame.
@@ -87,7 +87,7 @@ class Run:
 
 
 @contextmanager
-def stopped_by_hand(stop: Stop) -> Iterator[None]:
+def stop_on_signal(stop: StopRequest) -> Iterator[None]:
     """Ctrl-C and a request to terminate end the run after the current frame; a second one ends it at once."""
 
     def ask(number: int, frame: Any) -> None:
@@ -103,7 +103,7 @@ def stopped_by_hand(stop: Stop) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def rest_markers(text: str, source: str, reference: Reference, fps: float | None) -> Markers:
+def read_rest_markers(text: str, source: str, reference: Reference, fps: float | None) -> Markers:
     """The markers at rest: of a frame of the source by its number, or of an image file.
 
     Raises:
@@ -111,27 +111,27 @@ def rest_markers(text: str, source: str, reference: Reference, fps: float | None
     """
     from extractor import Extractor
 
-    markers = Extractor(reference).extract(rest_image(text, source, fps))
+    markers = Extractor(reference).extract(read_rest_image(text, source, fps))
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
     return markers
 
 
-def rest_image(text: str, source: str, fps: float | None) -> Any:
+def read_rest_image(text: str, source: str, fps: float | None) -> Any:
     """The picture at rest: a frame of the source by its number, or an image file.
 
     Raises:
         CmpDesignError: there is no such frame or image.
     """
-    image = _frame_at(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
+    image = _read_frame(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
     if image is None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: {name} cannot be read; choose another")
     return image
 
 
-def _frame_at(number: int, text: str, fps: float | None) -> Any:
+def _read_frame(number: int, text: str, fps: float | None) -> Any:
     source = open_source(text, fps)
     if source.name.startswith("camera"):
         raise CmpDesignError(

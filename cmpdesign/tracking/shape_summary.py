@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from extractor.space.views import ShapeFrame
 
 
-class ShapeTally:
+class ShapeStatistics:
     """Counts of a reconstructor's frames."""
 
     def __init__(self, reconstructor: Reconstructor) -> None:

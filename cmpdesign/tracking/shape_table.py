@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import HEAD, Columns, head, long_head
+from cmpdesign.tracking.columns import HEAD, Columns, head_columns, long_head_columns
 
 if TYPE_CHECKING:
     from extractor.space.reconstruction import Reconstructor, Shape
@@ -41,9 +41,9 @@ class ShapeTable:
 
     def batch(self, frames: Sequence[ShapeFrame]) -> Columns:
         shapes = [frame.shape for frame in frames]
-        columns = head(frames)
-        columns["status"] = np.stack([_joined(s.status, s.virtual_status) for s in shapes])
-        columns["point_reason"] = np.stack([_reasons(s) for s in shapes])
+        columns = head_columns(frames)
+        columns["status"] = np.stack([_join_virtual(s.status, s.virtual_status) for s in shapes])
+        columns["point_reason"] = np.stack([_reason_texts(s) for s in shapes])
         columns["misfit"] = np.stack([s.misfit for s in shapes]).astype(np.float32)
         for name in TRIPLES:
             columns[name] = np.stack([s.tac3d[name] for s in shapes]).astype(np.float32)
@@ -75,21 +75,21 @@ class ShapeTable:
         }
 
 
-def _joined(status: np.ndarray, virtual: np.ndarray) -> np.ndarray:
+def _join_virtual(status: np.ndarray, virtual: np.ndarray) -> np.ndarray:
     return np.concatenate([status, virtual.ravel()])
 
 
-def _reasons(shape: Shape) -> np.ndarray:
+def _reason_texts(shape: Shape) -> np.ndarray:
     from extractor import PointReason
 
     lost = shape.virtual_status.ravel() == 0
     return np.concatenate([shape.reason, np.where(lost, PointReason.SURROUNDINGS, 0).astype(np.uint8)])
 
 
-def long_form(columns: Columns, fixed: Columns) -> Columns:
+def shape_long_form(columns: Columns, fixed: Columns) -> Columns:
     """One row for every frame and point, lost ones too; triples become columns of their own."""
     frames, count = columns["status"].shape
-    long = long_head(columns, count)
+    long = long_head_columns(columns, count)
     long["point"] = np.tile(np.arange(count, dtype=np.int32), frames)
     long["edge"] = np.tile(fixed["edge"], frames)
     long["status"], long["point_reason"] = columns["status"].reshape(-1), columns["point_reason"].reshape(-1)

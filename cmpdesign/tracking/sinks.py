@@ -1,7 +1,8 @@
 """Where frames go, as they come: whatever happens, what was written so far can be read.
 
 CSV grows beside its place as ``FILE.part``. NPZ and Parquet cannot grow: their frames go to ``FILE.part/``, a folder
-of chunks, each of them an .npz of its own, and are assembled at the end. A killed run leaves these for ``recover``.
+of chunks, each of them an .npz of its own, and are assembled at the end. A killed run leaves these for
+``recover_table``.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.tracking.columns import HEAD, Columns, Table
-from cmpdesign.tracking.table import long_form_of
+from cmpdesign.tracking.columns import HEAD, Columns, FrameTable
+from cmpdesign.tracking.table import table_long_form
 
 CHUNK_FRAMES = 256
 CHUNK_S = 5.0  # what a crash can cost
 KINDS = (".npz", ".parquet", ".csv")
 
 
-class Sink(Protocol):
+class FrameSink(Protocol):
     """A table that is written frame by frame.
 
     ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says how many frames are where.
@@ -38,7 +39,7 @@ class Sink(Protocol):
     def kept(self) -> str: ...
 
 
-def open_sink(path: Path, table: Table) -> Sink:
+def open_sink(path: Path, table: FrameTable) -> FrameSink:
     """The sink for a file's ending.
 
     Raises:
@@ -46,7 +47,7 @@ def open_sink(path: Path, table: Table) -> Sink:
         OutputError: nothing can be written there.
     """
     _require_kind(path)
-    part = _part(path)
+    part = _part_path(path)
     if part.exists():
         raise CmpDesignError(
             f"{part} holds the frames of an interrupted run; call with --recover, or delete it"
@@ -60,7 +61,7 @@ def open_sink(path: Path, table: Table) -> Sink:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
-def recover(path: Path) -> int:
+def recover_table(path: Path) -> int:
     """Make the file that an interrupted run left in pieces; returns how many frames it has.
 
     Raises:
@@ -68,20 +69,20 @@ def recover(path: Path) -> int:
         OutputError: the file cannot be written; the pieces are still there.
     """
     _require_kind(path)
-    part = _part(path)
+    part = _part_path(path)
     if not part.exists():
         raise CmpDesignError(f"{part}: there is nothing to recover")
     try:
         if path.suffix == ".csv":
-            rows = _cut_to_whole_lines(part)
+            rows = _truncate_to_whole_lines(part)
             part.replace(path)
             return rows
-        return _assemble(part, path)
+        return _assemble_chunks(part, path)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); {part} is kept") from None
 
 
-def _part(path: Path) -> Path:
+def _part_path(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
@@ -106,16 +107,16 @@ def _pyarrow() -> Any:
 class CsvSink:
     """The long form as text, flushed frame by frame; a frame that does not fit on the disk is cut off again."""
 
-    def __init__(self, path: Path, table: Table) -> None:
-        self._path, self._part, self._table = path, _part(path), table
+    def __init__(self, path: Path, table: FrameTable) -> None:
+        self._path, self._part, self._table = path, _part_path(path), table
         self._file = self._part.open("xb", buffering=0)
         self._end, self._frames = 0, 0
         self._write((",".join((*HEAD, *self._table.digits)) + "\n").encode())
 
     def add(self, frame: Any) -> None:
-        columns = long_form_of(self._table.batch([frame]), self._table.about())
+        columns = table_long_form(self._table.batch([frame]), self._table.about())
         try:
-            self._write(_lines(columns, self._table.digits))
+            self._write(_csv_lines(columns, self._table.digits))
             self._frames += 1
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
@@ -142,25 +143,26 @@ class CsvSink:
         return f"{self._frames} frames are kept in {self._part if self._part.exists() else self._path}"
 
 
-def _lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
+def _csv_lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
     """A frame's rows; an empty field where nothing is known."""
     reason = io.StringIO()
     csv.writer(reason, lineterminator="").writerow([columns["reason"][0]])
-    head = f"{columns['frame'][0]},{_number(columns['time_s'][0], 6)},{columns['frame_status'][0]},{reason.getvalue()},"
+    time_s, status = _format_number(columns["time_s"][0], 6), columns["frame_status"][0]
+    head = f"{columns['frame'][0]},{time_s},{status},{reason.getvalue()},"
     if not columns["reason"][0]:
         head = head.replace('""', "")
     cells = [
-        [_number(v, places) if places else str(v) for v in columns[name].tolist()]
+        [_format_number(v, places) if places else str(v) for v in columns[name].tolist()]
         for name, places in digits.items()
     ]
     return "".join(head + ",".join(row) + "\n" for row in zip(*cells, strict=True)).encode()
 
 
-def _number(value: float, digits: int) -> str:
+def _format_number(value: float, digits: int) -> str:
     return "" if value != value else f"{value:.{digits}f}"
 
 
-def _cut_to_whole_lines(part: Path) -> int:
+def _truncate_to_whole_lines(part: Path) -> int:
     """Cut a line that was being written; returns how many frames have all their rows."""
     with part.open("r+b") as file:
         data = file.read()
@@ -173,8 +175,8 @@ def _cut_to_whole_lines(part: Path) -> int:
 class ChunkSink:
     """Frames in chunks of some seconds, assembled at the end."""
 
-    def __init__(self, path: Path, table: Table) -> None:
-        self._path, self._part, self._table = path, _part(path), table
+    def __init__(self, path: Path, table: FrameTable) -> None:
+        self._path, self._part, self._table = path, _part_path(path), table
         self._part.mkdir()
         self._frames: list[Any] = []
         self._chunks, self._kept = 0, 0
@@ -187,7 +189,7 @@ class ChunkSink:
 
     def _flush(self) -> None:
         try:
-            _save(self._part / "about.npz", self._table.about())
+            _save_chunk(self._part / "about.npz", self._table.about())
             if self._frames:
                 self._save(self._frames)
         except OSError as error:
@@ -197,7 +199,7 @@ class ChunkSink:
     def _save(self, frames: list[Any]) -> None:
         """As one chunk; where it does not fit, as two halves, so that a full disk takes what it can."""
         try:
-            _save(self._part / f"{self._chunks:06d}.npz", self._table.batch(frames))
+            _save_chunk(self._part / f"{self._chunks:06d}.npz", self._table.batch(frames))
         except OSError:
             if len(frames) == 1:
                 raise
@@ -211,7 +213,7 @@ class ChunkSink:
     def close(self) -> None:
         self._flush()
         try:
-            _assemble(self._part, self._path)
+            _assemble_chunks(self._part, self._path)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
@@ -221,7 +223,7 @@ class ChunkSink:
         return f"{self._kept} frames are kept in {self._part}; make room, then call with --recover"
 
 
-def _save(path: Path, columns: Columns) -> None:
+def _save_chunk(path: Path, columns: Columns) -> None:
     """A chunk is there whole or not at all."""
     beside = path.with_suffix(".new")
     try:
@@ -233,20 +235,20 @@ def _save(path: Path, columns: Columns) -> None:
         raise
 
 
-def _chunks(part: Path) -> Iterator[Columns]:
+def _read_chunks(part: Path) -> Iterator[Columns]:
     """The chunks in order, one in memory at a time."""
     for path in sorted(part.glob("[0-9]*.npz")):
         with np.load(path, allow_pickle=False) as file:
             yield {name: file[name] for name in file.files}
 
 
-def _assemble(part: Path, path: Path) -> int:
+def _assemble_chunks(part: Path, path: Path) -> int:
     """The chunks as one file; they are removed when it is complete. Returns the number of frames."""
     with np.load(part / "about.npz", allow_pickle=False) as file:
         fixed = {name: file[name] for name in file.files}
     beside = part / ("whole" + path.suffix)
     try:
-        frames = (_to_npz if path.suffix == ".npz" else _to_parquet)(part, beside, fixed)
+        frames = (_write_npz if path.suffix == ".npz" else _write_parquet)(part, beside, fixed)
     except OSError:
         beside.unlink(missing_ok=True)
         raise
@@ -255,19 +257,19 @@ def _assemble(part: Path, path: Path) -> int:
     return frames
 
 
-def _to_npz(part: Path, path: Path, fixed: Columns) -> int:
+def _write_npz(part: Path, path: Path, fixed: Columns) -> int:
     """Array by array and chunk by chunk, so that an hour of frames needs no more memory than a chunk."""
     import zipfile
 
     shapes: dict[str, tuple[np.dtype[Any], list[int]]] = {}
     frames = 0
-    for columns in _chunks(part):
+    for columns in _read_chunks(part):
         for name, values in columns.items():
             shapes.setdefault(name, (values.dtype, list(values.shape)))
         frames += len(columns["frame"])
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, values in fixed.items():
-            with archive.open(_member(name), "w", force_zip64=True) as file:
+            with archive.open(_zip_member(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, np.asarray(values), allow_pickle=False)
         for name, (dtype, shape) in shapes.items():
             header = {
@@ -275,14 +277,14 @@ def _to_npz(part: Path, path: Path, fixed: Columns) -> int:
                 "fortran_order": False,
                 "shape": (frames, *shape[1:]),
             }
-            with archive.open(_member(name), "w", force_zip64=True) as file:
+            with archive.open(_zip_member(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array_header_1_0(file, header)
-                for columns in _chunks(part):
+                for columns in _read_chunks(part):
                     file.write(np.ascontiguousarray(columns[name]).tobytes())
     return frames
 
 
-def _member(name: str) -> Any:
+def _zip_member(name: str) -> Any:
     """A zip member without a date."""
     import zipfile
 
@@ -291,13 +293,13 @@ def _member(name: str) -> Any:
     return member
 
 
-def _to_parquet(part: Path, path: Path, fixed: Columns) -> int:
+def _write_parquet(part: Path, path: Path, fixed: Columns) -> int:
     """The long form, a row group for every chunk."""
     arrow = _pyarrow()
     frames, writer = 0, None
     try:
-        for columns in _chunks(part):
-            long = long_form_of(columns, fixed)
+        for columns in _read_chunks(part):
+            long = table_long_form(columns, fixed)
             arrays = {
                 name: arrow.array(values, from_pandas=values.dtype.kind == "f")
                 for name, values in long.items()

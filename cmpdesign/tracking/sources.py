@@ -12,9 +12,9 @@ from typing import Any, Protocol
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, read_image
 
-IMAGES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
+IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
-PATIENCE = 10  # frames that may fail one after the other before a stream counts as ended
+MAX_FAILED_READS = 10  # frames that may fail one after the other before a stream counts as ended
 
 
 class SourceError(CmpDesignError, ValueError):
@@ -22,7 +22,7 @@ class SourceError(CmpDesignError, ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class SourceFrame:
     """What a source hands on: an image (of several sources: a list of them), or None and why there is none."""
 
     time_s: float
@@ -30,7 +30,7 @@ class Frame:
     problem: str = ""
 
 
-class Source(Protocol):
+class FrameSource(Protocol):
     """A sequence of frames that is read once.
 
     Attributes:
@@ -45,10 +45,10 @@ class Source(Protocol):
     fps: float | None
     ended_early: str
 
-    def frames(self) -> Iterator[Frame]: ...
+    def frames(self) -> Iterator[SourceFrame]: ...
 
 
-def open_source(text: str, fps: float | None = None) -> Source:
+def open_source(text: str, fps: float | None = None) -> FrameSource:
     """The source that a text names: a number is a camera, else a folder of images or a video file.
 
     Args:
@@ -59,20 +59,24 @@ def open_source(text: str, fps: float | None = None) -> Source:
     """
     path = Path(text)
     if text.isdecimal() and not path.exists():
-        return Camera(int(text))
+        return CameraSource(int(text))
     if path.is_dir():
-        return Folder(path, fps or DEFAULT_FPS)
-    return Video(path, fps)
+        return FolderSource(path, fps or DEFAULT_FPS)
+    return VideoSource(path, fps)
 
 
-def open_sources(text: str, fps: float | None = None) -> Source:
+def open_sources(text: str, fps: float | None = None) -> FrameSource:
     """The source that a text names, or several, one for each view, where it is a list with commas.
 
     Raises:
         SourceError: nothing to track there.
     """
     names = split_list(text)
-    return Several([open_source(name, fps) for name in names]) if len(names) > 1 else open_source(text, fps)
+    return (
+        MultiViewSource([open_source(name, fps) for name in names])
+        if len(names) > 1
+        else open_source(text, fps)
+    )
 
 
 def split_list(text: str) -> list[str]:
@@ -80,17 +84,17 @@ def split_list(text: str) -> list[str]:
     return [text] if Path(text).exists() else text.split(",")
 
 
-class Several:
+class MultiViewSource:
     """Sources that run side by side, one for each view; they end together with the shortest of them."""
 
-    def __init__(self, sources: list[Source]) -> None:
+    def __init__(self, sources: list[FrameSource]) -> None:
         self._sources = sources
         self.name, self.ended_early = " and ".join(source.name for source in sources), ""
         totals = [source.total for source in sources if source.total is not None]
         self.total = min(totals) if totals else None
         self.fps = sources[0].fps
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[SourceFrame]:
         """The first source's time stamps; a frame that one of them lacks is None in the list."""
         streams = [source.frames() for source in self._sources]
         while True:
@@ -99,7 +103,7 @@ class Several:
             if len(together) < len(frames):
                 break
             problems = [frame.problem for frame in together if frame.problem]
-            yield Frame(together[0].time_s, [frame.image for frame in together], "; ".join(problems))
+            yield SourceFrame(together[0].time_s, [frame.image for frame in together], "; ".join(problems))
         said = [source.ended_early for source in self._sources if source.ended_early]
         if together and not said:
             short = [
@@ -109,31 +113,35 @@ class Several:
         self.ended_early = "; ".join(said)
 
 
-class Folder:
+class FolderSource:
     """The images of a folder in the order of their names, numbers in them counted as numbers."""
 
     def __init__(self, path: Path, fps: float) -> None:
         try:
-            self.paths = sorted((p for p in path.iterdir() if p.suffix.lower() in IMAGES), key=_natural)
+            self.paths = sorted(
+                (p for p in path.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES), key=_natural_sort_key
+            )
         except OSError as error:
             raise SourceError(f"{path}: cannot be read ({error.strerror or error})") from None
         if not self.paths:
-            raise SourceError(f"{path}: holds no image; expected files ending in {', '.join(sorted(IMAGES))}")
+            raise SourceError(
+                f"{path}: holds no image; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
+            )
         self.name, self.ended_early = str(path), ""
         self.total: int | None = len(self.paths)
         self.fps: float | None = fps
         self._fps = fps
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[SourceFrame]:
         for index, path in enumerate(self.paths):
             time_s = index / self._fps
             try:
-                yield Frame(time_s, read_image(path))
+                yield SourceFrame(time_s, read_image(path))
             except ImageFileError as error:
-                yield Frame(time_s, None, str(error))
+                yield SourceFrame(time_s, None, str(error))
 
 
-def _natural(path: Path) -> list[tuple[int, int | str]]:
+def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
     """Sorts frame2 before frame10."""
     parts: list[tuple[int, int | str]] = []
     digits = ""
@@ -148,7 +156,7 @@ def _natural(path: Path) -> list[tuple[int, int | str]]:
     return parts
 
 
-class Video:
+class VideoSource:
     """A video file, read by OpenCV; time stamps are the file's own, or counted at ``fps`` where that is given."""
 
     def __init__(self, path: Path, fps: float | None) -> None:
@@ -156,7 +164,7 @@ class Video:
             raise SourceError(
                 f"{path}: no such file or folder; expected a video, a folder of images or a camera's number"
             )
-        self._capture = _capture(str(path))
+        self._capture = _open_capture(str(path))
         if not self._capture.isOpened():
             raise SourceError(
                 f"{path}: is not a video that can be read, or its end with the index is missing"
@@ -170,13 +178,13 @@ class Video:
         self.fps = fps or (own if 0 < own < 1e5 else None)
         self._counted = fps is not None
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[SourceFrame]:
         """Every frame that comes out; one in the middle that cannot be decoded is handed on as unreadable."""
         import cv2
 
         index, failed = 0, 0
         try:
-            while failed < PATIENCE:
+            while failed < MAX_FAILED_READS:
                 good, image = self._capture.read()
                 if not good or image is None:
                     if self.total is None or index + failed >= self.total:
@@ -184,11 +192,11 @@ class Video:
                     failed += 1
                     continue
                 for _ in range(failed):
-                    yield Frame(self._time(index), None, "cannot be decoded")
+                    yield SourceFrame(self._time(index), None, "cannot be decoded")
                     index += 1
                 failed = 0
                 time_s = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1e3
-                yield Frame(self._time(index) if self._counted or time_s < 0 else time_s, image)
+                yield SourceFrame(self._time(index) if self._counted or time_s < 0 else time_s, image)
                 index += 1
         finally:
             self._capture.release()
@@ -199,11 +207,11 @@ class Video:
         return index / self.fps if self.fps else float("nan")
 
 
-class Camera:
+class CameraSource:
     """A camera by its number; time stamps are taken when a frame arrives, counted from the first one."""
 
     def __init__(self, number: int) -> None:
-        self._capture = _capture(number)
+        self._capture = _open_capture(number)
         if not self._capture.isOpened():
             raise SourceError(
                 f"camera {number} cannot be opened; is it connected, and free of other programs?"
@@ -212,28 +220,28 @@ class Camera:
         self.total: int | None = None
         self.fps: float | None = None
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[SourceFrame]:
         """Until the camera stops, or for ever."""
         start: float | None = None
         failed, index = 0, 0
         try:
-            while failed < PATIENCE:
+            while failed < MAX_FAILED_READS:
                 good, image = self._capture.read()
                 now = time.monotonic()
                 start = now if start is None else start
                 if good and image is not None:
                     failed = 0
-                    yield Frame(now - start, image)
+                    yield SourceFrame(now - start, image)
                 else:
                     failed += 1
-                    yield Frame(now - start, None, "the camera gave no image")
+                    yield SourceFrame(now - start, None, "the camera gave no image")
                 index += 1
         finally:
             self._capture.release()
         self.ended_early = f"the camera stopped after {index - failed} frames"
 
 
-def _capture(source: str | int) -> Any:
+def _open_capture(source: str | int) -> Any:
     """OpenCV's reader, which would tell on stderr of every damaged frame; a frame's status says it."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     import cv2

@@ -16,7 +16,7 @@ AT_REST_PX = 0.2  # median displacement below which the pattern counts as restin
 MIN_REST_PAIRS = 10  # resting frames after resting frames, below which no jitter is stated
 
 
-class Tally:
+class TrackStatistics:
     """Counts; ``farthest`` is the frame with the largest RMS displacement, for the quiver plot."""
 
     def __init__(self, reference: Reference) -> None:
@@ -101,7 +101,7 @@ class Tally:
             "frames_per_s": {
                 name: 1e3 / ms if ms else None for name, ms in percentiles(self._elapsed_ms).items()
             },
-            "rest": _rest(rest),
+            "rest": _rest_json(rest),
             "jitter_px": self.jitter_px,
             "jitter_pairs": self._pairs,
             "largest_displacement": self._largest_json(),
@@ -120,7 +120,7 @@ def percentiles(elapsed_ms: list[float]) -> dict[str, float]:
     return dict(zip(("p50", "p95", "p99"), (float(v) for v in values), strict=True))
 
 
-def _rest(rest: Rest | None) -> dict[str, Any] | None:
+def _rest_json(rest: Rest | None) -> dict[str, Any] | None:
     if rest is None:
         return None
     residual = rest.residual_mm

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import HEAD, Columns, head, long_head
+from cmpdesign.tracking.columns import HEAD, Columns, head_columns, long_head_columns
 
 if TYPE_CHECKING:
     from extractor.track.tracker import Tracked, Tracker
@@ -29,26 +29,26 @@ class TrackTable:
         self._tracker = tracker
 
     def batch(self, frames: Sequence[Tracked]) -> Columns:
-        return batch(frames)
+        return frame_columns(frames)
 
     def about(self) -> Columns:
-        return about(self._tracker)
+        return fixed_columns(self._tracker)
 
 
-def long_form_of(columns: Columns, fixed: Columns) -> Columns:
+def table_long_form(columns: Columns, fixed: Columns) -> Columns:
     """The long form of frames, whichever table they are of."""
     if str(fixed["format"]) == "cmp-reconstruction":
-        from cmpdesign.tracking.shape_table import long_form as of_shapes
+        from cmpdesign.tracking.shape_table import shape_long_form as of_shapes
 
         return of_shapes(columns, fixed)
-    return long_form(columns, fixed)
+    return track_long_form(columns, fixed)
 
 
-def batch(frames: Sequence[Tracked]) -> Columns:
+def frame_columns(frames: Sequence[Tracked]) -> Columns:
     """Frames as columns: F frames by M markers."""
     cov = np.stack([frame.markers.cov_px2 for frame in frames])
     return {
-        **head(frames),
+        **head_columns(frames),
         "start": np.array([frame.start or "" for frame in frames], "U20"),
         "status": np.stack([frame.markers.status for frame in frames]),
         "xy_px": np.stack([frame.markers.xy_px for frame in frames]),
@@ -58,7 +58,7 @@ def batch(frames: Sequence[Tracked]) -> Columns:
     }
 
 
-def about(tracker: Tracker) -> Columns:
+def fixed_columns(tracker: Tracker) -> Columns:
     """The layout, and the rest frame as far as it is known by now."""
     reference, rest = tracker.layout, tracker.rest
     unknown = np.full((3, 3), np.nan)
@@ -77,7 +77,7 @@ def about(tracker: Tracker) -> Columns:
     }
 
 
-def long_form(columns: Columns, fixed: Columns) -> Columns:
+def track_long_form(columns: Columns, fixed: Columns) -> Columns:
     """One row for every frame and marker, lost ones too; pairs become columns of their own."""
     frames, count = columns["status"].shape
     pairs = {
@@ -85,7 +85,7 @@ def long_form(columns: Columns, fixed: Columns) -> Columns:
         "displacement_px": ("dx_px", "dy_px"),
         "displacement_mm": ("dx_mm", "dy_mm"),
     }
-    long = long_head(columns, count)
+    long = long_head_columns(columns, count)
     long["marker"] = np.tile(np.arange(count, dtype=np.int32), frames)
     long["layer"], long["index"] = np.tile(fixed["layer"], frames), np.tile(fixed["index"], frames)
     long["status"] = columns["status"].reshape(-1)

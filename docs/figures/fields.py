@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from cmpdesign.design.design import Design, Palette, design_schema
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.units import ANGLES_DEG, LENGTHS_MM
 
 BEGIN, END = "<!-- {}: written by python -m docs.figures -->", "<!-- end of {} -->"
@@ -91,7 +91,7 @@ def _takes(name: str, schema: dict[str, Any]) -> str:
     if "$ref" in schema:
         return "a table"
     if name == "pattern":
-        return ", ".join(f'`"{pattern}"`' for pattern in patterns())
+        return ", ".join(f'`"{pattern}"`' for pattern in registered_patterns())
     options = [option for option in schema.get("anyOf", [schema]) if option.get("type") != "null"]
     nested = [inner for option in options for inner in option.get("anyOf", [option])]
     words = [_kind(name, inner) for inner in nested]

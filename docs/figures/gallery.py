@@ -8,8 +8,8 @@ import numpy as np
 from cmpdesign.design.design import load_design
 from cmpdesign.design.templates import templates
 from cmpdesign.layout.build import build_layout
-from cmpdesign.layout.report import report
-from cmpdesign.patterns import patterns
+from cmpdesign.layout.report import design_report
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.products.drawing.preview import MARGIN_PX, TITLE_PX, draw_preview
 
 WIDTH_PX = 520
@@ -37,14 +37,17 @@ smallest feature  0.866 mm (circle inside the narrowest cell)
 
 def figures() -> dict[str, bytes]:
     """File name -> PNG."""
-    shown = {f"pattern-{name}.png": _preview(name, {"layers": str(PATTERN_LAYERS)}) for name in patterns()}
+    shown = {
+        f"pattern-{name}.png": _preview(name, {"layers": str(PATTERN_LAYERS)})
+        for name in registered_patterns()
+    }
     return shown | {f"template-{name}.png": _preview(name, {}) for name in templates()}
 
 
 def page() -> str:
     """docs/gallery.md."""
     parts = [HEAD, "\n## Patterns\n"]
-    for name, pattern in patterns().items():
+    for name, pattern in registered_patterns().items():
         options = ", ".join(f"`{option}`" for option in sorted(pattern.options))
         note = f"Options of its own: {options}." if options else "No options of its own."
         parts.append(
@@ -58,7 +61,7 @@ def page() -> str:
 
 def _template(name: str) -> str:
     design = load_design(name)
-    figures = report(design, build_layout(design))
+    figures = design_report(design, build_layout(design))
     width, height = figures.size_mm
     return (
         f"\n### {name}\n\n{design.description}\n\n"

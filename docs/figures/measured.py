@@ -5,24 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
-from benchmarks.suites.comparison.measure import Result
-from benchmarks.suites.comparison.report import markdown, picture
-from benchmarks.support.machine import sentence
-from benchmarks.support.published import measured, pages_with
+from benchmarks.suites.comparison.measure import MethodResult
+from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture
+from benchmarks.support.machine import conditions_text
+from benchmarks.support.published import read_measured, updated_pages
 
 
-def _compared() -> list[Result]:
-    return [Result(**row) for row in measured("comparison")["results"]]
+def _compared() -> list[MethodResult]:
+    return [MethodResult(**row) for row in read_measured("comparison")["results"]]
 
 
 def figures() -> dict[str, bytes]:
     """Name in docs/images -> PNG."""
-    return {"speed-error.png": picture(_compared())}
+    return {"speed-error.png": comparison_picture(_compared())}
 
 
 def pages() -> dict[Path, str]:
     """README and the pages of docs/ that show a measured table."""
-    precise = [accuracy.Result(**row) for row in measured("accuracy")["results"]]
-    conditions = sentence(measured("comparison")["conditions"])
-    blocks = {"comparison": markdown(_compared()), "conditions": conditions}
-    return pages_with(blocks | accuracy.blocks(precise) | extraction.markdown(measured("extraction")))
+    precise = [accuracy.AccuracyResult(**row) for row in read_measured("accuracy")["results"]]
+    conditions = conditions_text(read_measured("comparison")["conditions"])
+    blocks = {"comparison": comparison_markdown(_compared()), "conditions": conditions}
+    return updated_pages(
+        blocks | accuracy.documentation_blocks(precise) | extraction.markdown(read_measured("extraction"))
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
-from extractor.numeric.compilation import compiled, lent
+from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.numeric.delaunay import delaunay
 
 MAX_FLIP_ROUNDS = 12
@@ -23,11 +23,11 @@ MAX_FLIP_ROUNDS = 12
 MIN_AREA_RATIO = 0.4
 MAX_AREA_RATIO = 1.9
 # Neighbouring cells share a corner (eq. 5): L in units of the edge of an equilateral cell of the smaller area.
-SHARED_CORNER = 0.4
+MAX_CORNER_GAP = 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class CellMesh:
     """Stage 6.
 
     Attributes:
@@ -38,24 +38,24 @@ class Mesh:
 
     faces: NDArray[np.int32]
     neighbours: NDArray[np.int32]
-    turn: NDArray[np.int8]
+    orientation: NDArray[np.int8]
 
 
-@lent
-def _place_of(rows, i, value):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _index_in_row(rows, i, value):  # type: ignore[no-untyped-def]
     """The place of a value among the three of row i."""
     return 0 if rows[i, 0] == value else 1 if rows[i, 1] == value else 2
 
 
-@lent
-def _cross(xy, a, b, c):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _doubled_area(xy, a, b, c):  # type: ignore[no-untyped-def]
     """Twice the signed area of a, b, c; positive clockwise with y down."""
     x, y = xy[a, 0], xy[a, 1]
     return (xy[b, 0] - x) * (xy[c, 1] - y) - (xy[b, 1] - y) * (xy[c, 0] - x)
 
 
 @compiled
-def _flip(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
+def _update_flipped_edges(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
     """Flip edges between cells of one ink, in place, where the other diagonal joins two different inks."""
     for _ in range(MAX_FLIP_ROUNDS):
         flips = 0
@@ -65,37 +65,37 @@ def _flip(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
                 if g < f:
                     continue
                 a, b, c = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], faces[f, k]
-                j = _place_of(neighbours, g, f)
+                j = _index_in_row(neighbours, g, f)
                 d = faces[g, j]
                 if ink[a] != ink[b] or ink[c] == ink[d] or ink[c] == ink[a] or ink[d] == ink[a]:
                     continue
                 # the four must be convex: both new triangles turn the same way
-                if _cross(points, c, a, d) * _cross(points, c, d, b) <= 0.0:
+                if _doubled_area(points, c, a, d) * _doubled_area(points, c, d, b) <= 0.0:
                     continue
                 beyond_bc, beyond_ca = neighbours[f, (k + 1) % 3], neighbours[f, (k + 2) % 3]
-                beyond_ad = neighbours[g, _place_of(faces, g, b)]
-                beyond_db = neighbours[g, _place_of(faces, g, a)]
+                beyond_ad = neighbours[g, _index_in_row(faces, g, b)]
+                beyond_db = neighbours[g, _index_in_row(faces, g, a)]
                 # f becomes c, a, d and g becomes c, d, b
                 faces[f, 0], faces[f, 1], faces[f, 2] = c, a, d
                 neighbours[f, 0], neighbours[f, 1], neighbours[f, 2] = beyond_ad, g, beyond_ca
                 faces[g, 0], faces[g, 1], faces[g, 2] = c, d, b
                 neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = beyond_db, beyond_bc, f
                 if beyond_ad >= 0:
-                    neighbours[beyond_ad, _place_of(neighbours, beyond_ad, g)] = f
+                    neighbours[beyond_ad, _index_in_row(neighbours, beyond_ad, g)] = f
                 if beyond_bc >= 0:
-                    neighbours[beyond_bc, _place_of(neighbours, beyond_bc, f)] = g
+                    neighbours[beyond_bc, _index_in_row(neighbours, beyond_bc, f)] = g
                 flips += 1
                 break
         if flips == 0:
             break
 
 
-@lent
-def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _has_shared_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
     """True when two cells have a corner in common, or when one of them has no triangle to tell."""
     if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):
         return True
-    limit = SHARED_CORNER * SHARED_CORNER * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
+    limit = MAX_CORNER_GAP * MAX_CORNER_GAP * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
     nearest = np.inf
     for i in range(3):
         for j in range(3):
@@ -105,7 +105,7 @@ def _share_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-untyped-def]
+def _classify_faces(points, ink, area, corner, faces, neighbours):  # type: ignore[no-untyped-def]
     """Put every face in the order red, green, blue and drop those that are neither a marker nor a black cell."""
     count = faces.shape[0]
     ordered = np.full((count, 3), -1, np.int32)
@@ -115,18 +115,18 @@ def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-unt
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
             continue
-        size = 0.5 * abs(_cross(points, a, b, c))
+        size = 0.5 * abs(_doubled_area(points, a, b, c))
         mean = (area[a] + area[b] + area[c]) / 3.0
         if size < MIN_AREA_RATIO * mean or size > MAX_AREA_RATIO * mean:
             continue
-        if not (_share_corner(corner, area, a, b) and _share_corner(corner, area, b, c)):
+        if not (_has_shared_corner(corner, area, a, b) and _has_shared_corner(corner, area, b, c)):
             continue
-        if not _share_corner(corner, area, c, a):
+        if not _has_shared_corner(corner, area, c, a):
             continue
         for k in range(3):
             ordered[f, ink[faces[f, k]] - 1] = faces[f, k]
             across[f, ink[faces[f, k]] - 1] = neighbours[f, k]
-        turn[f] = 1 if _cross(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0 else -1
+        turn[f] = 1 if _doubled_area(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0 else -1
     for f in range(count):
         for k in range(3):
             g = across[f, k]
@@ -135,10 +135,12 @@ def _judge(points, ink, area, corner, faces, neighbours):  # type: ignore[no-unt
     return ordered, across, turn
 
 
-def build_mesh(cells: Cells) -> Mesh | None:
+def build_cell_mesh(cells: Cells) -> CellMesh | None:
     """Stage 6: Delaunay triangles of the centers, corrected by color; None with fewer than three cells."""
     faces, neighbours = delaunay(cells.center_px)
     if len(faces) == 0:  # all on one line
         return None
-    _flip(cells.center_px, cells.ink, faces, neighbours)
-    return Mesh(*_judge(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours))
+    _update_flipped_edges(cells.center_px, cells.ink, faces, neighbours)
+    return CellMesh(
+        *_classify_faces(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours)
+    )

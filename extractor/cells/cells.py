@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from extractor.cells.seeds import Seeds
 from extractor.cells.triangle_fit import Triangles
-from extractor.numeric.compilation import compiled, lent
-from extractor.numeric.nearest_points import bucketed, nearest
+from extractor.numeric.compilation import compiled, inlined_no_refcount
+from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
-NEIGHBOURS = 8
+NEAREST_CELLS = 8
 MIN_AREA_SHARE = 0.2  # of the median around it; smaller domains are dirt
-WHOLE_SHARE = (
+MIN_INTACT_SHARE = (
     0.7  # of the upper quartile around it; smaller cells have lost a part, and their centers lie aside
 )
 # Buckets' sides, within which points are counted. Of five buckets by five around a point none is missed within two; a
 # disc of 1.1 holds as many points as are NEIGHBOURS.
-RADII = (1.99, 1.5, 1.25, 1.05, 0.9, 0.75)
-UNSURE = -1
-SHARP_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, too
+COUNT_RADII = (1.99, 1.5, 1.25, 1.05, 0.9, 0.75)
+UNDECIDED = -1
+MIN_TRIANGLE_SHARE = 0.6  # of the cells are triangles: then what is none is a fragment, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Cells:
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) bool, whose centers are to be believed: triangles, if most are, as large as those around them."""
-        return np.asarray(_whole(self.center_px, self.area_px, self.corner_px))
+        return np.asarray(_is_intact(self.center_px, self.area_px, self.corner_px))
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
@@ -59,10 +59,10 @@ def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
         scale: full-scale pixels per pixel of the seeds.
     """
     found = triangles.region, triangles.corner_px
-    return Cells(*_gathered(seeds.center, seeds.ink, seeds.area_px, *found, scale, seeds.crowded))
+    return Cells(*_cell_arrays(seeds.center, seeds.ink, seeds.area_px, *found, scale, seeds.cluttered))
 
 
-def with_triangles(cells: Cells, triangles: Triangles) -> Cells:
+def cells_with_triangles(cells: Cells, triangles: Triangles) -> Cells:
     """The cells with these for their triangles, whose ``region`` is the cell."""
     center, corners = cells.center_px.copy(), cells.corner_px.copy()
     corners[triangles.region] = triangles.corner_px
@@ -71,7 +71,7 @@ def with_triangles(cells: Cells, triangles: Triangles) -> Cells:
 
 
 @compiled
-def _gathered(place, ink_of, area_px, region, corner_px, scale, crowded):  # type: ignore[no-untyped-def]
+def _cell_arrays(place, ink_of, area_px, region, corner_px, scale, crowded):  # type: ignore[no-untyped-def]
     """The fields of ``Cells``."""
     center = (place + 0.5) * scale - 0.5
     corners = np.full((place.shape[0], 3, 2), np.nan)
@@ -84,7 +84,7 @@ def _gathered(place, ink_of, area_px, region, corner_px, scale, crowded):  # typ
     area = area_px.astype(np.float64)
     if crowded:  # of what is so fine, and sharp
         center, ink_of, area, corners = center[region], ink_of[region], area[region], corners[region]
-    keep = np.flatnonzero(_large(center, area))
+    keep = np.flatnonzero(_is_large(center, area))
     return center[keep], ink_of[keep], area[keep] * scale * scale, corners[keep]
 
 
@@ -95,41 +95,41 @@ def _equilateral_edge(area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _large(center, area):  # type: ignore[no-untyped-def]
+def _is_large(center, area):  # type: ignore[no-untyped-def]
     """(N,) bool, the domains that are not small beside the ones around them."""
-    return _few_larger(center, area, MIN_AREA_SHARE, NEIGHBOURS // 2)
+    return _has_few_larger_neighbours(center, area, MIN_AREA_SHARE, NEAREST_CELLS // 2)
 
 
 @compiled
-def _whole(center, area, corner):  # type: ignore[no-untyped-def]
+def _is_intact(center, area, corner):  # type: ignore[no-untyped-def]
     """(N,) bool, the triangles, or all cells where few are, that are about as large as the ones around them."""
     shaped = np.isfinite(corner[:, 0, 0])
-    if np.count_nonzero(shaped) < SHARP_SHARE * shaped.shape[0]:
+    if np.count_nonzero(shaped) < MIN_TRIANGLE_SHARE * shaped.shape[0]:
         shaped[:] = True
-    return shaped & _few_larger(center, area, WHOLE_SHARE, NEIGHBOURS // 4 + 1)
+    return shaped & _has_few_larger_neighbours(center, area, MIN_INTACT_SHARE, NEAREST_CELLS // 4 + 1)
 
 
 @compiled
-def _few_larger(center, area, share, most):  # type: ignore[no-untyped-def]
+def _has_few_larger_neighbours(center, area, share, most):  # type: ignore[no-untyped-def]
     """(N,) bool, of which less than so many of the nearest are so much larger that it is but a ``share`` of them."""
     few, count = np.ones(area.shape[0], np.bool_), area.shape[0]
-    if count <= NEIGHBOURS or area.min() >= share * area.max():
+    if count <= NEAREST_CELLS or area.min() >= share * area.max():
         return few
     last = count - most  # where less than so many are larger at all, there is no need to look
     small = np.flatnonzero(area < share * np.partition(area, last)[last])
     if small.shape[0] == 0:
         return few
-    grid = bucketed(center)
+    grid = bucket_grid(center)
     order = grid[-1]
     x_of, y_of, limit = center[order, 0], center[order, 1], share * area[order]
-    index, square = np.empty(NEIGHBOURS, np.int32), np.empty(NEIGHBOURS)
+    index, square = np.empty(NEAREST_CELLS, np.int32), np.empty(NEAREST_CELLS)
     squares, larger_squares = np.empty(count), np.empty(count)
     for i in small:
         x, y = center[i, 0], center[i, 1]
-        seen = _squares_around(x_of, y_of, limit, grid, x, y, area[i], squares, larger_squares)
-        larger = _larger_among(squares, larger_squares, seen, grid[2], most)
-        if larger == UNSURE:
-            nearest(center, grid, x, y, index, square)
+        seen = _fill_squared_distances(x_of, y_of, limit, grid, x, y, area[i], squares, larger_squares)
+        larger = _larger_neighbour_count(squares, larger_squares, seen, grid[2], most)
+        if larger == UNDECIDED:
+            fill_nearest_points(center, grid, x, y, index, square)
             larger = 0
             for j in index:
                 larger += area[i] < share * area[j]
@@ -137,10 +137,10 @@ def _few_larger(center, area, share, most):  # type: ignore[no-untyped-def]
     return few
 
 
-@lent
-def _squares_around(x_of, y_of, limit, grid, x, y, size, squares, larger_squares):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_squared_distances(x_of, y_of, limit, grid, x, y, size, squares, larger_squares):  # type: ignore[no-untyped-def]
     """Write the squared distances of the points around (x, y) from it, and again, without end where their ``limit`` is
-    not beyond a ``size``; how many points. All within the largest of ``RADII`` are among them.
+    not beyond a ``size``; how many points. All within the largest of ``COUNT_RADII`` are among them.
 
     Args:
         x_of, y_of, limit: (N,) of the points in the grid's order.
@@ -161,19 +161,21 @@ def _squares_around(x_of, y_of, limit, grid, x, y, size, squares, larger_squares
     return count
 
 
-@lent
-def _larger_among(squares, larger_squares, count, step, most):  # type: ignore[no-untyped-def]
-    """At least, or at most, how many of the ``NEIGHBOURS`` nearest points are larger: enough to tell whether they are
-    fewer than ``most``, or ``UNSURE``. Counting within some radii takes a third of the time of finding them."""
-    for radius in RADII:
+@inlined_no_refcount
+def _larger_neighbour_count(squares, larger_squares, count, step, most):  # type: ignore[no-untyped-def]
+    """At least, or at most, how many of the ``NEAREST_CELLS`` nearest points are larger: enough to tell whether they
+    are
+    fewer than ``max_partial_share_in_dirt``, or ``UNDECIDED``. Counting within some radii takes a third of the time
+    of finding them."""
+    for radius in COUNT_RADII:
         reach, within, larger = (radius * step) ** 2, 0, 0
         for k in range(count):
             within += squares[k] <= reach
             larger += larger_squares[k] <= reach
-        if within <= NEIGHBOURS and larger >= most:  # all these are among the nearest
+        if within <= NEAREST_CELLS and larger >= most:  # all these are among the nearest
             return larger
-        if within < NEIGHBOURS:
+        if within < NEAREST_CELLS:
             break
-        if larger < most or within == NEIGHBOURS:  # the nearest are all among these
+        if larger < most or within == NEAREST_CELLS:  # the nearest are all among these
             return larger
-    return UNSURE
+    return UNDECIDED

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.cells.seeds import MOMENTS, Seeds
+from extractor.cells.seeds import MOMENT_TERMS, Seeds
 from extractor.image.color import HUES
 from extractor.image.ink_segmentation import Segmentation
-from extractor.numeric.compilation import compiled, lent_vectorized
+from extractor.numeric.compilation import compiled, vectorized_no_refcount
 
 GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
-FRAME = -1  # the owner of what lies around the image
+BORDER = -1  # the owner of what lies around the image
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +28,15 @@ class Regions:
         domain_px: (N,) int64, the area of the domain that the seed stood for.
     """
 
-    owner: NDArray[np.int32]
+    region_map: NDArray[np.int32]
     ink: NDArray[np.uint8]
     seed: NDArray[np.int32]
     moments: NDArray[np.float64]
     domain_px: NDArray[np.int64]
 
 
-@lent_vectorized
-def _add_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _fill_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
     """Write the moments of the first pixels about (x0, y0); whole numbers all, so that their order does not matter."""
     m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(np.uint64(count)):
@@ -63,12 +63,12 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
     """
     height, width = label.shape
     wide = width + 2
-    owner = np.full((height + 2, wide), FRAME, np.int32)
+    owner = np.full((height + 2, wide), BORDER, np.int32)
     owner[1:-1, 1:-1] = 0
     owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
     queue = np.empty(limit_px + 2, np.int32)  # of pixels
     framed = np.empty(limit_px + 2, np.int32)  # the same in the frame
-    moments = np.zeros((seed_xy.shape[0], MOMENTS))
+    moments = np.zeros((seed_xy.shape[0], MOMENT_TERMS))
     limit2 = threshold * threshold
     half, one, two = HUES // 2, np.uint64(1), np.uint64(2)
     for region in range(seed_xy.shape[0]):
@@ -118,13 +118,13 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             mean_v = sum_v / end
         if end > limit_px:
             continue  # a leak or a background: no cell is that large
-        _unframe(queue, framed, end, width)
-        _add_moments(queue, framed, end, sx, sy, moments, region)
+        _update_to_coordinates(queue, framed, end, width)
+        _fill_moments(queue, framed, end, sx, sy, moments, region)
     return owner, moments
 
 
-@lent_vectorized
-def _unframe(queue, framed, count, width):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _update_to_coordinates(queue, framed, count, width):  # type: ignore[no-untyped-def]
     """Write each pixel's x over its number, and its y over the one in the frame: the two differ by the frame's pixels
     before it."""
     for i in range(np.uint64(count)):
@@ -143,4 +143,4 @@ def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
         segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
     )
     owner = owner[1:-1, 1:-1]
-    return Regions(owner=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)
+    return Regions(region_map=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)

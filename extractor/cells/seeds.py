@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.image.ink_segmentation import Segmentation
-from extractor.numeric.compilation import compiled, lent
+from extractor.numeric.compilation import compiled, inlined_no_refcount
 
 MIN_DOMAIN_PX = 4
 # In a crowd, a cell has edges of 5 px at least, and of its area no less than a convex shape has for the spread of its
 # pixels (the root of their covariance's determinant): a triangle 10.4 times, an ellipse 12.6 times.
-MIN_CROWDED_PX = 12
+MIN_CLUTTERED_PX = 12
 MIN_SOLIDITY = 8.0
-NO_CROWD = 1 << 62
+NO_DOMAIN_LIMIT = 1 << 62
 SAFE_AREA_PX = 20  # a cell with edges of 7 px
-MAX_SMALL = 1 / 6  # of the domains
-MOMENTS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
+MAX_SMALL_SHARE = 1 / 6  # of the domains
+MOMENT_TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,26 +36,26 @@ class Seeds:
     area_px: NDArray[np.int64]
     runs: NDArray[np.int32]
     domain: NDArray[np.int32]
-    crowded: bool = False
+    cluttered: bool = False
 
     @property
     def xy(self) -> NDArray[np.int32]:
         """(N, 2) the pixel to grow from."""
-        return self._found[0]
+        return self._seed_properties[0]
 
     @property
     def center(self) -> NDArray[np.float64]:
         """(N, 2) the domain's geometric center."""
-        return self._found[1]
+        return self._seed_properties[1]
 
     @property
     def ink(self) -> NDArray[np.uint8]:
         """(N,) 1 red, 2 green, 3 blue."""
-        return self._found[2]
+        return self._seed_properties[2]
 
     @cached_property
-    def _found(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]:
-        return _seeds(self.runs, self.domain, self.area_px)  # type: ignore[no-any-return]
+    def _seed_properties(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]:
+        return _seed_points(self.runs, self.domain, self.area_px)  # type: ignore[no-any-return]
 
 
 @compiled
@@ -70,8 +70,8 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
     return count
 
 
-@lent
-def _root(parent, i):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _update_and_find_root(parent, i):  # type: ignore[no-untyped-def]
     """The first run of the domain that run i belongs to; the path to it is halved on the way."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -80,7 +80,7 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _runs(label):  # type: ignore[no-untyped-def]
+def _find_runs(label):  # type: ignore[no-untyped-def]
     """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
 
     Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 an earlier run of each run's domain, or itself.
@@ -118,7 +118,7 @@ def _runs(label):  # type: ignore[no-untyped-def]
                 if own == i:
                     own = parent[other]
                 elif own != parent[other]:
-                    a, b = _root(parent, own), _root(parent, other)
+                    a, b = _update_and_find_root(parent, own), _update_and_find_root(parent, other)
                     parent[max(a, b)] = min(a, b)
             other += 1
         parent[i] = own
@@ -126,7 +126,7 @@ def _runs(label):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
+def _find_domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
     """The runs of the domains that are large enough, or, where there are more than ``crowd``, that a cell could be;
     (R,) int32 the domain of each; the domains' areas; and whether there are more."""
     domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
@@ -139,14 +139,18 @@ def _domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
         area[d] += runs[i, 2] - runs[i, 1] + 1
     area = area[:count]
     crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
-    runs, domain, area = _kept(runs, domain, area, area >= (MIN_CROWDED_PX if crowded else MIN_DOMAIN_PX))
+    runs, domain, area = _select_domains(
+        runs, domain, area, area >= (MIN_CLUTTERED_PX if crowded else MIN_DOMAIN_PX)
+    )
     if crowded:
-        runs, domain, area = _kept(runs, domain, area, area >= MIN_SOLIDITY * _spread(runs, domain, area))
+        runs, domain, area = _select_domains(
+            runs, domain, area, area >= MIN_SOLIDITY * _covariance_root(runs, domain, area)
+        )
     return runs, domain, area, crowded
 
 
 @compiled
-def _kept(runs, domain, area, keep):  # type: ignore[no-untyped-def]
+def _select_domains(runs, domain, area, keep):  # type: ignore[no-untyped-def]
     """The runs of the domains to keep, these numbered anew, and their areas."""
     number, few, own = np.empty(area.shape[0], np.int32), 0, 0
     for d in range(area.shape[0]):
@@ -170,7 +174,7 @@ def _kept(runs, domain, area, keep):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
+def _covariance_root(runs, domain, area):  # type: ignore[no-untyped-def]
     """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
     sums = np.zeros((area.shape[0], 5))
     for i in range(domain.shape[0]):
@@ -192,7 +196,7 @@ def _spread(runs, domain, area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
+def _seed_points(runs, domain, area):  # type: ignore[no-untyped-def]
     """Per domain: the pixel of it nearest to its geometric center, that center and its ink."""
     count = area.shape[0]
     ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
@@ -218,7 +222,7 @@ def _seeds(runs, domain, area):  # type: ignore[no-untyped-def]
     return xy, center, ink
 
 
-def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
+def find_seeds(segmentation: Segmentation, crowd: int = NO_DOMAIN_LIMIT) -> Seeds:
     """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
 
     The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
@@ -227,8 +231,8 @@ def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
         crowd: where there are more domains than this, small and ragged ones are clutter, too: an image of noise has
             many times more than any pattern.
     """
-    runs, parent = _runs(segmentation.label)
-    runs, domain, area_px, crowded = _domains(runs, parent, crowd)
+    runs, parent = _find_runs(segmentation.label)
+    runs, domain, area_px, crowded = _find_domains(runs, parent, crowd)
     return Seeds(area_px, runs, domain, crowded)
 
 
@@ -236,7 +240,7 @@ def find_seeds(segmentation: Segmentation, crowd: int = NO_CROWD) -> Seeds:
 def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
     """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown: a run's at once, from its middle
     and its length; in halves, quarters and eighths of whole numbers, which are exact."""
-    out = np.zeros((seed_xy.shape[0], MOMENTS))
+    out = np.zeros((seed_xy.shape[0], MOMENT_TERMS))
     for i in range(runs.shape[0]):
         d = domain[i]
         y, length = float(runs[i, 0] - seed_xy[d, 1]), float(runs[i, 2] - runs[i, 1] + 1)
@@ -257,6 +261,6 @@ def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
     return out
 
 
-def large_enough(seeds: Seeds) -> bool:
+def has_large_domains(seeds: Seeds) -> bool:
     """Whether at most a few of the domains are too small to be recognised safely."""
-    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL
+    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL_SHARE

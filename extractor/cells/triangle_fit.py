@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 
 from extractor.cells.region_growing import Regions
 from extractor.cells.seeds import Seeds, domain_moments
-from extractor.cells.triangle_edges import fit_edges
+from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.numeric.compilation import compiled
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
 # radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
 CORNER_RADIUS = np.sqrt(8.0)
 THIRD_MOMENT = 8.0**1.5 / 10.0
-HALF_ROOT = np.sqrt(0.75)
+SINE_120 = np.sqrt(0.75)
 MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a square have 0
-ROUGH_TRIANGULARITY = 0.1  # of what has too few pixels to tell
+MIN_ROUGH_TRIANGULARITY = 0.1  # of what has too few pixels to tell
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4.0
 MAX_GROWTH = 3.0  # of a domain's area over its region's
@@ -47,7 +47,7 @@ class Triangles:
 
 
 @compiled
-def _fit(moments, seed, domain_px, min_area, least):  # type: ignore[no-untyped-def]
+def _fit_to_moments(moments, seed, domain_px, min_area, least):  # type: ignore[no-untyped-def]
     """Triangles with the regions' moments up to the third order, and which regions are triangles at all."""
     count = moments.shape[0]
     corners = np.zeros((count, 3, 2))
@@ -88,15 +88,15 @@ def _fit(moments, seed, domain_px, min_area, least):  # type: ignore[no-untyped-
         for k in range(3):
             corners[i, k, 0] = seed[i, 0] + mx + a * u
             corners[i, k, 1] = seed[i, 1] + my + b * u + c * v
-            u, v = -0.5 * u - HALF_ROOT * v, HALF_ROOT * u - 0.5 * v  # turned by 120 degrees
+            u, v = -0.5 * u - SINE_120 * v, SINE_120 * u - 0.5 * v  # turned by 120 degrees
         good[i] = True
     return corners, good
 
 
-def rough_triangles(seeds: Seeds, scale: int) -> Triangles:
+def triangles_from_moments(seeds: Seeds, scale: int) -> Triangles:
     """The domains that are triangles by shape, by their moments alone: without growing, without sub-pixel edges."""
     moments = domain_moments(seeds.runs, seeds.domain, seeds.xy)
-    corners, good = _fit(moments, seeds.xy, seeds.area_px, MIN_AREA_PX, ROUGH_TRIANGULARITY)
+    corners, good = _fit_to_moments(moments, seeds.xy, seeds.area_px, MIN_AREA_PX, MIN_ROUGH_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
     return Triangles(corners[good], seeds.ink[good], np.flatnonzero(good).astype(np.int32))
 
@@ -109,14 +109,16 @@ def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) ->
         regions: grown at 1/``scale`` of the image's scale.
         scale: full-scale pixels per pixel of the regions.
     """
-    return Triangles(*_fitted(image, regions.moments, regions.seed, regions.domain_px, regions.ink, scale))
+    return Triangles(
+        *_triangle_arrays(image, regions.moments, regions.seed, regions.domain_px, regions.ink, scale)
+    )
 
 
 @compiled
-def _fitted(image, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
+def _triangle_arrays(image, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
     """The fields of ``Triangles``."""
-    corners, good = _fit(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
+    corners, good = _fit_to_moments(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
-    fit_edges(image, corners, good)
+    update_triangle_corners(image, corners, good)
     region = np.flatnonzero(good)
     return corners[region], ink[region], region.astype(np.int32)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from extractor.numeric.compilation import compiled
-from extractor.numeric.dense_systems import cholesky_solve
+from extractor.numeric.dense_systems import update_to_cholesky_solution
 
 MIN_LAYER_MARKERS = 5  # known markers of a layer within a sextant for a quadratic with a residual
 TERMS = 3  # 1, s, s^2, s from -1 to 1 along the sextant
 
 
 @compiled
-def by_layer(xy, layers):  # type: ignore[no-untyped-def]
+def predict_by_layer(xy, layers):  # type: ignore[no-untyped-def]
     """Places of the unknown markers, between known ones, on the quadratic through their layer and sextant.
 
     Args:
@@ -33,12 +33,12 @@ def by_layer(xy, layers):  # type: ignore[no-untyped-def]
                 ids[k] = first + (sextant * layer + k) % around
                 unknown += np.isnan(xy[ids[k], 0])
             if unknown > 0:
-                _through(xy, ids[: layer + 1], place, variance)
+                _fill_by_layer_quadratic(xy, ids[: layer + 1], place, variance)
     return place, variance
 
 
 @compiled
-def _through(xy, ids, place, variance):  # type: ignore[no-untyped-def]
+def _fill_by_layer_quadratic(xy, ids, place, variance):  # type: ignore[no-untyped-def]
     """Fit x and y as quadratics of the place within the sextant and read them at the unknown places in between."""
     last = ids.shape[0] - 1
     normal, right = np.zeros((TERMS, TERMS)), np.zeros((2, TERMS))
@@ -57,7 +57,7 @@ def _through(xy, ids, place, variance):  # type: ignore[no-untyped-def]
             right[1, a] += row[a] * xy[ids[k], 1]
     if count < MIN_LAYER_MARKERS:
         return
-    cholesky_solve(normal.copy(), right, TERMS)
+    update_to_cholesky_solution(normal.copy(), right, TERMS)
     left = 0.0
     for k in range(begin, end + 1):
         if not np.isnan(xy[ids[k], 0]):
@@ -70,7 +70,7 @@ def _through(xy, ids, place, variance):  # type: ignore[no-untyped-def]
             continue
         s = 2.0 * k / last - 1.0
         unit[0, 0], unit[0, 1], unit[0, 2] = 1.0, s, s * s
-        cholesky_solve(normal.copy(), unit, TERMS)
+        update_to_cholesky_solution(normal.copy(), unit, TERMS)
         doubt = left * (1.0 + unit[0, 0] + s * (unit[0, 1] + s * unit[0, 2]))
         if not doubt < variance[ids[k]]:
             continue

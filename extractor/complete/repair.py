@@ -15,27 +15,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.complete.consistency_filter import MILD_SUPPORT, believable, inside
-from extractor.complete.layer_arcs import by_layer
-from extractor.complete.uncertain_markers import blend, vague_ones
+from extractor.complete.consistency_filter import MILD_SUPPORT, is_inside_image, reject_inconsistent_markers
+from extractor.complete.layer_arcs import predict_by_layer
+from extractor.complete.uncertain_markers import find_uncertain_markers, update_by_fusion
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.neighbour_prediction import MIN_CUBIC, cubic_variance, predicted
-from extractor.numbering.marker_places import Places
+from extractor.localmap.neighbour_prediction import MIN_CUBIC_NEIGHBOURS, cubic_variance, predict_markers
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.numeric.compilation import compiled
-from extractor.refine.drawn_pattern import chosen
-from extractor.refine.estimate import Refined
+from extractor.refine.drawn_pattern import merged_rows
+from extractor.refine.estimate import RefinedMarkers
 from extractor.result import Status
 
-MAX_IMPLIED = 0.1  # in edges, of what cells imply from what markers do
-IMPLIED_SIGMA = 0.02  # in edges
-BORDER = 0.25  # in edges, of the image, where cells that it cuts imply nothing
-MAX_SIGMA = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
-MAX_FITTED_SIGMA = 0.05  # the same of a fitted one: a layer's quadratic is wrong where the surface is bent
-RIM_SUPPORT = 6  # the same for what cells imply, too
+MAX_IMPLIED_DISTANCE = 0.1  # in edges, of what cells imply from what markers do
+IMPLIED_DEVIATION = 0.02  # in edges
+BORDER_WIDTH = 0.25  # in edges, of the image, where cells that it cuts imply nothing
+MAX_REPAIRED_DEVIATION = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
+MAX_FITTED_DEVIATION = (
+    0.05  # the same of a fitted one: a layer's quadratic is wrong where the surface is bent
+)
+MIN_RIM_SUPPORT = 6  # the same for what cells imply, too
 MAX_LEVERAGE = 1.2
-RIM_LEVERAGE = 2.0  # the same for what cells imply, too
-UNSEEN = 0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
-MODEL_SIGMA = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
+MAX_RIM_LEVERAGE = 2.0  # the same for what cells imply, too
+OUTER_RING_ERROR = (
+    0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
+)
+MODEL_DEVIATION = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
 # Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
 # surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
@@ -50,7 +54,7 @@ REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
 
 
 @dataclass(frozen=True, eq=False)
-class Repaired:
+class RepairedMarkers:
     """Markers after repair: (M, 2) places, (M, 2, 2) covariances, (M,) status; NaN and 0 where lost."""
 
     xy_px: NDArray[np.float64]
@@ -58,7 +62,9 @@ class Repaired:
     status: NDArray[np.uint8]
 
 
-def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, int]) -> Repaired:
+def repair_markers(
+    refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
+) -> RepairedMarkers:
     """Drop what contradicts its neighbours, repair what they imply, and let them say what is vague.
 
     Args:
@@ -66,16 +72,16 @@ def repair(refined: Refined, places: Places, lattice: Lattice, size: tuple[int, 
         places: the markers before refinement.
         size: width and height of the image; nothing is reported outside.
     """
-    xy, cov, edge_px, sound = believable(refined, places, lattice, size)
-    vague, some = vague_ones(cov, edge_px)
+    xy, cov, edge_px, sound = reject_inconsistent_markers(refined, places, lattice, size)
+    vague, some = find_uncertain_markers(cov, edge_px)
     if sound and not some:
-        return Repaired(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
-    tables = lattice.marker_mm, lattice.neighbours, lattice.ring, lattice.present, lattice.layers
-    return Repaired(xy, cov, _fill(xy, cov, vague, edge_px, places.xy_px, *tables, size))
+        return RepairedMarkers(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
+    tables = lattice.marker_mm, lattice.neighbours, lattice.first_ring, lattice.present, lattice.layers
+    return RepairedMarkers(xy, cov, _fill_lost_markers(xy, cov, vague, edge_px, places.xy_px, *tables, size))
 
 
 @compiled
-def _filled(edge, table):  # type: ignore[no-untyped-def]
+def _interpolated_edges(edge, table):  # type: ignore[no-untyped-def]
     """(M,) the edges at each marker; where none was seen, the mean of its neighbours', or NaN."""
     out = edge.copy()
     for m in np.flatnonzero(np.isnan(edge)):
@@ -89,88 +95,94 @@ def _filled(edge, table):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill(xy, cov, vague, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
+def _fill_lost_markers(xy, cov, vague, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
     """Write the places and covariances of the lost markers that can be told, NaN for those outside the image, and put
     the ``vague`` ones (M,) bool nearer to where others have them; (M,) uint8 the status of all."""
-    lost, edge = np.isnan(xy[:, 0]), _filled(edge, table)
+    lost, edge = np.isnan(xy[:, 0]), _interpolated_edges(edge, table)
     status = np.where(lost, LOST, MEASURED)
     lost &= present
     tables = marker_mm, table, ring
-    clear = chosen(vague, np.full(xy.shape, np.nan), xy)
-    near, nearer = _told(clear, lost | vague, *tables)
+    clear = merged_rows(vague, np.full(xy.shape, np.nan), xy)
+    near, nearer = _predict_by_rings(clear, lost | vague, *tables)
     for m in np.flatnonzero(lost | vague):
-        variance = _by_neighbours(m, near, nearer, edge[m])
+        variance = _variance_by_neighbours(m, near, nearer, edge[m])
         if lost[m]:
-            lost[m], status[m] = not _put(m, near[0][m], variance, xy, cov, size), REPAIRED
+            lost[m], status[m] = not _fill_marker(m, near[0][m], variance, xy, cov, size), REPAIRED
         elif variance >= 0.0:
-            blend(xy[m], cov[m], near[0][m], variance)
-    known = chosen(vague, xy, clear)
+            update_by_fusion(xy[m], cov[m], near[0][m], variance)
+    known = merged_rows(vague, xy, clear)
     if lost.any() and vague.any():
-        near, nearer = _told(known, lost, *tables)
+        near, nearer = _predict_by_rings(known, lost, *tables)
         for m in np.flatnonzero(lost):
-            variance = _by_neighbours(m, near, nearer, edge[m])
-            lost[m] = not _put(m, near[0][m], variance, xy, cov, size)
+            variance = _variance_by_neighbours(m, near, nearer, edge[m])
+            lost[m] = not _fill_marker(m, near[0][m], variance, xy, cov, size)
     for m in np.flatnonzero(lost):
-        lost[m] = not _put(m, implied[m], _by_cells(m, near, implied, edge[m], size), xy, cov, size)
+        lost[m] = not _fill_marker(
+            m, implied[m], _variance_by_cells(m, near, implied, edge[m], size), xy, cov, size
+        )
     if lost.any():  # what says less, and takes longer, is asked only of these
-        bent = cubic_variance(known, lost & (near[3] >= MIN_CUBIC), marker_mm, table)
-        along, doubt = by_layer(known, layers)
+        bent = cubic_variance(known, lost & (near[3] >= MIN_CUBIC_NEIGHBOURS), marker_mm, table)
+        along, doubt = predict_by_layer(known, layers)
         for m in np.flatnonzero(lost):
-            if not _put(m, near[0][m], _in_whole_rings(bent[m], edge[m]), xy, cov, size):
+            if not _fill_marker(m, near[0][m], _variance_by_cubic(bent[m], edge[m]), xy, cov, size):
                 status[m] = FITTED
-                _put(m, along[m], _by_layer(doubt[m], edge[m]), xy, cov, size)
+                _fill_marker(m, along[m], _variance_by_layer(doubt[m], edge[m]), xy, cov, size)
     for n in range(xy.shape[0]):
-        if not (cov[n, 0, 0] >= 0.0 and inside(xy[n, 0], xy[n, 1], size)):
+        if not (cov[n, 0, 0] >= 0.0 and is_inside_image(xy[n, 0], xy[n, 1], size)):
             xy[n], cov[n], status[n] = np.nan, np.nan, LOST
     return status
 
 
 @compiled
-def _told(known, wanted, marker_mm, table, ring):  # type: ignore[no-untyped-def]
-    """All that ``predicted`` says of the wanted markers by two rings, and where the inner one alone puts them."""
-    return predicted(known, wanted, marker_mm, table), predicted(known, wanted, marker_mm, ring)[0]
+def _predict_by_rings(known, wanted, marker_mm, table, ring):  # type: ignore[no-untyped-def]
+    """All that ``predict_markers`` says of the wanted markers by two rings, and where the inner one alone puts them."""
+    return predict_markers(known, wanted, marker_mm, table), predict_markers(known, wanted, marker_mm, ring)[
+        0
+    ]
 
 
 @compiled
-def _put(m, place, variance, xy, cov, size):  # type: ignore[no-untyped-def]
+def _fill_marker(m, place, variance, xy, cov, size):  # type: ignore[no-untyped-def]
     """Put a marker there, as sure along as across; False where that is not known, or not in the image."""
     xy[m, 0], xy[m, 1] = place[0], place[1]
     cov[m, 0, 0], cov[m, 1, 1], cov[m, 0, 1], cov[m, 1, 0] = variance, variance, 0.0, 0.0
-    return variance >= 0.0 and inside(place[0], place[1], size)
+    return variance >= 0.0 and is_inside_image(place[0], place[1], size)
 
 
 @compiled
-def _by_neighbours(m, near, nearer, edge):  # type: ignore[no-untyped-def]
+def _variance_by_neighbours(m, near, nearer, edge):  # type: ignore[no-untyped-def]
     """The variance of a lost marker's place by the two rings around it; NaN where that is not safe."""
     place, spread, leverage, support = near
     dx, dy = place[m, 0] - nearer[m, 0], place[m, 1] - nearer[m, 1]
     # where the inner ring alone says something else, the surface is too bent for either to be believed
     alone = np.isnan(nearer[m, 0])
-    doubt = (UNSEEN * edge) ** 2 if alone else (dx * dx + dy * dy) / 4
-    at_most = spread[m] * (1 + leverage[m]) + (MODEL_SIGMA * edge) ** 2 + doubt
-    if support[m] < MILD_SUPPORT or not (leverage[m] < MAX_LEVERAGE and at_most < (MAX_SIGMA * edge) ** 2):
+    doubt = (OUTER_RING_ERROR * edge) ** 2 if alone else (dx * dx + dy * dy) / 4
+    at_most = spread[m] * (1 + leverage[m]) + (MODEL_DEVIATION * edge) ** 2 + doubt
+    if support[m] < MILD_SUPPORT or not (
+        leverage[m] < MAX_LEVERAGE and at_most < (MAX_REPAIRED_DEVIATION * edge) ** 2
+    ):
         return np.nan
-    hidden = 0.25 * (UNSEEN * edge) ** 2 if alone else 0.0
+    hidden = 0.25 * (OUTER_RING_ERROR * edge) ** 2 if alone else 0.0
     return (MILD_ERROR * leverage[m]) ** 2 * spread[m] + hidden
 
 
 @compiled
-def _in_whole_rings(left, edge):  # type: ignore[no-untyped-def]
+def _variance_by_cubic(left, edge):  # type: ignore[no-untyped-def]
     """The same where the surface is bent, but the rings are nearly whole, by what a cubic has ``left`` in them."""
-    variance = CUBIC_ERROR**2 * left + (MODEL_SIGMA * edge) ** 2
-    return variance if variance < (MAX_SIGMA * edge) ** 2 else np.nan
+    variance = CUBIC_ERROR**2 * left + (MODEL_DEVIATION * edge) ** 2
+    return variance if variance < (MAX_REPAIRED_DEVIATION * edge) ** 2 else np.nan
 
 
 @compiled
-def _by_layer(doubt, edge):  # type: ignore[no-untyped-def]
+def _variance_by_layer(doubt, edge):  # type: ignore[no-untyped-def]
     """The same by the quadratic through its layer, which leaves so much ``doubt``."""
-    if not doubt + (3 * MODEL_SIGMA * edge) ** 2 < (MAX_FITTED_SIGMA * edge) ** 2:
+    if not doubt + (3 * MODEL_DEVIATION * edge) ** 2 < (MAX_FITTED_DEVIATION * edge) ** 2:
         return np.nan
-    return HEAVY_ERROR * doubt + (MODEL_SIGMA * edge) ** 2
+    return HEAVY_ERROR * doubt + (MODEL_DEVIATION * edge) ** 2
 
 
 @compiled
-def _by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
+def _variance_by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
     """The variance of the corners that the cells around a lost marker imply, averaged (the article's eq. 6); NaN where
     the markers around say something else, and at the image's border, which cuts cells.
 
@@ -179,10 +191,14 @@ def _by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
     expected, spread, leverage, support = near
     x, y = implied[m]
     square = (x - expected[m, 0]) ** 2 + (y - expected[m, 1]) ** 2
-    deep = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER * edge
-    if not (deep and support[m] >= RIM_SUPPORT and square < (MAX_IMPLIED * edge) ** 2):
+    deep = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER_WIDTH * edge
+    if not (deep and support[m] >= MIN_RIM_SUPPORT and square < (MAX_IMPLIED_DISTANCE * edge) ** 2):
         return np.nan
-    known, own = spread[m] * (1 + leverage[m]), (IMPLIED_SIGMA * edge) ** 2
-    if not (leverage[m] < RIM_LEVERAGE and known < (MAX_IMPLIED * edge) ** 2 and square < 4 * (known + own)):
+    known, own = spread[m] * (1 + leverage[m]), (IMPLIED_DEVIATION * edge) ** 2
+    if not (
+        leverage[m] < MAX_RIM_LEVERAGE
+        and known < (MAX_IMPLIED_DISTANCE * edge) ** 2
+        and square < 4 * (known + own)
+    ):
         return np.nan
     return 0.25 * square + own

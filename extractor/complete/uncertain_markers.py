@@ -6,21 +6,23 @@ import numpy as np
 
 from extractor.numeric.compilation import compiled
 
-VAGUE = 0.02  # in edges, deviation of a marker about which others may know more: they know no less than 0.012
+UNCERTAIN_DEVIATION = (
+    0.02  # in edges, deviation of a marker about which others may know more: they know no less than 0.012
+)
 
 
 @compiled
-def vague_ones(cov, edge):  # type: ignore[no-untyped-def]
+def find_uncertain_markers(cov, edge):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that are measured vaguely, by their covariances (M, 2, 2) and edges (M,); and whether
     there are any."""
     out = np.zeros(edge.shape[0], np.bool_)
     for m in range(edge.shape[0]):
-        out[m] = cov[m, 0, 0] + cov[m, 1, 1] > (VAGUE * edge[m]) ** 2
+        out[m] = cov[m, 0, 0] + cov[m, 1, 1] > (UNCERTAIN_DEVIATION * edge[m]) ** 2
     return out, np.any(out)
 
 
 @compiled
-def blend(xy, cov, place, variance):  # type: ignore[no-untyped-def]
+def update_by_fusion(xy, cov, place, variance):  # type: ignore[no-untyped-def]
     """Move a marker (2,) towards the ``place`` where others put it, each counting by how sure it is; in place, with its
     covariance (2, 2). ``variance``: of that place, along and across."""
     xx, cross, yy = cov[0, 0] + variance, cov[0, 1], cov[1, 1] + variance

@@ -12,17 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.complete.repair import Repaired
+from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import FIRST_RING, local_maps
 from extractor.result import Status, VirtualStatus
 
-MAX_APART = 0.08  # of a measured point from the interpolated one, in edges: more is dirt
-BENT = 0.05  # of the way from the chord to the cubic may be wrong
+MAX_MEASURED_OFFSET = 0.08  # of a measured point from the interpolated one, in edges: more is dirt
+BEND_UNCERTAINTY = 0.05  # of the way from the chord to the cubic may be wrong
 
 
-class Virtual(NamedTuple):
+class VirtualMarkers(NamedTuple):
     """(E, m, 2) places, (E, m, 2, 2) covariances, (E, m) status; NaN and 0 where lost."""
 
     xy_px: NDArray[np.float64]
@@ -30,7 +30,9 @@ class Virtual(NamedTuple):
     status: NDArray[np.uint8]
 
 
-def place_virtual(mesh: Topology, repaired: Repaired, points: NDArray[np.float64]) -> Virtual:
+def locate_virtual_markers(
+    mesh: Topology, repaired: RepairedMarkers, points: NDArray[np.float64]
+) -> VirtualMarkers:
     """The virtual markers at the fractions (j + 1) / (m + 1) of every edge from its smaller id.
 
     Args:
@@ -40,17 +42,17 @@ def place_virtual(mesh: Topology, repaired: Repaired, points: NDArray[np.float64
     on both sides, or where what was measured lies too far off to be the gridline.
     """
     if points.shape[1] == 0:
-        return Virtual(
+        return VirtualMarkers(
             points[..., :2], np.empty((len(points), 0, 2, 2)), np.empty((len(points), 0), np.uint8)
         )
-    maps = local_maps(repaired.xy_px, mesh.near, mesh.offset, mesh.stencil)
+    maps = local_maps(repaired.xy_px, mesh.near, mesh.ring_vectors, mesh.derivative_stencil)
     known = repaired.status != Status.LOST
-    tables = mesh.edges, mesh.near, mesh.offset
-    return Virtual(*_place(repaired.xy_px, repaired.cov_px2, known, maps, *tables, points))
+    tables = mesh.edges, mesh.near, mesh.ring_vectors
+    return VirtualMarkers(*_locate_on_edges(repaired.xy_px, repaired.cov_px2, known, maps, *tables, points))
 
 
 @compiled
-def _tangent(maps, near, offset, a, b, chord):  # type: ignore[no-untyped-def]
+def _edge_tangent(maps, near, offset, a, b, chord):  # type: ignore[no-untyped-def]
     """The map's derivative along the edge at marker a, towards b; the chord where it is not known."""
     for k in range(FIRST_RING):
         if near[a, k] == b and np.isfinite(maps[a, 0, 0]):
@@ -60,7 +62,7 @@ def _tangent(maps, near, offset, a, b, chord):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[no-untyped-def]
+def _locate_on_edges(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[no-untyped-def]
     count, m = points.shape[0], points.shape[1]
     places, spread = np.full((count, m, 2), np.nan), np.full((count, m, 2, 2), np.nan)
     status = np.zeros((count, m), np.uint8)
@@ -72,8 +74,8 @@ def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[n
         cx, cy = xy[b, 0] - x0, xy[b, 1] - y0
         length = np.sqrt(cx * cx + cy * cy)
         tx, ty = cx / length, cy / length
-        ax, ay = _tangent(maps, near, offset, a, b, (cx, cy))
-        bx, by = _tangent(maps, near, offset, b, a, (-cx, -cy))
+        ax, ay = _edge_tangent(maps, near, offset, a, b, (cx, cy))
+        bx, by = _edge_tangent(maps, near, offset, b, a, (-cx, -cy))
         for j in range(m):
             t = (j + 1.0) / (m + 1.0)
             s = 1.0 - t
@@ -81,13 +83,13 @@ def _place(xy, cov, known, maps, edges, near, offset, points):  # type: ignore[n
             end, leave, arrive = t * t * (3 - 2 * t), s * s * t, s * t * t
             x = end * cx + leave * ax + arrive * bx
             y = end * cy + leave * ay + arrive * by
-            hidden = BENT**2 * ((x - t * cx) ** 2 + (y - t * cy) ** 2)
+            hidden = BEND_UNCERTAINTY**2 * ((x - t * cx) ** 2 + (y - t * cy) ** 2)
             xx = s * s * cov[a, 0, 0] + t * t * cov[b, 0, 0] + hidden
             cross = s * s * cov[a, 0, 1] + t * t * cov[b, 0, 1]
             yy = s * s * cov[a, 1, 1] + t * t * cov[b, 1, 1] + hidden
             across = (points[e, j, 1] - y0 - y) * tx - (points[e, j, 0] - x0 - x) * ty
             status[e, j] = VirtualStatus.INTERPOLATED
-            if abs(across) < MAX_APART * length:  # not where there is none
+            if abs(across) < MAX_MEASURED_OFFSET * length:  # not where there is none
                 x, y = x - across * ty, y + across * tx
                 along, aside = xx * tx * tx + 2 * cross * tx * ty + yy * ty * ty, points[e, j, 2]
                 xx, cross = along * tx * tx + aside * ty * ty, (along - aside) * tx * ty

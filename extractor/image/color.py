@@ -15,9 +15,9 @@ HUE_REACH_DEG = 50.0  # a hue farther than this from its nominal one is not that
 MIN_CHROMA = 12  # below this, 8-bit hue is noise
 OPENCV_HUE_DEG = 2.0
 HUE_WIDTH_DEG = 40.0  # pixels farther from every center tell nothing about it
-ROUNDS = 8
-STRONG_SHARE = 0.98  # of the colored pixels are less saturated than what counts as strong
-PALE_SHARE = 8  # times less chroma than that is pale
+KMEANS_ROUNDS = 8
+STRONG_QUANTILE = 0.98  # of the colored pixels are less saturated than what counts as strong
+PALE_DIVISOR = 8  # times less chroma than that is pale
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +43,19 @@ def nominal_hues_deg(palette: dict[str, str]) -> NDArray[np.float64]:
 
 
 @compiled
-def _converted(image):  # type: ignore[no-untyped-def]
+def _hsv_and_chroma(image):  # type: ignore[no-untyped-def]
     """(H, W, 3) uint8 OpenCV's HSV, to the bit, in less than half its time; and (H, W) uint8 each: the hue, and the
     chroma max - min of B, G, R, which is S V / 255."""
     height, width = image.shape[:2]
     hsv = np.empty((height, width, 3), np.uint8)
     hue, chroma = np.empty((height, width), np.uint8), np.empty((height, width), np.uint8)
-    _convert(image.reshape(-1), hsv.reshape(-1), hue.reshape(-1), chroma.reshape(-1))
+    _fill_hsv_and_chroma(image.reshape(-1), hsv.reshape(-1), hue.reshape(-1), chroma.reshape(-1))
     return hsv, hue, chroma
 
 
 @compiled
-def _convert(bgr, hsv, hue, chroma):  # type: ignore[no-untyped-def]
-    """``_converted``, flat: in whole numbers of 32 bits, which lanes hold; quotients are rounded to 2^-12."""
+def _fill_hsv_and_chroma(bgr, hsv, hue, chroma):  # type: ignore[no-untyped-def]
+    """``_hsv_and_chroma``, flat: in whole numbers of 32 bits, which lanes hold; quotients are rounded to 2^-12."""
     one, two, three, twelve = np.uint64(1), np.uint64(2), np.uint64(3), np.int32(12)
     half, rounds, unit = np.float32(0.5), np.int32(1 << 11), np.int32(1)
     for i in range(np.uint64(hue.shape[0])):
@@ -75,14 +75,14 @@ def _convert(bgr, hsv, hue, chroma):  # type: ignore[no-untyped-def]
 
 def to_colors(image: NDArray[np.uint8]) -> Colors:
     """HSV and chroma of an 8-bit BGR image."""
-    return Colors(*_converted(np.ascontiguousarray(image)))
+    return Colors(*_hsv_and_chroma(np.ascontiguousarray(image)))
 
 
 @compiled
 def hue_weights(hue, chroma):  # type: ignore[no-untyped-def]
     """(180,) the chroma of the pixels of each hue, summed over those that are not pale; zeros without any."""
     of_chroma, rest = np.zeros(256, np.int64), np.zeros(HUES, np.int64)
-    lower = np.zeros((HUES, 256 // PALE_SHARE), np.int32)  # what may turn out to be pale, by hue and chroma
+    lower = np.zeros((HUES, 256 // PALE_DIVISOR), np.int32)  # what may turn out to be pale, by hue and chroma
     for y in range(hue.shape[0]):
         for x in range(hue.shape[1]):
             much = chroma[y, x]
@@ -93,21 +93,21 @@ def hue_weights(hue, chroma):  # type: ignore[no-untyped-def]
                 lower[hue[y, x], much] += 1
             else:
                 rest[hue[y, x]] += much
-    limit, below, strong = STRONG_SHARE * of_chroma.sum(), 0, 0
+    limit, below, strong = STRONG_QUANTILE * of_chroma.sum(), 0, 0
     while strong < 255 and below + of_chroma[strong] < limit:
         below += of_chroma[strong]
         strong += 1
-    for much in range(max(MIN_CHROMA, strong // PALE_SHARE), lower.shape[1]):
+    for much in range(max(MIN_CHROMA, strong // PALE_DIVISOR), lower.shape[1]):
         for one in range(HUES):
             rest[one] += much * lower[one, much]
     return rest.astype(np.float64)
 
 
 @compiled
-def _centers(weight, nominal_deg):  # type: ignore[no-untyped-def]
+def _hue_shifts(weight, nominal_deg):  # type: ignore[no-untyped-def]
     """Circular 3-means of a hue histogram, held within reach of the nominal hues; False when an ink has no pixels."""
     shift = np.zeros(3)
-    for _ in range(ROUNDS):
+    for _ in range(KMEANS_ROUNDS):
         total, moment = np.zeros(3), np.zeros(3)
         for hue in range(HUES):
             if weight[hue] == 0.0:
@@ -137,7 +137,7 @@ def find_hues(weight: NDArray[np.float64], nominal_deg: NDArray[np.float64]) -> 
     """
     if not weight.any():
         return None
-    shift, found = _centers(weight, nominal_deg)
+    shift, found = _hue_shifts(weight, nominal_deg)
     return (nominal_deg + shift) % 360 if found else None
 
 

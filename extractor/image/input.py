@@ -12,11 +12,11 @@ from extractor.errors import ImageError
 from extractor.numeric.compilation import compiled
 
 MIN_SIDE_PX = 16
-NOISE_PLACES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
-BESIDE = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
+NOISE_SAMPLES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
+NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
-def prepare(image: NDArray[Any]) -> NDArray[np.uint8] | None:
+def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
     """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
 
     16-bit images are scaled to 8 bits (value / 257, rounded), the alpha of BGRA is dropped, and a grayscale image
@@ -58,14 +58,14 @@ def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
     NaN where no cell is seen.
     """
     counts, total = np.zeros(8 * 255 + 1, np.int64), 0
-    around = min(max(NOISE_PLACES // max(cells.shape[0], 1), 1), len(BESIDE))
+    around = min(max(NOISE_SAMPLES // max(cells.shape[0], 1), 1), len(NEIGHBOUR_PIXELS))
     for i in range(cells.shape[0]):
         a, b, c = cells[i]
         cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3
         if not (cx > 2.5 and cy > 2.5 and cx < image.shape[1] - 3.5 and cy < image.shape[0] - 3.5):
             continue
         for k in range(around):
-            x, y = int(cx + 0.5) + BESIDE[k][0], int(cy + 0.5) + BESIDE[k][1]
+            x, y = int(cx + 0.5) + NEIGHBOUR_PIXELS[k][0], int(cy + 0.5) + NEIGHBOUR_PIXELS[k][1]
             for channel in range(3):
                 response, low, high = np.int64(0), np.int64(255), np.int64(0)
                 for dy in range(-1, 2):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from extractor.numeric.compilation import compiled, inlined
 
 
-class Frame(NamedTuple):
+class PolynomialFrame(NamedTuple):
     """The image coordinates of polynomials: (x - x) / scale, (y - y) / scale."""
 
     x: float
@@ -18,52 +18,52 @@ class Frame(NamedTuple):
     scale: float
 
 
-class Sight(NamedTuple):
+class PyramidLevel(NamedTuple):
     """An image at 1/``scale`` of its size, and the coordinates of its polynomials."""
 
     image: NDArray[np.uint8]
     scale: int
-    frame: Frame
+    frame: PolynomialFrame
 
     def reduced(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points of the full image in this one."""
         return (xy_px + 0.5) / self.scale - 0.5
 
-    def full(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_full_scale(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points of this image in the full one."""
         return (xy_px + 0.5) * self.scale - 0.5
 
 
-class Sights:
+class Pyramid:
     """One image at every scale that is asked for, each made once."""
 
     def __init__(self, image: NDArray[np.uint8]) -> None:
         self._image = image
-        self._made: dict[int, Sight] = {}
+        self._levels: dict[int, PyramidLevel] = {}
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height at full scale, px."""
         return self._image.shape[1], self._image.shape[0]
 
-    def at(self, scale: int) -> Sight:
+    def at(self, scale: int) -> PyramidLevel:
         """The image reduced by averaging ``scale`` x ``scale`` pixels."""
-        if scale not in self._made:
-            self._made[scale] = _sight(self._image, scale)
-        return self._made[scale]
+        if scale not in self._levels:
+            self._levels[scale] = _pyramid_level(self._image, scale)
+        return self._levels[scale]
 
 
-def _sight(image: NDArray[np.uint8], scale: int) -> Sight:
+def _pyramid_level(image: NDArray[np.uint8], scale: int) -> PyramidLevel:
     if scale == 2:
         image = _halved(image)
     elif scale > 1:
-        image = _averaged(image, scale)
+        image = _block_means(image, scale)
     height, width = image.shape[:2]
-    return Sight(image, scale, Frame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
+    return PyramidLevel(image, scale, PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
 
 
 @compiled
-def _averaged(image, scale):  # type: ignore[no-untyped-def]
+def _block_means(image, scale):  # type: ignore[no-untyped-def]
     """The means of ``scale`` x ``scale`` pixels, halves rounded up; what is left over at the rims is cut off."""
     height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
     out = np.empty((height, width, 3), np.uint8)
@@ -77,7 +77,7 @@ def _averaged(image, scale):  # type: ignore[no-untyped-def]
             line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
             for i in range(row):
                 column[i] += np.uint16(line[i])
-        _add_up(column, scale, width, total)
+        _fill_block_sums(column, scale, width, total)
         own = means[3 * y * width : 3 * (y + 1) * width]
         for i in range(3 * width):
             own[i] = np.uint8(np.float32(total[i]) * share + half)
@@ -85,7 +85,7 @@ def _averaged(image, scale):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _add_up(column, scale, width, total):  # type: ignore[no-untyped-def]
+def _fill_block_sums(column, scale, width, total):  # type: ignore[no-untyped-def]
     """Write the sums of ``scale`` pixels side by side, all channels of a pixel at once."""
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     at = np.uint64(0)

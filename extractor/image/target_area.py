@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 from extractor.image.color import MIN_CHROMA, Colors
 from extractor.numeric.compilation import compiled
 
-SHRINK = 8  # pixels per side of a tile of the target area
-DRY_RANK, DRY_SHARE = 0.95, 0.15  # tiles with less than this share of the chroma of that rank have no color
+TARGET_TILE_PX = 8  # pixels per side of a tile of the target area
+MIN_CHROMA_QUANTILE, MIN_CHROMA_SHARE = (
+    0.95,
+    0.15,
+)  # tiles with less than this share of the chroma of that rank have no color
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Stage 1. ``mask`` (h, w) bool: pixels that may belong to the pattern, at 1/``shrink`` of the image's scale."""
+    """Stage 1. ``mask`` (h, w) bool: pixels that may belong to the pattern, at 1/``tile_px`` of the image's scale."""
 
     mask: NDArray[np.uint8]
-    shrink: int
+    tile_px: int
 
 
 def find_target(colors: Colors) -> Target:
@@ -28,12 +31,12 @@ def find_target(colors: Colors) -> Target:
     Tiles without color are water; closing seals the gaps between cells first, so that the flood stops at the
     pattern's rim while its black cells stay dry.
     """
-    return Target(mask=_dry(_tile_chroma(colors.chroma, SHRINK)), shrink=SHRINK)
+    return Target(mask=_target_mask(_tile_chroma(colors.chroma, TARGET_TILE_PX)), tile_px=TARGET_TILE_PX)
 
 
 @compiled
 def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
-    """The largest chroma in every tile of ``shrink`` pixels."""
+    """The largest chroma in every tile of ``tile_px`` pixels."""
     height, width = chroma.shape
     rows, columns = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
     largest, strongest, flat = (
@@ -56,22 +59,22 @@ def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _dry(chroma):  # type: ignore[no-untyped-def]
+def _target_mask(chroma):  # type: ignore[no-untyped-def]
     """(rows, columns) uint8, which tiles the flood does not reach."""
     counts = np.zeros(256, np.int64)
     for much in chroma.ravel():
         counts[much] += 1
-    rank, below, strong = int(DRY_RANK * (chroma.size - 1)), counts[0], 0
+    rank, below, strong = int(MIN_CHROMA_QUANTILE * (chroma.size - 1)), counts[0], 0
     while below <= rank:
         strong += 1
         below += counts[strong]
-    colored = (chroma > max(float(MIN_CHROMA), DRY_SHARE * strong)).astype(np.uint8)
-    closed = _spread(_spread(colored, 1), 0)
+    colored = (chroma > max(float(MIN_CHROMA), MIN_CHROMA_SHARE * strong)).astype(np.uint8)
+    closed = _dilated(_dilated(colored, 1), 0)
     return 1 - _flooded(closed)
 
 
 @compiled
-def _spread(mask, value):  # type: ignore[no-untyped-def]
+def _dilated(mask, value):  # type: ignore[no-untyped-def]
     """The mask with ``value`` in the eight tiles around each that has it, too."""
     rows, columns = mask.shape
     out = mask.copy()

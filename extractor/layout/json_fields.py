@@ -40,7 +40,7 @@ def shown(value: object) -> str:
 def document(text: str) -> dict[str, Any]:
     """The JSON object in ``text``; NaN, Infinity and names given twice are refused."""
     try:
-        value = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_twins)
+        value = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_duplicates)
     except json.JSONDecodeError as error:
         raise LayoutError(
             f"not JSON, or truncated: {error.msg} at line {error.lineno}, column {error.colno}"
@@ -60,7 +60,7 @@ def _refuse_constant(name: str) -> NoReturn:
     raise LayoutError(f"holds the value {name}; expected finite numbers only")
 
 
-def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) < len(pairs):
         names = [name for name, _ in pairs]
@@ -106,7 +106,7 @@ def length_mm(value: object, field: str) -> float:
 
 def integers(value: object, field: str, high: int, length: int | None = None) -> NDArray[np.int32]:
     """(N,) int32 from 0 to ``high``."""
-    column = _column(value, field, length)
+    column = _list_value(value, field, length)
     return _integers(column, field, high, 1)
 
 
@@ -118,7 +118,7 @@ def integer_rows(value: object, field: str, high: int, widths: tuple[int, ...]) 
 
 def lengths_mm(value: object, field: str, length: int) -> NDArray[np.float64]:
     """(N,) finite float64 in mm, of either sign."""
-    return _lengths_mm(_column(value, field, length), field, 1)
+    return _lengths_mm(_list_value(value, field, length), field, 1)
 
 
 def points_mm(value: object, field: str) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ def points_mm(value: object, field: str) -> NDArray[np.float64]:
 
 def choices(value: object, field: str, length: int, names: Sequence[str]) -> NDArray[np.uint8]:
     """(N,) uint8, each text's place in ``names``."""
-    column = _column(value, field, length)
+    column = _list_value(value, field, length)
     codes = {name: code for code, name in enumerate(names)}
     found = [codes.get(item, -1) if type(item) is str else -1 for item in column]
     if -1 in found:
@@ -138,7 +138,7 @@ def choices(value: object, field: str, length: int, names: Sequence[str]) -> NDA
     return np.array(found, dtype=np.uint8)
 
 
-def _column(value: object, field: str, length: int | None) -> list[Any]:
+def _list_value(value: object, field: str, length: int | None) -> list[Any]:
     if not isinstance(value, list):
         fail(field, shown(value), "a list")
     if not value:
@@ -149,7 +149,7 @@ def _column(value: object, field: str, length: int | None) -> list[Any]:
 
 
 def _flat_rows(value: object, field: str, widths: tuple[int, ...]) -> tuple[list[Any], int]:
-    rows = _column(value, field, None)
+    rows = _list_value(value, field, None)
     first = len(rows[0]) if type(rows[0]) is list else -1
     width = first if first in widths else widths[0]
     if set(map(type, rows)) != {list} or set(map(len, rows)) != {width}:
@@ -161,14 +161,14 @@ def _flat_rows(value: object, field: str, widths: tuple[int, ...]) -> tuple[list
 def _integers(flat: list[Any], field: str, high: int, width: int) -> NDArray[np.int32]:
     if set(map(type, flat)) != {int} or min(flat) < 0 or max(flat) > high:
         at = next(i for i, item in enumerate(flat) if type(item) is not int or not 0 <= item <= high)
-        fail(_place(field, at, width), shown(flat[at]), f"an integer from 0 to {high}")
+        fail(_field_path(field, at, width), shown(flat[at]), f"an integer from 0 to {high}")
     return np.array(flat, dtype=np.int32)
 
 
 def _lengths_mm(flat: list[Any], field: str, width: int) -> NDArray[np.float64]:
     if not set(map(type, flat)) <= {int, float} or not all(-MAX_MM <= item <= MAX_MM for item in flat):
         at = next(i for i, item in enumerate(flat) if not _is_length(item))
-        fail(_place(field, at, width), shown(flat[at]), f"a number from {-MAX_MM:g} to {MAX_MM:g} mm")
+        fail(_field_path(field, at, width), shown(flat[at]), f"a number from {-MAX_MM:g} to {MAX_MM:g} mm")
     return np.array(flat, dtype=np.float64)
 
 
@@ -176,5 +176,5 @@ def _is_length(item: object) -> bool:
     return type(item) in (int, float) and -MAX_MM <= item <= MAX_MM  # type: ignore[operator]
 
 
-def _place(field: str, at: int, width: int) -> str:
+def _field_path(field: str, at: int, width: int) -> str:
     return f"{field}[{at}]" if width == 1 else f"{field}[{at // width}][{at % width}]"

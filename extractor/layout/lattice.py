@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 
-SIX = np.array([[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32)  # steps to the neighbours
+NEIGHBOUR_STEPS = np.array(
+    [[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32
+)  # steps to the neighbours
 
 
 @compiled
@@ -38,7 +40,7 @@ def marker_id(q, r):  # type: ignore[no-untyped-def]
     return 3 * k * (k - 1) + 1 + i
 
 
-def axial(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int32]:
+def axial_coordinates(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int32]:
     """(M, 2) int32 axial coordinates of the markers with these layers and indices."""
     k = np.maximum(layer, 1)
     side, along = np.divmod(index, k)
@@ -50,7 +52,7 @@ def axial(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int3
 
 
 @compiled
-def turned_place(q, r, turn):  # type: ignore[no-untyped-def]
+def rotated_cell(q, r, turn):  # type: ignore[no-untyped-def]
     """The axial place of a cell turned by 0, 120 or 240 degrees; inks are carried onto themselves when shifted so that
     their (q - r) mod 3 agrees.
 
@@ -65,9 +67,9 @@ def turned_place(q, r, turn):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def turned(at, turn):  # type: ignore[no-untyped-def]
+def rotated_cells(at, turn):  # type: ignore[no-untyped-def]
     """(N, 2) int32, the axial coordinates of cells turned so."""
     out = np.empty(at.shape, np.int32)
     for i in range(at.shape[0]):
-        out[i] = turned_place(at[i, 0], at[i, 1], turn)
+        out[i] = rotated_cell(at[i, 0], at[i, 1], turn)
     return out

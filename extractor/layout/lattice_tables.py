@@ -9,27 +9,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.lattice import SIX, axial, marker_id
-from extractor.layout.neighbour_tables import INNER, inner_table, neighbour_table, ring_weights
+from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates, marker_id
+from extractor.layout.neighbour_tables import (
+    FIRST_RING,
+    inward_neighbour_table,
+    neighbour_table,
+    ring_weights,
+)
 from extractor.layout.reference import BLACK, WHITE, Reference
 from extractor.numeric.compilation import compiled, inlined
 
-UNKNOWN = -(1 << 20)  # the axial coordinate of a cell that has none
+UNKNOWN_AXIAL = -(1 << 20)  # the axial coordinate of a cell that has none
 
 
-class Plan(NamedTuple):
+class LayoutCells(NamedTuple):
     """The layout's colored cells.
 
     Attributes:
         center_mm: (U, 2) float64. ink: (U,) uint8, 1 red, 2 green, 3 blue. size_mm: (U,) float64, the mean side.
         arms_mm: (U, 3, 2) float64, from the center to the corners.
-        beside: (U, 6) int32, the cells that share a corner with each, in the order of ``SIX``; -1 for none.
+        beside: (U, 6) int32, the cells that share a corner with each, in the order of ``NEIGHBOUR_STEPS``; -1 for none.
     """
 
     center_mm: NDArray[np.float64]
     ink: NDArray[np.uint8]
     size_mm: NDArray[np.float64]
-    arms_mm: NDArray[np.float64]
+    corner_vectors_mm: NDArray[np.float64]
     beside: NDArray[np.int32]
 
 
@@ -47,22 +52,23 @@ class Lattice:
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
         inner: (M, 18) int32, for markers of the outermost layer the nearest ones of the others, else -1.
-        ring_weights, inner_weights: (M, 18) float64, weights of ``neighbours`` and of ``inner`` that give a marker's
+        ring_weights, inner_weights: (M, 18) float64, weights of ``neighbours`` and of ``inward_neighbours`` that
+            give a marker's
             place; 0 where they are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
     layers: int
     marker_mm: NDArray[np.float64]
-    holder: NDArray[np.int32]
+    cell_lookup: NDArray[np.int32]
     corner_ids: NDArray[np.int32]
     ink: NDArray[np.uint8]
     axial: NDArray[np.int32]
     layer: NDArray[np.int32]
     neighbours: NDArray[np.int32]
-    inner: NDArray[np.int32]
+    inward_neighbours: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
-    inner_weights: NDArray[np.float64]
+    inward_weights: NDArray[np.float64]
     present: NDArray[np.bool_]
 
     @cached_property
@@ -79,67 +85,68 @@ class Lattice:
 
     @cached_property
     def beside(self) -> NDArray[np.int32]:
-        """(U, 6) int32 the colored cells that share a corner with each, in the order of ``SIX``; -1 for none."""
-        at = self.axial[:, None] + SIX
+        """(U, 6) int32 the colored cells that share a corner with each, in the order of ``NEIGHBOUR_STEPS``; -1 for
+        none."""
+        at = self.axial[:, None] + NEIGHBOUR_STEPS
         return cells_at(at.reshape(-1, 2), self).reshape(-1, 6)
 
     @cached_property
-    def meeting(self) -> NDArray[np.int64]:
+    def cells_per_marker(self) -> NDArray[np.int64]:
         """(M,) how many colored cells meet at each marker."""
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
 
     @cached_property
-    def plan(self) -> Plan:
+    def layout_cells(self) -> LayoutCells:
         """The colored cells as compiled loops see them."""
-        return Plan(self.center_mm, self.ink, self.size_mm, self.arms_mm, self.beside)
+        return LayoutCells(self.center_mm, self.ink, self.size_mm, self.corner_vectors_mm, self.beside)
 
     @cached_property
-    def white_place(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def white_cell_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(2,) mm the middle of the white cell, and (2, 2) mm per axial step in it."""
         below, left, right = self.marker_mm[:3]
         return (below + left + right) / 3, np.stack([right - left, right - below], axis=1)
 
     @cached_property
-    def ring(self) -> NDArray[np.int32]:
+    def first_ring(self) -> NDArray[np.int32]:
         """(M, 6) the markers around each, -1 beyond the pattern."""
-        return np.ascontiguousarray(self.neighbours[:, INNER])
+        return np.ascontiguousarray(self.neighbours[:, FIRST_RING])
 
     @cached_property
     def rim(self) -> NDArray[np.bool_]:
         """(M,) the markers that have not all six around them."""
-        return np.asarray(~((self.ring >= 0) & self.present[self.ring]).all(axis=1))
+        return np.asarray(~((self.first_ring >= 0) & self.present[self.first_ring]).all(axis=1))
 
     @cached_property
-    def arms_mm(self) -> NDArray[np.float64]:
+    def corner_vectors_mm(self) -> NDArray[np.float64]:
         """(U, 3, 2) from the centers of the colored cells to their corners."""
         return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])
 
 
 def lattice_of(reference: Reference) -> Lattice:
     """The tables of a triangular layout."""
-    coordinates = axial(reference.layer, reference.index)
+    coordinates = axial_coordinates(reference.layer, reference.index)
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
     neighbours = neighbour_table(coordinates, int(reference.layer.max()))
-    inner = inner_table(coordinates, reference.layer)
+    inner = inward_neighbour_table(coordinates, reference.layer)
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
     return Lattice(
         layers=int(reference.layer.max()),
         marker_mm=reference.xy_mm,
-        holder=_holder(coordinates[lower_left], int(reference.layer.max())),
-        corner_ids=marker_ids(coordinates[lower_left]),
+        cell_lookup=_cell_lookup_table(coordinates[lower_left], int(reference.layer.max())),
+        corner_ids=corner_marker_ids(coordinates[lower_left]),
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
         layer=reference.layer,
         neighbours=neighbours,
-        inner=inner,
+        inward_neighbours=inner,
         ring_weights=ring_weights(reference.xy_mm, neighbours),
-        inner_weights=ring_weights(reference.xy_mm, inner),
+        inward_weights=ring_weights(reference.xy_mm, inner),
         present=reference.present,
     )
 
 
-def _holder(at: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
+def _cell_lookup_table(at: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     """Where each cell's number stands in a square as large as the layout, with a rim of -1 all around."""
     out = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
     out[at[:, 0] + layers + 1, at[:, 1] + layers + 1] = np.arange(len(at))
@@ -163,19 +170,19 @@ def _cells_at(at, holder):  # type: ignore[no-untyped-def]
 
 def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
     """(N,) int32, the layout's cell at each axial (q, r), or -1."""
-    return np.asarray(_cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.holder))
+    return np.asarray(_cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_lookup))
 
 
 @compiled
-def _marker_ids(at, out):  # type: ignore[no-untyped-def]
+def _fill_corner_ids(at, out):  # type: ignore[no-untyped-def]
     """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
     for i in range(at.shape[0]):
         q, r = at[i, 0], at[i, 1]
         out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
 
 
-def marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
+def corner_marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
     """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1) at the corners of the cells (q, r)."""
     out = np.empty((len(at), 3), np.int32)
-    _marker_ids(np.ascontiguousarray(at, dtype=np.int32), out)
+    _fill_corner_ids(np.ascontiguousarray(at, dtype=np.int32), out)
     return out

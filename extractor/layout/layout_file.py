@@ -68,12 +68,12 @@ def parse_layout(text: str, name: str = "layout") -> Reference:
         LayoutError: see ``load_layout``.
     """
     try:
-        return _reference(fields.document(text))
+        return _checked_reference(fields.document(text))
     except LayoutError as error:
         raise LayoutError(f"{name}: {error}") from None
 
 
-def _reference(document: dict[str, Any]) -> Reference:
+def _checked_reference(document: dict[str, Any]) -> Reference:
     _check_header(document)
     markers = fields.mapping(document["markers"], "markers")
     fields.known_fields(markers, ("layer", "index", "x", "y"), "markers.")

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from extractor.layout.reference import BLACK, Reference
 
-NEIGHBOURS = 6  # around a marker at most
-NEAR = 18  # in its two rings at most
-MAX_TURN = np.cos(np.radians(150.0))  # of a gridline that goes on beyond a marker
+MAX_NEIGHBOURS = 6  # around a marker at most
+MAX_RING_MARKERS = 18  # in its two rings at most
+MAX_ONWARD_COSINE = np.cos(np.radians(150.0))  # of a gridline that goes on beyond a marker
 
 
 class Topology(NamedTuple):
@@ -29,9 +29,9 @@ class Topology(NamedTuple):
         offset: (M, 18, 2) float64, their places relative to it in the layout, in units of the mean edge, y up.
         stencil: (M, 2, 18) float64: weights that give the map's derivatives from the differences to these markers
             (a cubic's least squares), where all 18 are there; else 0.
-        along: (E, 2) float64, from an edge's start to its end, in the unit of ``offset``.
+        along: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
         ahead: (E, 2) int32, the marker next on the same gridline before an edge's start, and the one after its end.
-        third: (E, 2) float64, the layout's third difference along these four, in the unit of ``offset``.
+        third: (E, 2) float64, the layout's third difference along these four, in the unit of ``ring_vectors``.
         onward: (M, 6) int32, the edge after each of the ``spokes`` on the same gridline.
     """
 
@@ -43,12 +43,12 @@ class Topology(NamedTuple):
     edge_cells: NDArray[np.int32]
     spokes: NDArray[np.int32]
     near: NDArray[np.int32]
-    offset: NDArray[np.float64]
-    stencil: NDArray[np.float64]
-    along: NDArray[np.float64]
-    ahead: NDArray[np.int32]
-    third: NDArray[np.float64]
-    onward: NDArray[np.int32]
+    ring_vectors: NDArray[np.float64]
+    derivative_stencil: NDArray[np.float64]
+    edge_vectors: NDArray[np.float64]
+    next_markers: NDArray[np.int32]
+    third_differences: NDArray[np.float64]
+    next_edges: NDArray[np.int32]
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -59,17 +59,17 @@ def topology_of(layout: Reference) -> Topology:
     sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2)
     key = edges[:, 0] * count + edges[:, 1]
     cell_edges = np.searchsorted(key, sides.min(axis=2) * count + sides.max(axis=2))
-    edge_cells = _grouped(cell_edges.ravel(), np.repeat(np.arange(len(cells)), 3), len(edges), 2)
+    edge_cells = _items_by_owner(cell_edges.ravel(), np.repeat(np.arange(len(cells)), 3), len(edges), 2)
     ends = edges.ravel(order="F")
-    spokes = _grouped(ends, np.tile(np.arange(len(edges)), 2), count, NEIGHBOURS)
-    ring = _grouped(ends, edges[:, ::-1].ravel(order="F"), count, NEIGHBOURS)
+    spokes = _items_by_owner(ends, np.tile(np.arange(len(edges)), 2), count, MAX_NEIGHBOURS)
+    ring = _items_by_owner(ends, edges[:, ::-1].ravel(order="F"), count, MAX_NEIGHBOURS)
     near = _two_rings(ring)
     xy = layout.xy_mm
     chord = xy[edges[:, 1]] - xy[edges[:, 0]]
     length = np.linalg.norm(chord, axis=1)
-    ahead = np.stack([_ahead(ring, xy, edges[:, ::-1]), _ahead(ring, xy, edges)], axis=1)
+    ahead = np.stack([_next_markers(ring, xy, edges[:, ::-1]), _next_markers(ring, xy, edges)], axis=1)
     third = xy[ahead[:, 0]] - xy[ahead[:, 1]] + 3 * chord
-    spokes = _around(spokes, edges, xy)
+    spokes = _sorted_by_direction(spokes, edges, xy)
     offset = np.where((near >= 0)[:, :, None], (xy[near] - xy[:, None]) / length.mean(), 0.0)
     return Topology(
         edges=layout.edges.astype(np.int32),
@@ -80,16 +80,16 @@ def topology_of(layout: Reference) -> Topology:
         edge_cells=edge_cells,
         spokes=spokes,
         near=near,
-        offset=offset,
-        stencil=_stencil(near, offset),
-        along=chord / length.mean(),
-        ahead=ahead,
-        third=np.where(np.all(ahead >= 0, axis=1)[:, None], third / length.mean(), 0.0),
-        onward=_onward(spokes, edges, ahead, key),
+        ring_vectors=offset,
+        derivative_stencil=_derivative_stencil(near, offset),
+        edge_vectors=chord / length.mean(),
+        next_markers=ahead,
+        third_differences=np.where(np.all(ahead >= 0, axis=1)[:, None], third / length.mean(), 0.0),
+        next_edges=_next_edges(spokes, edges, ahead, key),
     )
 
 
-def _onward(
+def _next_edges(
     spokes: NDArray[np.int32], edges: NDArray[np.int64], ahead: NDArray[np.int32], key: NDArray[np.int64]
 ) -> NDArray[np.int32]:
     """(M, 6) int32: the edge after each spoke on the same gridline, -1 where none is; ``key`` tells edges."""
@@ -100,7 +100,9 @@ def _onward(
     return np.where((spokes >= 0) & (beyond >= 0), found, -1).astype(np.int32)
 
 
-def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most: int) -> NDArray[np.int32]:
+def _items_by_owner(
+    owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most: int
+) -> NDArray[np.int32]:
     """(count, most) int32: the items of each owner, filled up with -1."""
     order = np.argsort(owner, kind="stable")
     owner, item = owner[order], item[order]
@@ -110,7 +112,7 @@ def _grouped(owner: NDArray[np.int64], item: NDArray[np.int64], count: int, most
     return out
 
 
-def _around(
+def _sorted_by_direction(
     spokes: NDArray[np.int32], edges: NDArray[np.int64], xy: NDArray[np.float64]
 ) -> NDArray[np.int32]:
     """(M, 6) int32: the edges at each marker in the order of their directions."""
@@ -121,7 +123,9 @@ def _around(
     return np.take_along_axis(spokes, np.argsort(angle, axis=1, kind="stable"), axis=1)
 
 
-def _ahead(ring: NDArray[np.int32], xy: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int32]:
+def _next_markers(
+    ring: NDArray[np.int32], xy: NDArray[np.float64], edges: NDArray[np.int64]
+) -> NDArray[np.int32]:
     """(E,) int32: the neighbour of each edge's end that goes on in its direction, -1 where none does."""
     start, end = edges[:, 0], edges[:, 1]
     back, on = xy[start] - xy[end], xy[ring[end]] - xy[end][:, None]
@@ -130,7 +134,7 @@ def _ahead(ring: NDArray[np.int32], xy: NDArray[np.float64], edges: NDArray[np.i
         cosine = np.where(ring[end] >= 0, np.einsum("ek,enk->en", back, on) / lengths, 1.0)
     best = cosine.argmin(axis=1)
     rows = np.arange(len(edges))
-    return np.where(cosine[rows, best] < MAX_TURN, ring[end][rows, best], -1).astype(np.int32)
+    return np.where(cosine[rows, best] < MAX_ONWARD_COSINE, ring[end][rows, best], -1).astype(np.int32)
 
 
 def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -145,13 +149,15 @@ def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
     again[:, 1:] = ordered[:, 1:] == ordered[:, :-1]
     np.put_along_axis(both, order, np.where(again, -1, ordered), axis=1)
     front = np.argsort(both < 0, axis=1, kind="stable")
-    return np.ascontiguousarray(np.take_along_axis(both, front, axis=1)[:, :NEAR].astype(np.int32))
+    return np.ascontiguousarray(
+        np.take_along_axis(both, front, axis=1)[:, :MAX_RING_MARKERS].astype(np.int32)
+    )
 
 
-def _stencil(near: NDArray[np.int32], offset: NDArray[np.float64]) -> NDArray[np.float64]:
+def _derivative_stencil(near: NDArray[np.int32], offset: NDArray[np.float64]) -> NDArray[np.float64]:
     x, y = offset[..., 0], offset[..., 1]
     terms = np.stack([x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
-    out = np.zeros((len(near), 2, NEAR))
+    out = np.zeros((len(near), 2, MAX_RING_MARKERS))
     full = (near >= 0).all(axis=1)
     terms = terms[full]
     gram = np.swapaxes(terms, 1, 2) @ terms

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import compiled, lent
+from extractor.numeric.compilation import compiled, inlined_no_refcount
 
 MIN_SPREAD = 0.2  # of the neighbours across against along, below which they are one line and tell nothing
 MAX_MISFIT = 0.3  # of the way to a neighbour, between its center and where a cell's own triangle puts it
-MIN_RIVAL = 0.8  # the same for the triangle turned by a third, which puts it 1.7 ways off
+MIN_RIVAL_MISFIT = 0.8  # the same for the triangle turned by a third, which puts it 1.7 ways off
 
 
 @compiled
-def seen_as(cell, count):  # type: ignore[no-untyped-def]
+def image_cell_of_layout_cell(cell, count):  # type: ignore[no-untyped-def]
     """(U,) int32, which cell of the image each of the layout's ``count`` cells is, or -1."""
     out = np.full(count, -1, np.int32)
     for i in range(cell.shape[0]):
@@ -22,7 +22,7 @@ def seen_as(cell, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def slopes(center_px, cell, seen, center_mm, beside):  # type: ignore[no-untyped-def]
+def linear_maps(center_px, cell, seen, center_mm, beside):  # type: ignore[no-untyped-def]
     """(N, 2, 2) float64, image step (px) per layout step (mm) around each numbered cell, by least squares over its six
     neighbours; NaN where they lie on one line.
 
@@ -31,12 +31,12 @@ def slopes(center_px, cell, seen, center_mm, beside):  # type: ignore[no-untyped
     out = np.full((cell.shape[0], 2, 2), np.nan)
     for i in range(cell.shape[0]):
         if cell[i] >= 0:
-            lay_slope(i, center_px, cell[i], seen, center_mm, beside, out[i])
+            fill_linear_map(i, center_px, cell[i], seen, center_mm, beside, out[i])
     return out
 
 
-@lent
-def lay_slope(i, center_px, u, seen, center_mm, beside, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_linear_map(i, center_px, u, seen, center_mm, beside, out):  # type: ignore[no-untyped-def]
     """Write that of cell i, the layout's u."""
     xx, xy, yy = 0.0, 0.0, 0.0
     ax, ay, bx, by = 0.0, 0.0, 0.0, 0.0
@@ -63,7 +63,7 @@ def lay_slope(i, center_px, u, seen, center_mm, beside, out):  # type: ignore[no
 
 
 @compiled
-def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-def]
+def _fill_map_from_triangle(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-def]
     """Write the linear map that carries a cell's corners 0 and 1 to those of a triangle, counted from ``shift``."""
     a, b = arms[0], arms[1]
     p, q = seen[shift] - middle, seen[(shift + step) % 3] - middle
@@ -73,7 +73,7 @@ def _spanned(arms, seen, middle, shift, step, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out):  # type: ignore[no-untyped-def]
+def _fill_maps_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out):  # type: ignore[no-untyped-def]
     """Write the map of every numbered cell that has none, but a triangle, and a neighbour that tells its turn."""
     center_mm, _, _, arms_mm, beside = plan
     maps, misfit = np.empty((3, 2, 2)), np.empty(3)
@@ -85,7 +85,7 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out): 
         if u < 0 or not np.isnan(out[i, 0, 0]) or np.isnan(corner_px[i, 0, 0]):
             continue
         for shift in range(3):
-            _spanned(arms_mm[u], corner_px[i], center_px[i], shift, step, maps[shift])
+            _fill_map_from_triangle(arms_mm[u], corner_px[i], center_px[i], shift, step, maps[shift])
         misfit[:] = 0.0
         for k in range(6):
             v = beside[u, k]
@@ -99,16 +99,17 @@ def _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out): 
                 misfit[shift] = max(misfit[shift], apart / np.hypot(px, py))
         best = misfit.argmin()
         # without a neighbour all are 0
-        if misfit[best] < MAX_MISFIT and min(misfit[best - 1], misfit[best - 2]) > MIN_RIVAL:
+        if misfit[best] < MAX_MISFIT and min(misfit[best - 1], misfit[best - 2]) > MIN_RIVAL_MISFIT:
             out[i] = maps[best]
 
 
 @compiled
-def whole_slopes(center_px, corner_px, cell, mirrored, plan):  # type: ignore[no-untyped-def]
-    """``slopes``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle says
+def completed_linear_maps(center_px, corner_px, cell, mirrored, plan):  # type: ignore[no-untyped-def]
+    """``linear_maps``, and where a cell's neighbours are too few for it, in the rims of holes, what its own triangle
+    says
     if one of them tells which of its corners is which."""
     center_mm, _, _, arms_mm, beside = plan
-    seen = seen_as(cell, arms_mm.shape[0])
-    out = slopes(center_px, cell, seen, center_mm, beside)
-    _add_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out)
+    seen = image_cell_of_layout_cell(cell, arms_mm.shape[0])
+    out = linear_maps(center_px, cell, seen, center_mm, beside)
+    _fill_maps_from_triangles(center_px, corner_px, mirrored, cell, seen, plan, out)
     return out

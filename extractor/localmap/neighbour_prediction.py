@@ -4,17 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.layout.neighbour_tables import MIN_LINEAR, MIN_QUADRATIC, PIVOT, PLANE, TERMS
-from extractor.localmap.ring_maps import BENT, LEFT, SIDE, SOUND, lay_neighbours, room_for_maps, solve_maps
+from extractor.layout.neighbour_tables import (
+    LINEAR_TERMS,
+    MIN_LINEAR_NEIGHBOURS,
+    MIN_PIVOT,
+    MIN_QUADRATIC_NEIGHBOURS,
+    QUADRATIC_TERMS,
+)
+from extractor.localmap.ring_maps import (
+    DETERMINED,
+    IS_QUADRATIC,
+    RIGHT_SIDE,
+    SQUARED_MISFIT,
+    allocate_ring_map_buffers,
+    fill_map_solutions,
+    fill_neighbours,
+)
 from extractor.numeric.batched_systems import LANES
-from extractor.numeric.compilation import compiled, lent
+from extractor.numeric.compilation import compiled, inlined_no_refcount
 
-CUBIC = 10  # the same terms and x^3, x^2 y, x y^2, y^3
-MIN_CUBIC = 16  # neighbours, which leave a cubic something to miss
+CUBIC_TERMS = 10  # the same terms and x^3, x^2 y, x y^2, y^3
+MIN_CUBIC_NEIGHBOURS = 16  # neighbours, which leave a cubic something to miss
 
 
-@lent
-def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def is_neighbour_outlier(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
     """Whether a known marker lies farther than the limit from where its neighbours put it, or these are not all known,
     or too few."""
     x, y = xy_px[m, 0], xy_px[m, 1]
@@ -26,7 +40,7 @@ def strays(xy_px, m, limit_px, weights, table):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _factor(matrix, terms):  # type: ignore[no-untyped-def]
+def _update_to_cholesky_factor(matrix, terms):  # type: ignore[no-untyped-def]
     """Cholesky factor in place; False when the neighbours do not determine the map."""
     for i in range(terms):
         for j in range(i + 1):
@@ -34,7 +48,7 @@ def _factor(matrix, terms):  # type: ignore[no-untyped-def]
             for k in range(j):
                 total -= matrix[i, k] * matrix[j, k]
             if i == j:
-                if not total > PIVOT:
+                if not total > MIN_PIVOT:
                     return False
                 matrix[i, i] = np.sqrt(total)
             else:
@@ -43,7 +57,7 @@ def _factor(matrix, terms):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _solve(factor, terms, vector):  # type: ignore[no-untyped-def]
+def _update_to_solution(factor, terms, vector):  # type: ignore[no-untyped-def]
     """Solve in place with a Cholesky factor."""
     for i in range(terms):
         for k in range(i):
@@ -56,7 +70,7 @@ def _solve(factor, terms, vector):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
+def predict_markers(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
     """Where the wanted markers lie by their neighbours in two rings, themselves not counted.
 
     Returns:
@@ -71,56 +85,56 @@ def predicted(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
         np.full(count, np.nan),
         np.zeros(count, np.int32),
     )
-    room, filled, members = room_for_maps(table.shape[1]), 0, np.empty(LANES, np.int64)
+    room, filled, members = allocate_ring_map_buffers(table.shape[1]), 0, np.empty(LANES, np.int64)
     for m in range(count):
         if not wanted[m]:
             continue
-        n = lay_neighbours(xy_px, m, filled, marker_mm, table, room)
+        n = fill_neighbours(xy_px, m, filled, marker_mm, table, room)
         out[3][m] = n
-        if n >= MIN_LINEAR:
-            room[1][BENT * LANES + filled], members[filled] = n >= MIN_QUADRATIC, m
+        if n >= MIN_LINEAR_NEIGHBOURS:
+            room[1][IS_QUADRATIC * LANES + filled], members[filled] = n >= MIN_QUADRATIC_NEIGHBOURS, m
             filled += 1
         if filled == LANES:
-            _predict(members, room, out)
+            _fill_predictions(members, room, out)
             filled = 0
     if filled > 0:
-        _predict(members[:filled], room, out)
+        _fill_predictions(members[:filled], room, out)
     return out
 
 
 @compiled
-def _predict(members, room, out):  # type: ignore[no-untyped-def]
-    """Write what ``predicted`` returns of these markers, which have the first lanes."""
-    solve_maps(room, members.shape[0])
+def _fill_predictions(members, room, out):  # type: ignore[no-untyped-def]
+    """Write what ``predict_markers`` returns of these markers, which have the first lanes."""
+    fill_map_solutions(room, members.shape[0])
     place, variance, leverage, support = out
     for lane in range(members.shape[0]):
         one = room[1][lane:]
-        if one[SOUND * LANES] > 0.0:
-            m, terms = members[lane], TERMS if one[BENT * LANES] > 0.0 else PLANE
-            place[m, 0], place[m, 1] = one[SIDE * LANES], one[(SIDE + TERMS) * LANES]
-            leverage[m] = one[(SIDE + 2 * TERMS) * LANES]
-            variance[m] = one[LEFT * LANES] / (2.0 * max(support[m] - terms, 1))
+        if one[DETERMINED * LANES] > 0.0:
+            m, terms = members[lane], QUADRATIC_TERMS if one[IS_QUADRATIC * LANES] > 0.0 else LINEAR_TERMS
+            place[m, 0], place[m, 1] = one[RIGHT_SIDE * LANES], one[(RIGHT_SIDE + QUADRATIC_TERMS) * LANES]
+            leverage[m] = one[(RIGHT_SIDE + 2 * QUADRATIC_TERMS) * LANES]
+            variance[m] = one[SQUARED_MISFIT * LANES] / (2.0 * max(support[m] - terms, 1))
 
 
 @compiled
 def cubic_variance(xy_px, wanted, marker_mm, table):  # type: ignore[no-untyped-def]
     """(M,) px^2, the variance per axis that a cubic map leaves in the neighbours of the wanted markers; infinite where
-    these are fewer than ``MIN_CUBIC``.
+    these are fewer than ``MIN_CUBIC_NEIGHBOURS``.
 
     What is odd about the marker, as cubic terms are, hardly moves where a quadratic puts it, if its rings are (nearly)
     whole: a quadratic misses much of its neighbours on a surface that is bent, and is right about the middle.
     """
     out = np.full(xy_px.shape[0], np.inf)
-    rows, seen = np.ones((table.shape[1], CUBIC)), np.empty((table.shape[1], 2))
+    rows, seen = np.ones((table.shape[1], CUBIC_TERMS)), np.empty((table.shape[1], 2))
     for m in np.flatnonzero(wanted):
-        n = _arms_around(xy_px, m, marker_mm, table, rows, seen)
-        if n >= MIN_CUBIC:
-            out[m] = _left_by_cubic(rows[:n], seen[:n])
+        n = _fill_neighbour_rows(xy_px, m, marker_mm, table, rows, seen)
+        if n >= MIN_CUBIC_NEIGHBOURS:
+            out[m] = _fill_rows_for_cubic_variance(rows[:n], seen[:n])
     return out
 
 
 @compiled
-def _arms_around(xy_px, m, marker_mm, table, rows, seen):  # type: ignore[no-untyped-def]
+def _fill_neighbour_rows(xy_px, m, marker_mm, table, rows, seen):  # type: ignore[no-untyped-def]
     """Write x and y of the known neighbours of a marker, in units of their mean distance, into the columns 1 and 2 of
     ``rows``, and where they are seen; their number."""
     scale, n = 0.0, 0
@@ -135,27 +149,27 @@ def _arms_around(xy_px, m, marker_mm, table, rows, seen):  # type: ignore[no-unt
 
 
 @compiled
-def _left_by_cubic(rows, seen):  # type: ignore[no-untyped-def]
+def _fill_rows_for_cubic_variance(rows, seen):  # type: ignore[no-untyped-def]
     """The variance per axis about the cubic through places ``seen`` (n, 2); their x and y are columns 1 and 2 of
     ``rows`` (n, 10), whose others are written here."""
-    normal, sides = np.zeros((CUBIC, CUBIC)), np.zeros((2, CUBIC))
+    normal, sides = np.zeros((CUBIC_TERMS, CUBIC_TERMS)), np.zeros((2, CUBIC_TERMS))
     for k in range(rows.shape[0]):
         x, y = rows[k, 1], rows[k, 2]
         rows[k, 3], rows[k, 4], rows[k, 5] = x * x, x * y, y * y
         rows[k, 6], rows[k, 7], rows[k, 8], rows[k, 9] = x * x * x, x * x * y, x * y * y, y * y * y
-        for a in range(CUBIC):
+        for a in range(CUBIC_TERMS):
             for axis in range(2):
                 sides[axis, a] += rows[k, a] * seen[k, axis]
             for b in range(a + 1):
                 normal[a, b] += rows[k, a] * rows[k, b]
-    if not _factor(normal, CUBIC):
+    if not _update_to_cholesky_factor(normal, CUBIC_TERMS):
         return np.inf
     squares = 0.0
     for axis in range(2):
-        _solve(normal, CUBIC, sides[axis])
+        _update_to_solution(normal, CUBIC_TERMS, sides[axis])
         for k in range(rows.shape[0]):
             miss = seen[k, axis]
-            for a in range(CUBIC):
+            for a in range(CUBIC_TERMS):
                 miss -= rows[k, a] * sides[axis, a]
             squares += miss * miss
-    return squares / (2.0 * (rows.shape[0] - CUBIC))
+    return squares / (2.0 * (rows.shape[0] - CUBIC_TERMS))

@@ -4,32 +4,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import compiled, lent, lent_call, lent_vectorized
+from extractor.numeric.compilation import (
+    compiled,
+    compiled_no_refcount,
+    inlined_no_refcount,
+    vectorized_no_refcount,
+)
 from extractor.numeric.median import median_of
 
-WITNESSES = 20  # numbered cells through which a map is laid
-REACH = 4.5  # how far from the nearest of them a cell may stand, in cells
-MAX_SIGMA = 0.12  # of the map there, in cells
+SUPPORT_CELLS = 20  # numbered cells through which a map is laid
+MAX_SUPPORT_DISTANCE = 4.5  # how far from the nearest of them a cell may stand, in cells
+MAX_DEVIATION = 0.12  # of the map there, in cells
 ROBUST_ROUNDS = 4  # what dirt has cut is among the witnesses, too
-EXACT = 0.02  # of a cell: witnesses that fit so well are not judged
+EXACT_MISFIT = 0.02  # of a cell: witnesses that fit so well are not judged
 RIDGE = 1e-3  # holds the curvature of the map where the witnesses lie in a row
 MIN_PIVOT = 1e-7  # of the normal matrix against its largest entry: below, they do lie in a row
 TERMS = 6  # 1, x, y, xx, xy, yy
 # A witness's products: of the terms with each other, those of one power together, and with its place in the layout.
-PRODUCT = np.array([[0, 1, 2, 3, 4, 5], [1, 3, 4, 6, 7, 8], [2, 4, 5, 7, 8, 9]])
-PRODUCT = np.concatenate([PRODUCT, [[3, 6, 7, 10, 11, 12], [4, 7, 8, 11, 12, 13], [5, 8, 9, 12, 13, 14]]])
-PLACE_X, PLACE_Y, CLOSENESS, PRODUCTS = 15, 21, 27, 32
+PRODUCT_INDEX = np.array([[0, 1, 2, 3, 4, 5], [1, 3, 4, 6, 7, 8], [2, 4, 5, 7, 8, 9]])
+PRODUCT_INDEX = np.concatenate(
+    [PRODUCT_INDEX, [[3, 6, 7, 10, 11, 12], [4, 7, 8, 11, 12, 13], [5, 8, 9, 12, 13, 14]]]
+)
+PLACE_X, PLACE_Y, DISTANCE_WEIGHT, PRODUCT_COLUMNS = 15, 21, 27, 32
 
 
 @compiled
-def room_for_map():  # type: ignore[no-untyped-def]
-    """What ``mapped`` needs for its numbers: the witnesses' products, weights and squares, a system and its sums."""
-    of_witnesses = np.zeros((WITNESSES, PRODUCTS)), np.empty(WITNESSES), np.empty(WITNESSES)
-    return *of_witnesses, np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCTS)
+def allocate_map_buffers():  # type: ignore[no-untyped-def]
+    """What ``fill_quadratic_map`` needs for its numbers: the witnesses' products, weights and squares, a system and
+    its sums."""
+    of_witnesses = (
+        np.zeros((SUPPORT_CELLS, PRODUCT_COLUMNS)),
+        np.empty(SUPPORT_CELLS),
+        np.empty(SUPPORT_CELLS),
+    )
+    return *of_witnesses, np.empty((TERMS, TERMS)), np.empty((3, TERMS)), np.empty(PRODUCT_COLUMNS)
 
 
-@lent_call
-def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no-untyped-def]
+@compiled_no_refcount
+def fill_quadratic_map(center, i, known, near, square, cell, plan, room):  # type: ignore[no-untyped-def]
     """Where cell i lies in the layout by its witnesses (the nearest first), NaN where that is doubtful, and the size of
     a cell there, mm.
 
@@ -47,22 +59,23 @@ def mapped(center, i, known, near, square, cell, plan, room):  # type: ignore[no
     for k in range(count):
         j = known[near[k]]
         x, y, u = (center[j, 0] - center[i, 0]) * unit, (center[j, 1] - center[i, 1]) * unit, cell[j]
-        _lay(rows[k], x, y, plan.center_mm[u, 0] - middle_x, plan.center_mm[u, 1] - middle_y)
-        rows[k, CLOSENESS] = 1.0 / (0.3 + square[k] * unit**2)
-    for k in range(count, WITNESSES):
-        rows[k, CLOSENESS] = 0.0
-    terms, (variance, leverage) = room[4], _robust(count, (EXACT * size) ** 2, room)
+        _fill_products(rows[k], x, y, plan.center_mm[u, 0] - middle_x, plan.center_mm[u, 1] - middle_y)
+        rows[k, DISTANCE_WEIGHT] = 1.0 / (0.3 + square[k] * unit**2)
+    for k in range(count, SUPPORT_CELLS):
+        rows[k, DISTANCE_WEIGHT] = 0.0
+    terms, (variance, leverage) = room[4], _fill_robust_map(count, (EXACT_MISFIT * size) ** 2, room)
     slope = np.sqrt(abs(terms[0, 1] * terms[1, 2] - terms[0, 2] * terms[1, 1])) * unit
     sure = (
-        np.sqrt(square[0]) * slope < REACH * size and np.sqrt(variance * (1.0 + leverage)) < MAX_SIGMA * size
+        np.sqrt(square[0]) * slope < MAX_SUPPORT_DISTANCE * size
+        and np.sqrt(variance * (1.0 + leverage)) < MAX_DEVIATION * size
     )
     if not sure:
         return np.nan, np.nan, size
     return middle_x + terms[0, 0], middle_y + terms[1, 0], size
 
 
-@lent
-def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_products(row, x, y, u, v):  # type: ignore[no-untyped-def]
     """Write the products of a witness's terms with each other and with its place (u, v)."""
     row[0], row[1], row[2], row[3], row[4], row[5] = 1.0, x, y, x * x, x * y, y * y
     row[6], row[7], row[8], row[9] = x * row[3], x * row[4], x * row[5], y * row[5]
@@ -72,39 +85,39 @@ def _lay(row, x, y, u, v):  # type: ignore[no-untyped-def]
         row[PLACE_X + a], row[PLACE_Y + a] = row[a] * u, row[a] * v
 
 
-@lent
-def _robust(count, exact2, room):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_robust_map(count, exact2, room):  # type: ignore[no-untyped-def]
     """Write the map's terms by robust least squares, x and y, into the room's right sides; the variance about it, and
     the leverage at the origin, infinite where the witnesses lie in a row."""
     rows, weight, squares, normal, right, sums = room
-    for k in range(WITNESSES):
-        weight[k] = rows[k, CLOSENESS]
+    for k in range(SUPPORT_CELLS):
+        weight[k] = rows[k, DISTANCE_WEIGHT]
     variance, leverage = np.inf, np.inf
     for number in range(ROBUST_ROUNDS):
         sides = 3 if number == ROBUST_ROUNDS - 1 else 2
-        _sums(rows, weight, sums)
-        if not _solved(sums, normal, right, sides):
+        _fill_weighted_sums(rows, weight, sums)
+        if not _fill_solutions(sums, normal, right, sides):
             return np.inf, np.inf
         leverage = right[2, 0] * sums[0] / count
-        _misfits(rows, right, count, squares)
+        _fill_squared_misfits(rows, right, count, squares)
         usual = 2.0 * median_of(squares, count) + exact2
-        variance = _weighed(rows, squares, usual, count, weight)
+        variance = _fill_robust_weights(rows, squares, usual, count, weight)
     return variance, leverage
 
 
-@lent_vectorized
-def _sums(rows, weight, out):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _fill_weighted_sums(rows, weight, out):  # type: ignore[no-untyped-def]
     """Write the weighted sums of the witnesses' products, four witnesses at once."""
-    for m in range(PRODUCTS):
+    for m in range(PRODUCT_COLUMNS):
         out[m] = 0.0
-    for k in range(0, WITNESSES, 4):
+    for k in range(0, SUPPORT_CELLS, 4):
         a, b, c, d = weight[k], weight[k + 1], weight[k + 2], weight[k + 3]
-        for m in range(PRODUCTS):
+        for m in range(PRODUCT_COLUMNS):
             out[m] += a * rows[k, m] + b * rows[k + 1, m] + c * rows[k + 2, m] + d * rows[k + 3, m]
 
 
-@lent
-def _solved(sums, normal, right, sides):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_solutions(sums, normal, right, sides):  # type: ignore[no-untyped-def]
     """Write the solutions for the two coordinates, and if asked for the leverage; False where there is none to trust.
 
     Elimination without roots, and one quotient a term: each waits for the one before.
@@ -112,7 +125,7 @@ def _solved(sums, normal, right, sides):  # type: ignore[no-untyped-def]
     largest = 0.0
     for a in range(TERMS):
         for b in range(a + 1):
-            normal[a, b] = sums[PRODUCT[a, b]]
+            normal[a, b] = sums[PRODUCT_INDEX[a, b]]
         normal[a, a] += RIDGE if a >= 3 else 0.0
         largest = max(largest, normal[a, a])
         right[0, a], right[1, a] = sums[PLACE_X + a], sums[PLACE_Y + a]
@@ -137,8 +150,8 @@ def _solved(sums, normal, right, sides):  # type: ignore[no-untyped-def]
     return True
 
 
-@lent_vectorized
-def _misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _fill_squared_misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
     """Write the squared distances between where the map puts the witnesses and where they belong."""
     for k in range(count):
         u, v = -rows[k, PLACE_X], -rows[k, PLACE_Y]
@@ -148,12 +161,12 @@ def _misfits(rows, right, count, out):  # type: ignore[no-untyped-def]
         out[k] = u * u + v * v
 
 
-@lent_vectorized
-def _weighed(rows, squares, usual, count, weight):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _fill_robust_weights(rows, squares, usual, count, weight):  # type: ignore[no-untyped-def]
     """Write the witnesses' weights, by how near they are and how well they fit; the variance about the map."""
     total, about = 0.0, 0.0
     for k in range(count):
-        weight[k] = rows[k, CLOSENESS] * usual / (usual + squares[k])
+        weight[k] = rows[k, DISTANCE_WEIGHT] * usual / (usual + squares[k])
         total += weight[k]
         about += weight[k] * squares[k]
     return about / (2.0 * total)

@@ -8,20 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.batched_systems import LANES, add_product, factor, place, solve
+from extractor.numeric.batched_systems import (
+    LANES,
+    add_row_product,
+    packed_index,
+    update_to_cholesky_factors,
+    update_to_solutions,
+)
 from extractor.numeric.compilation import compiled, inlined
 
 TERMS = 5  # x, y, xx / 2, xy, yy / 2
 # Rows of lanes: of a neighbour the terms, these times its weight, its distances in the image and whether it is known; 1
 # where the neighbours tell the derivatives;
-TERM, OFF, SEEN, SOUND = 0, 10, 12, 13
+TERM, IMAGE_STEP, KNOWN, DETERMINED = 0, 10, 12, 13
 # of the normal equations the lower triangle, and the right sides of x and y.
-GRAM, RIGHT, ROWS = 14, 29, 39
+NORMAL, RIGHT_SIDE, ROWS = 14, 29, 39
 MIN_SINE2 = 0.05  # of the angle between the two directions that neighbours tell at least
 
 
 @compiled
-def lay_quadratics(xy, markers, near, offset, out):  # type: ignore[no-untyped-def]
+def fill_quadratic_derivatives(xy, markers, near, offset, out):  # type: ignore[no-untyped-def]
     """Write the five derivatives of x and y at ``markers`` (n,) into ``out`` (M, 2, 5), where their neighbours tell
     them."""
     rows, known = np.empty(ROWS * LANES), np.empty(LANES, np.int64)
@@ -32,39 +38,39 @@ def lay_quadratics(xy, markers, near, offset, out):  # type: ignore[no-untyped-d
         for k in range(near.shape[1]):
             for lane in range(lanes):
                 m = some[lane]
-                known[lane] += _look(xy, m, near[m, k], offset[m, k], rows[lane:])
-            _add(rows, lanes)
+                known[lane] += _fill_neighbour(xy, m, near[m, k], offset[m, k], rows[lane:])
+            _accumulate_normal_equations(rows, lanes)
         for lane in range(lanes):
-            _hold(rows[lane:], known[lane])
-        factor(rows, GRAM, TERMS, 0.0, SOUND, lanes)
-        for side in (RIGHT, RIGHT + TERMS):
-            solve(rows, GRAM, TERMS, side, lanes)
+            _update_regularisation(rows[lane:], known[lane])
+        update_to_cholesky_factors(rows, NORMAL, TERMS, 0.0, DETERMINED, lanes)
+        for side in (RIGHT_SIDE, RIGHT_SIDE + TERMS):
+            update_to_solutions(rows, NORMAL, TERMS, side, lanes)
         for lane in range(lanes):
-            if rows[SOUND * LANES + lane] > 0.0:
+            if rows[DETERMINED * LANES + lane] > 0.0:
                 for i in range(TERMS):
-                    out[some[lane], 0, i] = rows[(RIGHT + i) * LANES + lane]
-                    out[some[lane], 1, i] = rows[(RIGHT + TERMS + i) * LANES + lane]
+                    out[some[lane], 0, i] = rows[(RIGHT_SIDE + i) * LANES + lane]
+                    out[some[lane], 1, i] = rows[(RIGHT_SIDE + TERMS + i) * LANES + lane]
 
 
 @inlined
-def _look(xy, m, n, offset, column):  # type: ignore[no-untyped-def]
+def _fill_neighbour(xy, m, n, offset, column):  # type: ignore[no-untyped-def]
     """Fill in a neighbour n of marker m; whether it is known."""
     if n < 0 or not np.isfinite(xy[n, 0]):
         column[TERM * LANES], column[(TERM + 1) * LANES] = 1.0, 1.0
-        column[OFF * LANES], column[(OFF + 1) * LANES], column[SEEN * LANES] = 0.0, 0.0, 0.0
+        column[IMAGE_STEP * LANES], column[(IMAGE_STEP + 1) * LANES], column[KNOWN * LANES] = 0.0, 0.0, 0.0
         return False
     column[TERM * LANES], column[(TERM + 1) * LANES] = offset[0], offset[1]
-    column[OFF * LANES], column[(OFF + 1) * LANES] = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
-    column[SEEN * LANES] = 1.0
+    column[IMAGE_STEP * LANES], column[(IMAGE_STEP + 1) * LANES] = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
+    column[KNOWN * LANES] = 1.0
     return True
 
 
 @compiled
-def _add(rows, lanes):  # type: ignore[no-untyped-def]
+def _accumulate_normal_equations(rows, lanes):  # type: ignore[no-untyped-def]
     """Add a neighbour of every marker to its normal equations."""
     for lane in range(lanes):
         x, y = rows[TERM * LANES + lane], rows[(TERM + 1) * LANES + lane]
-        weight = rows[SEEN * LANES + lane] / (x * x + y * y) ** 2
+        weight = rows[KNOWN * LANES + lane] / (x * x + y * y) ** 2
         rows[(TERM + 2) * LANES + lane] = 0.5 * x * x
         rows[(TERM + 3) * LANES + lane] = x * y
         rows[(TERM + 4) * LANES + lane] = 0.5 * y * y
@@ -72,17 +78,17 @@ def _add(rows, lanes):  # type: ignore[no-untyped-def]
             rows[(TERM + TERMS + i) * LANES + lane] = weight * rows[(TERM + i) * LANES + lane]
     for i in range(TERMS):
         for j in range(i + 1):
-            add_product(rows, GRAM + place(i, j), TERM + TERMS + i, TERM + j, lanes)
+            add_row_product(rows, NORMAL + packed_index(i, j), TERM + TERMS + i, TERM + j, lanes)
         for axis in range(2):
-            add_product(rows, RIGHT + axis * TERMS + i, TERM + TERMS + i, OFF + axis, lanes)
+            add_row_product(rows, RIGHT_SIDE + axis * TERMS + i, TERM + TERMS + i, IMAGE_STEP + axis, lanes)
 
 
 @inlined
-def _hold(column, known):  # type: ignore[no-untyped-def]
+def _update_regularisation(column, known):  # type: ignore[no-untyped-def]
     """Hold a marker's bending towards 0, and write whether its neighbours tell the derivatives at all."""
-    xx, xy, yy = column[GRAM * LANES], column[(GRAM + 1) * LANES], column[(GRAM + 2) * LANES]
+    xx, xy, yy = column[NORMAL * LANES], column[(NORMAL + 1) * LANES], column[(NORMAL + 2) * LANES]
     told = known >= 2 and xx * yy - xy**2 >= MIN_SINE2 * xx * yy
-    column[SOUND * LANES] = 1.0 if told else 0.0
+    column[DETERMINED * LANES] = 1.0 if told else 0.0
     held = (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
     for i in range(2, TERMS):
-        column[(GRAM + place(i, i)) * LANES] += held
+        column[(NORMAL + packed_index(i, i)) * LANES] += held

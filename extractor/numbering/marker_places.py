@@ -9,30 +9,32 @@ from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.affine_maps import whole_slopes
-from extractor.localmap.neighbour_prediction import predicted
+from extractor.localmap.affine_maps import completed_linear_maps
+from extractor.localmap.neighbour_prediction import predict_markers
 from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.compilation import compiled
 
 MAX_CORNER_MISFIT = 0.28  # between a triangle's corner and where the cell's neighbours put it, in edges
-MAX_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
-AGREED_SPREAD = 0.2  # of those that agree, in the triangle's shortest edge
+MAX_CORNER_SPREAD = 0.3  # how far a corner may lie from the mean of its marker's, in edges
+MAX_AGREED_SPREAD = 0.2  # of those that agree, in the triangle's shortest edge
 # Where most cells are sharp enough for triangles, one without is damaged and its edges are not the pattern's, unless
 # it is only cut off by the image's border.
-SHARP_SHARE = 0.6
+MIN_SHARP_SHARE = 0.6
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a corner that the neighbours' centers put there, beside one of a fitted triangle
-AGREED = 0.04  # standard deviation in edges of corners on which triangles agree, where gridlines bend
-CLEAR = 0.6  # of the misfit with the corners named otherwise: then it is clear which is which
-MAX_EXPECTED_SIGMA = 0.15  # in edges, of where markers around put a corner of such a triangle, and
-MAX_EXPECTED_MISFIT = 0.1  # how far from there it may lie,
-NEARER = 0.5  # of how far the neighbours' centers put it
-MAX_APART = 0.1  # how far what the gridlines say may lie from a place that is right, in edges
+AGREED_DEVIATION = (
+    0.04  # standard deviation in edges of corners on which triangles agree, where gridlines bend
+)
+MAX_AMBIGUITY_RATIO = 0.6  # of the misfit with the corners named otherwise: then it is clear which is which
+MAX_PREDICTED_DEVIATION = 0.15  # in edges, of where markers around put a corner of such a triangle, and
+MAX_PREDICTED_DISTANCE = 0.1  # how far from there it may lie,
+MAX_DISTANCE_RATIO = 0.5  # of how far the neighbours' centers put it
+MAX_PLACE_ERROR = 0.1  # how far what the gridlines say may lie from a place that is right, in edges
 X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class InitialMarkers:
     """Numbered markers before refinement.
 
     Attributes:
@@ -50,7 +52,9 @@ class Places:
     whole: NDArray[np.bool_]
 
 
-def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int, int]) -> Places:
+def merge_corners(
+    cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int, int]
+) -> InitialMarkers:
     """Merge the corners of each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
 
     A cell's corners are those of its triangle where that lies as its neighbours say, else where they say. A marker
@@ -61,26 +65,31 @@ def place(cells: Cells, numbering: Numbering, lattice: Lattice, size: tuple[int,
     Args:
         size: width and height of the image.
     """
-    slope = whole_slopes(cells.center_px, cells.corner_px, numbering.cell, numbering.mirrored, lattice.plan)
+    slope = completed_linear_maps(
+        cells.center_px, cells.corner_px, numbering.cell, numbering.mirrored, lattice.layout_cells
+    )
     seen = cells.center_px, cells.corner_px, slope, numbering.cell
-    corners = _corners(*seen, lattice.arms_mm, lattice.corner_ids, numbering.mirrored, *size)
-    xy, around, there, kept, unmatched = _merged(corners, len(lattice.marker_mm))
-    agreed, whole = agreement(there, lattice.meeting)
+    corners = _cell_corners(*seen, lattice.corner_vectors_mm, lattice.corner_ids, numbering.mirrored, *size)
+    xy, around, there, kept, unmatched = _average_corners(corners, len(lattice.marker_mm))
+    agreed, whole = corner_agreement(there, lattice.cells_per_marker)
     unmatched &= lattice.rim
     if unmatched.any():
-        _believe(xy, around, agreed, unmatched, corners, lattice.marker_mm, lattice.neighbours)
-    return Places(xy, around, kept, agreed, whole)
+        _update_unmatched_markers(
+            xy, around, agreed, unmatched, corners, lattice.marker_mm, lattice.neighbours
+        )
+    return InitialMarkers(xy, around, kept, agreed, whole)
 
 
-def agreement(
+def corner_agreement(
     there: NDArray[np.int64], meeting: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """``agreed`` and ``whole`` of ``Places``, by how many cells agree at each marker and how many meet there."""
+    """``agreed`` and ``whole`` of ``InitialMarkers``, by how many cells agree at each marker and how many meet
+    there."""
     return (there == meeting) | (there >= 2), (there == meeting) & (there >= 2)
 
 
 @compiled
-def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, width, height):  # type: ignore[no-untyped-def]
+def _cell_corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, width, height):  # type: ignore[no-untyped-def]
     """Of the N numbered cells with a slope: (N, 3) the ids of corners 0, 1, 2, (N, 3, 2) these, (N,) the mean edges,
     (N,) where a triangle matched, (N,) which matched or are cut off by the border, (N, 3, 2) the corners of the others'
     triangles where it is clear which is which, else NaN, and whether most matched.
@@ -102,16 +111,16 @@ def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, wi
             ids[n, k], corner[n, k, 0], corner[n, k, 1] = corner_ids[u, k], x, y
             inside = inside and min(x, y, width - 1 - x, height - 1 - y) >= BORDER_PX
         for k in range(3):
-            edge[n] += np.sqrt(_square(corner, n, k, corner, n, (k + 1) % 3)) / 3
+            edge[n] += np.sqrt(_squared_corner_distance(corner, n, k, corner, n, (k + 1) % 3)) / 3
         for shift in range(3):
             misfit[shift] = 0.0
             for k in range(3):
-                square = _square(triangle, i, (shift + step * k) % 3, corner, n, k)
+                square = _squared_corner_distance(triangle, i, (shift + step * k) % 3, corner, n, k)
                 misfit[shift] = square if not square <= misfit[shift] else misfit[shift]  # a NaN stays
         first = misfit.argmin()
         fitted[n] = misfit[first] < (MAX_CORNER_MISFIT * edge[n]) ** 2
         matched += fitted[n]
-        clear = misfit[first] < CLEAR**2 * min(misfit[first - 1], misfit[first - 2])
+        clear = misfit[first] < MAX_AMBIGUITY_RATIO**2 * min(misfit[first - 1], misfit[first - 2])
         for k in range(3):
             x, y = triangle[i, (first + step * k) % 3, 0], triangle[i, (first + step * k) % 3, 1]
             if fitted[n]:
@@ -119,28 +128,28 @@ def _corners(center, triangle, slope, cell_of, arms_mm, corner_ids, mirrored, wi
             elif clear:
                 aside[n, k, 0], aside[n, k, 1] = x, y
         kept[n] = fitted[n] or not inside
-    return ids, corner, edge, fitted, kept, aside, matched > SHARP_SHARE * count
+    return ids, corner, edge, fitted, kept, aside, matched > MIN_SHARP_SHARE * count
 
 
 @compiled
-def _square(a, i, k, b, j, m):  # type: ignore[no-untyped-def]
+def _squared_corner_distance(a, i, k, b, j, m):  # type: ignore[no-untyped-def]
     """The squared distance of two triangles' corners."""
     x, y = a[i, k, 0] - b[j, m, 0], a[i, k, 1] - b[j, m, 1]
     return x * x + y * y
 
 
 @compiled
-def _square_to(a, i, k, xy, m):  # type: ignore[no-untyped-def]
+def _squared_point_distance(a, i, k, xy, m):  # type: ignore[no-untyped-def]
     """The squared distance of a triangle's corner from a point."""
     x, y = a[i, k, 0] - xy[m, 0], a[i, k, 1] - xy[m, 1]
     return x * x + y * y
 
 
 @compiled
-def _merged(corners, count):  # type: ignore[no-untyped-def]
+def _average_corners(corners, count):  # type: ignore[no-untyped-def]
     """(M, 2) weighted means of the corners and (M,) of the edges at each marker, NaN where it has none; (M,) how many
     triangles agree there; (C, 3) the ids of the cells whose corners are all known, where most are sharp only of those
-    ``kept``; (M,) bool, the markers where no triangle matched. ``corners`` as ``_corners`` gives them."""
+    ``kept``; (M,) bool, the markers where no triangle matched. ``corners`` as ``_cell_corners`` gives them."""
     ids, corner, edge, fitted, kept, _, sharp = corners
     sums, there = np.zeros((count, 4)), np.zeros(count, np.int64)
     for n in range(ids.shape[0]):
@@ -164,13 +173,13 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
             continue
         shortest = np.inf
         for k in range(3):
-            shortest = min(shortest, _square(corner, n, k, corner, n, (k + 1) % 3))
+            shortest = min(shortest, _squared_corner_distance(corner, n, k, corner, n, (k + 1) % 3))
         for k in range(3):
             m = ids[n, k]
-            apart = _square_to(corner, n, k, mean, m)
-            if apart > (MAX_SPREAD * around[m]) ** 2:
+            apart = _squared_point_distance(corner, n, k, mean, m)
+            if apart > (MAX_CORNER_SPREAD * around[m]) ** 2:
                 xy[m, 0], xy[m, 1] = np.nan, np.nan
-            there[m] += apart < AGREED_SPREAD**2 * shortest
+            there[m] += apart < MAX_AGREED_SPREAD**2 * shortest
     whole, rows = np.empty(ids.shape, np.int32), 0
     for n in range(ids.shape[0]):
         a, b, c = ids[n, 0], ids[n, 1], ids[n, 2]
@@ -182,19 +191,20 @@ def _merged(corners, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _believe(xy, edge, agreed, unmatched, corners, marker_mm, table):  # type: ignore[no-untyped-def]
+def _update_unmatched_markers(xy, edge, agreed, unmatched, corners, marker_mm, table):  # type: ignore[no-untyped-def]
     """Put ``unmatched`` markers (M,) on corners of triangles that the ``agreed`` ones around confirm, in place."""
     ids, aside = corners[0], corners[5]
     seen = xy.copy()
     seen[~agreed] = np.nan
-    expected, variance, leverage, _ = predicted(seen, unmatched, marker_mm, table)
+    expected, variance, leverage, _ = predict_markers(seen, unmatched, marker_mm, table)
     for n in range(ids.shape[0]):
         for k in range(3):
             m = ids[n, k]
-            if unmatched[m] and variance[m] * (1.0 + leverage[m]) < (MAX_EXPECTED_SIGMA * edge[m]) ** 2:
+            if unmatched[m] and variance[m] * (1.0 + leverage[m]) < (MAX_PREDICTED_DEVIATION * edge[m]) ** 2:
                 limit = min(
-                    MAX_EXPECTED_MISFIT * edge[m],
-                    NEARER * np.sqrt((xy[m, 0] - expected[m, 0]) ** 2 + (xy[m, 1] - expected[m, 1]) ** 2),
+                    MAX_PREDICTED_DISTANCE * edge[m],
+                    MAX_DISTANCE_RATIO
+                    * np.sqrt((xy[m, 0] - expected[m, 0]) ** 2 + (xy[m, 1] - expected[m, 1]) ** 2),
                 )
-                if _square_to(aside, n, k, expected, m) < limit * limit:
+                if _squared_point_distance(aside, n, k, expected, m) < limit * limit:
                     xy[m] = aside[n, k]

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.cells.cell_mesh import Mesh
+from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
-from extractor.numeric.bilinear import sample_patch
+from extractor.numeric.bilinear import fill_patch_mean
 from extractor.numeric.compilation import compiled
 
-WITNESSES = 80  # faces that say which turn is that of the markers
-MIN_WITNESSES = 4  # of each turn
+MAX_SAMPLED_FACES = 80  # faces that say which turn is that of the markers
+MIN_SAMPLED_FACES = 4  # of each turn
 
 
 @compiled
-def connected(neighbours, member):  # type: ignore[no-untyped-def]
+def connected_components(neighbours, member):  # type: ignore[no-untyped-def]
     """(N,) int32, counted from 0, the connected part that each ``member`` (N,) bool belongs to, by its ``neighbours``
     (N, K), -1 for none; -1 for what is no member."""
     part = np.full(member.shape[0], -1, np.int32)
@@ -40,9 +40,9 @@ def connected(neighbours, member):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _by_part(neighbours, turn):  # type: ignore[no-untyped-def]
+def _faces_by_component(neighbours, turn):  # type: ignore[no-untyped-def]
     """The faces, part by part, the largest first, and where each part begins."""
-    part = connected(neighbours, turn != 0)
+    part = connected_components(neighbours, turn != 0)
     sizes = np.zeros(part.max() + 1 if part.shape[0] > 0 else 0, np.int64)
     for i in part:
         if i >= 0:
@@ -60,14 +60,14 @@ def _by_part(neighbours, turn):  # type: ignore[no-untyped-def]
     return faces, begin
 
 
-def largest_parts(mesh: Mesh, count: int) -> list[NDArray[np.intp]]:
+def largest_components(mesh: CellMesh, count: int) -> list[NDArray[np.intp]]:
     """The faces of each of the largest connected parts of the mesh, the largest first."""
-    faces, begin = _by_part(mesh.neighbours, mesh.turn)
+    faces, begin = _faces_by_component(mesh.neighbours, mesh.orientation)
     return [faces[begin[i] : begin[i + 1]] for i in range(min(count, len(begin) - 1))]
 
 
 @compiled
-def innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
+def most_central_face(center, faces, members, blocked):  # type: ignore[no-untyped-def]
     """The sound face nearest to the middle of its part of the mesh, or -1: rims are often damaged."""
     x, y = 0.0, 0.0
     for f in members:
@@ -88,10 +88,10 @@ def innermost(center, faces, members, blocked):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _front(image, center, faces, turn):  # type: ignore[no-untyped-def]
+def _marker_turn_by_brightness(image, center, faces, turn):  # type: ignore[no-untyped-def]
     """The turn of the brighter faces; 0 where too few are seen."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    every = max(1, int(np.count_nonzero(turn)) // WITNESSES)
+    every = max(1, int(np.count_nonzero(turn)) // MAX_SAMPLED_FACES)
     brightness, color = np.empty((2, turn.shape[0] // every + 1)), np.zeros(3)
     number_of, count = 0, [0, 0]
     for f in range(turn.shape[0]):
@@ -107,16 +107,16 @@ def _front(image, center, faces, turn):  # type: ignore[no-untyped-def]
         nearest = np.inf
         for k in range(3):
             nearest = min(nearest, np.hypot(center[faces[f, k], 0] - x, center[faces[f, k], 1] - y))
-        if sample_patch(flat, height, width, x, y, 0.12 * nearest, color):
+        if fill_patch_mean(flat, height, width, x, y, 0.12 * nearest, color):
             side = 1 if turn[f] > 0 else 0
             brightness[side, count[side]] = color.sum()
             count[side] += 1
-    if min(count) < MIN_WITNESSES:
+    if min(count) < MIN_SAMPLED_FACES:
         return 0
     return 1 if np.median(brightness[1, : count[1]]) > np.median(brightness[0, : count[0]]) else -1
 
 
-def fronts(image: NDArray[np.uint8], cells: Cells, mesh: Mesh) -> list[int]:
+def marker_turns(image: NDArray[np.uint8], cells: Cells, mesh: CellMesh) -> list[int]:
     """The turn of the faces that are markers, the likelier first: black cells are darker than where cells meet."""
-    front = int(_front(image, cells.center_px, mesh.faces, mesh.turn))
+    front = int(_marker_turn_by_brightness(image, cells.center_px, mesh.faces, mesh.orientation))
     return [front] if front != 0 else [1, -1]

@@ -12,27 +12,30 @@ from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
 from extractor.cells.seeds import Seeds
-from extractor.cells.triangle_edges import fit_edges
+from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.cells.triangle_fit import Triangles
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.affine_maps import seen_as, slopes
+from extractor.localmap.affine_maps import image_cell_of_layout_cell, linear_maps
 from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.compilation import compiled
 
 MIN_CELL_PX = 12  # of a cell, of which there must be more than the pattern has,
-MORE = 1.0
-MIN_AREA_PX, MIN_SHARE = 8, 0.9  # at least so many domains are larger than specks: noise has many of them
-MIN_OUTLINED = 0.97  # of the pattern's cells have edges where their numbers say
+MIN_DOMAINS_PER_CELL = 1.0
+MIN_AREA_PX, MIN_DOMAIN_SHARE = (
+    8,
+    0.9,
+)  # at least so many domains are larger than specks: noise has many of them
+MIN_FITTED_SHARE = 0.97  # of the pattern's cells have edges where their numbers say
 
 
-def amid(seeds: Seeds, cells: int) -> bool:
+def is_small_pattern_possible(seeds: Seeds, cells: int) -> bool:
     """Whether a pattern of so many cells may be whole and small among these domains."""
-    if np.count_nonzero(seeds.area_px >= MIN_CELL_PX) < MORE * cells:
+    if np.count_nonzero(seeds.area_px >= MIN_CELL_PX) < MIN_DOMAINS_PER_CELL * cells:
         return False
-    return bool(np.count_nonzero(seeds.area_px >= MIN_AREA_PX) >= MIN_SHARE * len(seeds.area_px))
+    return bool(np.count_nonzero(seeds.area_px >= MIN_AREA_PX) >= MIN_DOMAIN_SHARE * len(seeds.area_px))
 
 
-def outlined(
+def fit_predicted_triangles(
     image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice
 ) -> Triangles | None:
     """The triangles of the numbered cells, from where their numbers put the corners; their ``region`` is the cell.
@@ -41,18 +44,22 @@ def outlined(
     """
     if np.count_nonzero(numbering.cell >= 0) < len(lattice.ink):
         return None
-    corners, good = _corners(cells.center_px, numbering.cell, lattice.plan, numbering.mirrored)
-    fit_edges(image, corners, good)
-    if np.count_nonzero(good) < MIN_OUTLINED * len(lattice.ink):
+    corners, good = _predicted_corners(
+        cells.center_px, numbering.cell, lattice.layout_cells, numbering.mirrored
+    )
+    update_triangle_corners(image, corners, good)
+    if np.count_nonzero(good) < MIN_FITTED_SHARE * len(lattice.ink):
         return None
     return Triangles(corners[good], cells.ink[good], np.flatnonzero(good).astype(np.int32))
 
 
 @compiled
-def _corners(center_px, cell, plan, mirrored):  # type: ignore[no-untyped-def]
+def _predicted_corners(center_px, cell, plan, mirrored):  # type: ignore[no-untyped-def]
     """(N, 3, 2) px, the corners of the numbered cells, clockwise in the image, by the neighbours' centers; (N,) bool,
     which have any."""
-    slope = slopes(center_px, cell, seen_as(cell, plan.ink.shape[0]), plan.center_mm, plan.beside)
+    slope = linear_maps(
+        center_px, cell, image_cell_of_layout_cell(cell, plan.ink.shape[0]), plan.center_mm, plan.beside
+    )
     corners, good = np.full((cell.shape[0], 3, 2), np.nan), np.zeros(cell.shape[0], np.bool_)
     step = 1 if mirrored else 2  # clockwise a cell's corners run 0, 2, 1, seen from the back 0, 1, 2
     for i in range(cell.shape[0]):
@@ -60,7 +67,7 @@ def _corners(center_px, cell, plan, mirrored):  # type: ignore[no-untyped-def]
             continue
         good[i] = True
         for k in range(3):
-            x, y = plan.arms_mm[cell[i], step * k % 3]
+            x, y = plan.corner_vectors_mm[cell[i], step * k % 3]
             for axis in range(2):
                 corners[i, k, axis] = center_px[i, axis] + slope[i, axis, 0] * x + slope[i, axis, 1] * y
     return corners, good

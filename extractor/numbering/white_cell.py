@@ -8,38 +8,52 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.bilinear import sample_patch
-from extractor.numeric.bilinear_batch import COLOR, POINTS, RADIUS, X, Y, room_for_samples, sample_patches
+from extractor.numeric.bilinear import fill_patch_mean
+from extractor.numeric.bilinear_batch import (
+    BATCH_POINTS,
+    COLOR,
+    RADIUS,
+    X,
+    Y,
+    allocate_sample_buffers,
+    fill_patch_means,
+)
 from extractor.numeric.bilinear_batch import INSIDE as INSIDE_IMAGE
 from extractor.numeric.compilation import compiled
-from extractor.numeric.dense_systems import cholesky_solve, dot
+from extractor.numeric.dense_systems import dot3, update_to_cholesky_solution
 
-WITNESSES = 16  # numbered cells, the nearest, that say where it is
-MIN_WITNESSES = 3
+MAX_FIT_CELLS = 16  # numbered cells, the nearest, that say where it is
+MIN_FIT_CELLS = 3
 RIDGE = 0.02  # holds the map's curvature where the witnesses lie on one side
-MAX_SIGMA = 0.15  # of the map there, in edges
-MAX_ASIDE = 0.3  # in edges, of the white's centroid from where the map puts it; the next black cell is at 1
+MAX_PREDICTED_DEVIATION = 0.15  # of the map there, in edges
+MAX_CENTROID_DISTANCE = (
+    0.3  # in edges, of the white's centroid from where the map puts it; the next black cell is at 1
+)
 # The shape, from 0 for the paler one of ink and black to 1 for the middle.
 MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE = 0.5, 0.25, 0.5
-SAME_INK = 0.9  # cosine between a color and an ink, both above black
-FAINT = 0.3  # of an ink's strength above black: black, where its cell is missing
+MIN_INK_COSINE = 0.9  # cosine between a color and an ink, both above black
+MIN_INK_STRENGTH = 0.3  # of an ink's strength above black: black, where its cell is missing
 TERMS = 6  # 1, x, y, xx, xy, yy
 # The corners of a down-cell from its middle, in axial steps: below, right above and left above.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
-INKS = np.array([2, 3, 1])  # of the cells opposite to them
+OPPOSITE_INKS = np.array([2, 3, 1])  # of the cells opposite to them
 # In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
-INSIDE = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
-SIDES = [
+INSIDE_POINTS = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
+SIDE_POINTS = [
     one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
 ]
-OUTSIDE = np.concatenate([1.7 * CORNERS, np.array(SIDES) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]])
+OUTSIDE_POINTS = np.concatenate(
+    [1.7 * CORNERS, np.array(SIDE_POINTS) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]]
+)
 GRID, GRID_REACH = 4, 0.8  # places over which the centroid is taken
-STEP = np.arange(-GRID, GRID + 1)
-AROUND = GRID_REACH / GRID * np.array([[a, b] for a in STEP for b in STEP if abs(a + b) <= GRID])
+GRID_STEPS = np.arange(-GRID, GRID + 1)
+CENTROID_POINTS = (
+    GRID_REACH / GRID * np.array([[a, b] for a in GRID_STEPS for b in GRID_STEPS if abs(a + b) <= GRID])
+)
 
 
 @compiled
-def white_cell(image, center_px, cell, white_mm, to_mm, center_mm, inks, black):  # type: ignore[no-untyped-def]
+def locate_white_cell(image, center_px, cell, white_mm, to_mm, center_mm, inks, black):  # type: ignore[no-untyped-def]
     """(2,) px the middle of the white cell, where these numbers put it; NaN where it is not.
 
     Args:
@@ -47,43 +61,43 @@ def white_cell(image, center_px, cell, white_mm, to_mm, center_mm, inks, black):
         white_mm: (2,) the middle of the white cell. to_mm: (2, 2) mm per axial step there.
         inks: (4, 3) the colors of red, green and blue from row 1 on. black: (3,) the color between them.
     """
-    where, slope = _map_at(center_px, cell, white_mm, to_mm, center_mm)
+    where, slope = _fit_layout_map(center_px, cell, white_mm, to_mm, center_mm)
     if np.isnan(where[0]):
         return where
     axial = np.empty((2, 2))
     for row in range(2):
         for column in range(2):
             axial[row, column] = slope[row, 0] * to_mm[0, column] + slope[row, 1] * to_mm[1, column]
-    return _middle(image, where, axial, inks, black)
+    return _verified_center(image, where, axial, inks, black)
 
 
 @compiled
-def _witnesses(cell, white_mm, center_mm):  # type: ignore[no-untyped-def]
+def _nearest_numbered_cells(cell, white_mm, center_mm):  # type: ignore[no-untyped-def]
     """The numbered cells whose places in the layout are the nearest to the white one, and their squared distances."""
-    near, square, found = np.empty(WITNESSES, np.int64), np.empty(WITNESSES), 0
+    near, square, found = np.empty(MAX_FIT_CELLS, np.int64), np.empty(MAX_FIT_CELLS), 0
     for i in range(cell.shape[0]):
         if cell[i] < 0:
             continue
         x, y = center_mm[cell[i], 0] - white_mm[0], center_mm[cell[i], 1] - white_mm[1]
-        apart, k = x * x + y * y, min(found, WITNESSES - 1)
-        if found == WITNESSES and apart >= square[k]:
+        apart, k = x * x + y * y, min(found, MAX_FIT_CELLS - 1)
+        if found == MAX_FIT_CELLS and apart >= square[k]:
             continue
         while k > 0 and square[k - 1] > apart:
             near[k], square[k] = near[k - 1], square[k - 1]
             k -= 1
         near[k], square[k] = i, apart
-        found = min(found + 1, WITNESSES)
+        found = min(found + 1, MAX_FIT_CELLS)
     return near[:found], square[:found]
 
 
 @compiled
-def _map_at(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-untyped-def]
+def _fit_layout_map(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-untyped-def]
     """Where the map of the layout to the image through the cells nearest to the white one puts that, (2,) px, NaN where
     that is doubtful; and (2, 2) px per mm there."""
-    near, squares = _witnesses(cell, white_mm, center_mm)
+    near, squares = _nearest_numbered_cells(cell, white_mm, center_mm)
     nowhere = np.full(2, np.nan), np.full((2, 2), np.nan)
     count = near.shape[0]
-    if count < MIN_WITNESSES:
+    if count < MIN_FIT_CELLS:
         return nowhere
     scale = np.sqrt(squares.mean())
     rows, weight = np.empty((count, TERMS)), np.empty(count)
@@ -105,7 +119,7 @@ def _map_at(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-unt
     total = weight.sum()
     for a in range(3, TERMS):
         normal[a, a] += RIDGE * total
-    cholesky_solve(normal, right, TERMS)
+    update_to_cholesky_solution(normal, right, TERMS)
     if not normal[2, 2] ** 2 > 1e-4 * total:
         return nowhere
     left = 0.0
@@ -120,7 +134,7 @@ def _map_at(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-unt
         to_mm[0, 0] * to_mm[1, 1] - to_mm[0, 1] * to_mm[1, 0]
     )
     edge2 = abs(determinant) * 2.0 / np.sqrt(3.0)
-    if not left / (2.0 * total) * (1.0 + right[2, 0] * total / count) < MAX_SIGMA**2 * edge2:
+    if not left / (2.0 * total) * (1.0 + right[2, 0] * total / count) < MAX_PREDICTED_DEVIATION**2 * edge2:
         return nowhere
     return np.array([about_x + right[0, 0], about_y + right[1, 0]]), slope
 
@@ -132,7 +146,7 @@ def _whiteness(color, strongest):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
+def _verified_center(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
     """(2,) px the centroid of the white cell expected here, (2, 2) px per axial step; NaN where there is none."""
     strongest, nowhere = np.ones(3), np.full(2, np.nan)
     for channel in range(3):
@@ -141,85 +155,99 @@ def _middle(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
     for c in range(1, 4):
         ground = max(ground, _whiteness(inks[c], strongest))
     # the centroid tells where it is better than the map does, unless something white stands beside it
-    if _fills(image, where, slope, ground, strongest) and _amid_inks(image, where, slope, inks, black):
+    if _is_white_triangle(image, where, slope, ground, strongest) and _is_between_inks(
+        image, where, slope, inks, black
+    ):
         return where.copy()
-    u, v = _centroid(image, where, slope, ground, strongest)
-    if not u * u + u * v + v * v <= MAX_ASIDE**2:
+    u, v = _white_centroid(image, where, slope, ground, strongest)
+    if not u * u + u * v + v * v <= MAX_CENTROID_DISTANCE**2:
         return nowhere
     middle = where + slope @ np.array([u, v])
-    if _fills(image, middle, slope, ground, strongest) and _amid_inks(image, middle, slope, inks, black):
+    if _is_white_triangle(image, middle, slope, ground, strongest) and _is_between_inks(
+        image, middle, slope, inks, black
+    ):
         return middle
     return nowhere
 
 
 @compiled
-def _place(middle, slope, u, v):  # type: ignore[no-untyped-def]
+def _image_point(middle, slope, u, v):  # type: ignore[no-untyped-def]
     """The place in the image this axial way from the middle."""
     return middle[0] + slope[0, 0] * u + slope[0, 1] * v, middle[1] + slope[1, 0] * u + slope[1, 1] * v
 
 
 @compiled
-def _radius(slope):  # type: ignore[no-untyped-def]
+def _sample_radius(slope):  # type: ignore[no-untyped-def]
     """Over which a color is taken, px."""
     return 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
 
 
 @compiled
-def _sampled(image, middle, slope, u, v, out):  # type: ignore[no-untyped-def]
+def _fill_mean_color(image, middle, slope, u, v, out):  # type: ignore[no-untyped-def]
     """Write the mean color around this axial way from the middle; False outside the image."""
-    px, py = _place(middle, slope, u, v)
-    return sample_patch(image.reshape(-1), image.shape[0], image.shape[1], px, py, _radius(slope), out)
+    px, py = _image_point(middle, slope, u, v)
+    return fill_patch_mean(
+        image.reshape(-1), image.shape[0], image.shape[1], px, py, _sample_radius(slope), out
+    )
 
 
 @compiled
-def _centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
+def _white_centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
     """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
-    room, radius = room_for_samples(), _radius(slope)
+    room, radius = allocate_sample_buffers(), _sample_radius(slope)
     patches = room.patches
-    for n in range(AROUND.shape[0]):
-        patches[X + n], patches[Y + n] = _place(where, slope, AROUND[n, 0], AROUND[n, 1])
+    for n in range(CENTROID_POINTS.shape[0]):
+        patches[X + n], patches[Y + n] = _image_point(
+            where, slope, CENTROID_POINTS[n, 0], CENTROID_POINTS[n, 1]
+        )
         patches[RADIUS + n] = radius
-    sample_patches(image.reshape(-1), image.shape[0], image.shape[1], AROUND.shape[0], room)
+    fill_patch_means(image.reshape(-1), image.shape[0], image.shape[1], CENTROID_POINTS.shape[0], room)
     total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
-    for n in range(AROUND.shape[0]):
+    for n in range(CENTROID_POINTS.shape[0]):
         if patches[INSIDE_IMAGE + n] > 0.0:
             for channel in range(3):
-                own[channel] = patches[COLOR + channel * POINTS + n]
+                own[channel] = patches[COLOR + channel * BATCH_POINTS + n]
             weight = max(_whiteness(own, strongest) - ground, 0.0)
-            total, q, r = total + weight, q + weight * AROUND[n, 0], r + weight * AROUND[n, 1]
+            total, q, r = (
+                total + weight,
+                q + weight * CENTROID_POINTS[n, 0],
+                r + weight * CENTROID_POINTS[n, 1],
+            )
     return (q / total, r / total) if total > 0.0 else (np.nan, np.nan)
 
 
 @compiled
-def _fills(image, middle, slope, ground, strongest):  # type: ignore[no-untyped-def]
+def _is_white_triangle(image, middle, slope, ground, strongest):  # type: ignore[no-untyped-def]
     """Whether it is white all over the cell and nowhere around it; outside the image nothing is."""
     own = np.empty(3)
-    if not _sampled(image, middle, slope, 0.0, 0.0, own):
+    if not _fill_mean_color(image, middle, slope, 0.0, 0.0, own):
         return False
     reach = max(_whiteness(own, strongest) - ground, 1e-3)
-    for n in range(INSIDE.shape[0]):
-        if not _sampled(image, middle, slope, INSIDE[n, 0], INSIDE[n, 1], own):
+    for n in range(INSIDE_POINTS.shape[0]):
+        if not _fill_mean_color(image, middle, slope, INSIDE_POINTS[n, 0], INSIDE_POINTS[n, 1], own):
             return False
         least = MIN_CORNER if n < CORNERS.shape[0] else MIN_INSIDE
         if _whiteness(own, strongest) - ground < least * reach:
             return False
-    for n in range(OUTSIDE.shape[0]):
-        seen = _sampled(image, middle, slope, OUTSIDE[n, 0], OUTSIDE[n, 1], own)
+    for n in range(OUTSIDE_POINTS.shape[0]):
+        seen = _fill_mean_color(image, middle, slope, OUTSIDE_POINTS[n, 0], OUTSIDE_POINTS[n, 1], own)
         if seen and _whiteness(own, strongest) - ground > MAX_OUTSIDE * reach:
             return False
     return True
 
 
 @compiled
-def _amid_inks(image, middle, slope, inks, black):  # type: ignore[no-untyped-def]
+def _is_between_inks(image, middle, slope, inks, black):  # type: ignore[no-untyped-def]
     """Whether the three cells beside it show their inks, or black where one is missing."""
     own = np.empty(3)
     for k in range(3):
-        if not _sampled(image, middle, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):
+        if not _fill_mean_color(image, middle, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):
             continue
-        ink = inks[INKS[k]] - black
+        ink = inks[OPPOSITE_INKS[k]] - black
         own -= black
-        strength, size = dot(ink, ink), np.sqrt(dot(own, own))
-        if size > FAINT * np.sqrt(strength) and dot(own, ink) < SAME_INK * size * np.sqrt(strength):
+        strength, size = dot3(ink, ink), np.sqrt(dot3(own, own))
+        if size > MIN_INK_STRENGTH * np.sqrt(strength) and dot3(own, ink) < MIN_INK_COSINE * size * np.sqrt(
+            strength
+        ):
             return False
     return True

@@ -16,13 +16,13 @@ LANES = 16
 
 
 @inlined
-def place(a, b):  # type: ignore[no-untyped-def]
+def packed_index(a, b):  # type: ignore[no-untyped-def]
     """Where a lower triangle has its number (a, b), b not after a."""
     return a * (a + 1) // 2 + b
 
 
 @inlined
-def add_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
+def add_row_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
     """Add a product of two rows to a third."""
     out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
     for k in range(lanes):
@@ -31,7 +31,7 @@ def add_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _less(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
+def _update_minus_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
     """Take a product of two rows from a third."""
     out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
     for k in range(lanes):
@@ -40,7 +40,7 @@ def _less(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _over(rows, to, by, lanes):  # type: ignore[no-untyped-def]
+def _update_row_quotient(rows, to, by, lanes):  # type: ignore[no-untyped-def]
     """Divide a row by another."""
     out, one = np.uint64(to * LANES), np.uint64(by * LANES)
     for k in range(lanes):
@@ -49,16 +49,19 @@ def _over(rows, to, by, lanes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def factor(rows, at, terms, least, sound, lanes):  # type: ignore[no-untyped-def]
-    """Replace the matrices by their Cholesky factors; the row ``sound`` becomes 0 where a pivot is not above ``least``,
+def update_to_cholesky_factors(rows, at, terms, least, sound, lanes):  # type: ignore[no-untyped-def]
+    """Replace the matrices by their Cholesky factors; the row ``is_complete`` becomes 0 where a pivot is not above
+    ``min_places``,
     and the factor is any then."""
     for i in range(terms):
-        own = at + place(i, i)
+        own = at + packed_index(i, i)
         for j in range(i):
             for k in range(j):
-                _less(rows, at + place(i, j), at + place(i, k), at + place(j, k), lanes)
-            _over(rows, at + place(i, j), at + place(j, j), lanes)
-            _less(rows, own, at + place(i, j), at + place(i, j), lanes)
+                _update_minus_product(
+                    rows, at + packed_index(i, j), at + packed_index(i, k), at + packed_index(j, k), lanes
+                )
+            _update_row_quotient(rows, at + packed_index(i, j), at + packed_index(j, j), lanes)
+            _update_minus_product(rows, own, at + packed_index(i, j), at + packed_index(i, j), lanes)
         for lane in range(lanes):
             determined = rows[own * LANES + lane] > least
             rows[sound * LANES + lane] = rows[sound * LANES + lane] if determined else 0.0
@@ -66,13 +69,13 @@ def factor(rows, at, terms, least, sound, lanes):  # type: ignore[no-untyped-def
 
 
 @compiled
-def solve(rows, at, terms, side, lanes):  # type: ignore[no-untyped-def]
+def update_to_solutions(rows, at, terms, side, lanes):  # type: ignore[no-untyped-def]
     """Replace the right sides by the solutions."""
     for i in range(terms):
         for k in range(i):
-            _less(rows, side + i, at + place(i, k), side + k, lanes)
-        _over(rows, side + i, at + place(i, i), lanes)
+            _update_minus_product(rows, side + i, at + packed_index(i, k), side + k, lanes)
+        _update_row_quotient(rows, side + i, at + packed_index(i, i), lanes)
     for i in range(terms - 1, -1, -1):
         for k in range(i + 1, terms):
-            _less(rows, side + i, at + place(k, i), side + k, lanes)
-        _over(rows, side + i, at + place(i, i), lanes)
+            _update_minus_product(rows, side + i, at + packed_index(k, i), side + k, lanes)
+        _update_row_quotient(rows, side + i, at + packed_index(i, i), lanes)

@@ -9,9 +9,9 @@ import numpy as np
 
 from extractor.numeric.compilation import compiled
 
-STEPS = 256  # to a pixel
-SHORT = 1.0 + 1e-6  # of the image's size, where the last sample lies
-HEXAGON = np.array(
+SUBPIXEL_STEPS = 256  # to a pixel
+BORDER_PX = 1.0 + 1e-6  # of the image's size, where the last sample lies
+HEXAGON_POINTS = np.array(
     [
         [0.0, 0.0],
         [1.0, 0.0],
@@ -25,27 +25,31 @@ HEXAGON = np.array(
 
 
 @compiled
-def sample_dot(flat, height, width, x, y, red, green, blue):  # type: ignore[no-untyped-def]
+def weighted_sample(flat, height, width, x, y, red, green, blue):  # type: ignore[no-untyped-def]
     """The sample at (x, y) of the image's channels, weighted and summed; NaN outside the image."""
     if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
         return np.nan
-    x, y = min(x, width - SHORT), min(y, height - SHORT)
+    x, y = min(x, width - BORDER_PX), min(y, height - BORDER_PX)
     ix, iy = int(x), int(y)
-    fx, fy = np.int64((x - ix) * STEPS + 0.5), np.int64((y - iy) * STEPS + 0.5)
+    fx, fy = np.int64((x - ix) * SUBPIXEL_STEPS + 0.5), np.int64((y - iy) * SUBPIXEL_STEPS + 0.5)
     a = np.uint64((iy * width + ix) * 3)
     b = np.uint64(a + np.uint64(width * 3))
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     four, five = np.uint64(4), np.uint64(5)
     both = fx * fy  # whole numbers are faster
-    right, down, rest = STEPS * fx - both, STEPS * fy - both, STEPS * (STEPS - fx - fy) + both
+    right, down, rest = (
+        SUBPIXEL_STEPS * fx - both,
+        SUBPIXEL_STEPS * fy - both,
+        SUBPIXEL_STEPS * (SUBPIXEL_STEPS - fx - fy) + both,
+    )
     s0 = rest * flat[a] + right * flat[a + three] + down * flat[b] + both * flat[b + three]
     s1 = rest * flat[a + one] + right * flat[a + four] + down * flat[b + one] + both * flat[b + four]
     s2 = rest * flat[a + two] + right * flat[a + five] + down * flat[b + two] + both * flat[b + five]
-    return (red * s0 + green * s1 + blue * s2) * (1.0 / (STEPS * STEPS))
+    return (red * s0 + green * s1 + blue * s2) * (1.0 / (SUBPIXEL_STEPS * SUBPIXEL_STEPS))
 
 
 @compiled
-def sample_patch(flat, height, width, x, y, radius, out):  # type: ignore[no-untyped-def]
+def fill_patch_mean(flat, height, width, x, y, radius, out):  # type: ignore[no-untyped-def]
     """Write the mean of seven samples, the center and a hexagon of ``radius`` around it; False outside the image."""
     if not (x >= radius and y >= radius and x <= width - 1.0 - radius and y <= height - 1.0 - radius):
         return False
@@ -54,19 +58,23 @@ def sample_patch(flat, height, width, x, y, radius, out):  # type: ignore[no-unt
     four, five = np.uint64(4), np.uint64(5)
     for k in range(7):
         px, py = (
-            min(x + radius * HEXAGON[k, 0], width - SHORT),
-            min(y + radius * HEXAGON[k, 1], height - SHORT),
+            min(x + radius * HEXAGON_POINTS[k, 0], width - BORDER_PX),
+            min(y + radius * HEXAGON_POINTS[k, 1], height - BORDER_PX),
         )
         ix, iy = int(px), int(py)
-        fx, fy = np.int64((px - ix) * STEPS + 0.5), np.int64((py - iy) * STEPS + 0.5)
+        fx, fy = np.int64((px - ix) * SUBPIXEL_STEPS + 0.5), np.int64((py - iy) * SUBPIXEL_STEPS + 0.5)
         a = np.uint64((iy * width + ix) * 3)
         b = np.uint64(a + np.uint64(width * 3))
         both = fx * fy
-        right, down, rest = STEPS * fx - both, STEPS * fy - both, STEPS * (STEPS - fx - fy) + both
+        right, down, rest = (
+            SUBPIXEL_STEPS * fx - both,
+            SUBPIXEL_STEPS * fy - both,
+            SUBPIXEL_STEPS * (SUBPIXEL_STEPS - fx - fy) + both,
+        )
         s0 += rest * flat[a] + right * flat[a + three] + down * flat[b] + both * flat[b + three]
         s1 += rest * flat[a + one] + right * flat[a + four] + down * flat[b + one] + both * flat[b + four]
         s2 += rest * flat[a + two] + right * flat[a + five] + down * flat[b + two] + both * flat[b + five]
-    whole = 1.0 / (7 * STEPS * STEPS)
+    whole = 1.0 / (7 * SUBPIXEL_STEPS * SUBPIXEL_STEPS)
     out[0], out[1], out[2] = s0 * whole, s1 * whole, s2 * whole
     return True
 

@@ -10,69 +10,74 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.numeric.bilinear import HEXAGON, SHORT, STEPS
+from extractor.numeric.bilinear import BORDER_PX, HEXAGON_POINTS, SUBPIXEL_STEPS
 from extractor.numeric.compilation import compiled
 
-FIXED, HALF_STEP = float(1 << 32), 1 << 23  # a pixel, and half of 1 / STEPS of it, in fixed places
-POINTS = 192  # sampled at once, at most
-X, Y, AT = (k * POINTS for k in range(3))
-BLUE, GREEN, RED, ACROSS, DOWN = (k * POINTS for k in range(5))
-RADIUS, COLOR, INSIDE = 2 * POINTS, 3 * POINTS, 6 * POINTS
+FIXED_POINT_ONE, HALF_STEP = float(1 << 32), 1 << 23  # a pixel, and half of 1 / STEPS of it, in fixed places
+BATCH_POINTS = 192  # sampled at once, at most
+X, Y, PIXEL_INDEX = (k * BATCH_POINTS for k in range(3))
+BLUE, GREEN, RED, FRACTION_X, FRACTION_Y = (k * BATCH_POINTS for k in range(5))
+RADIUS, COLOR, INSIDE = 2 * BATCH_POINTS, 3 * BATCH_POINTS, 6 * BATCH_POINTS
 
 
-class Room(NamedTuple):
-    """What many samples at once are taken in, by columns of ``POINTS``, so that loops have no branches.
+class SampleBuffers(NamedTuple):
+    """What many samples at once are taken in, by columns of ``BATCH_POINTS``, so that loops have no branches.
 
     Attributes:
-        places: (3 P,) int64 ``X``, ``Y``, ``fixed``, and ``AT``, the first byte of four pixels.
+        places: (3 P,) int64 ``X``, ``Y``, ``fixed_point_coordinate``, and ``PIXEL_INDEX``, the first byte of four
+            pixels.
         words: (4 P,) uint32, the bytes of these.
-        parts: (5 P,) float32 ``BLUE``, ``GREEN``, ``RED``, the square of ``STEPS`` times each channel, and how far
-            beyond the first pixel the place lies, ``ACROSS`` and ``DOWN``.
+        parts: (5 P,) float32 ``BLUE``, ``GREEN``, ``RED``, the square of ``SUBPIXEL_STEPS`` times each channel, and
+            how far
+            beyond the first pixel the place lies, ``FRACTION_X`` and ``FRACTION_Y``.
         patches: (7 P,) float64 ``X``, ``Y``, ``RADIUS``, px, the ``COLOR`` in three columns, and 1 where ``INSIDE`` the
             image, else 0.
     """
 
     places: NDArray[np.int64]
-    words: NDArray[np.uint32]
-    parts: NDArray[np.float32]
+    pixel_words: NDArray[np.uint32]
+    channel_sums: NDArray[np.float32]
     patches: NDArray[np.float64]
 
 
 @compiled
-def fixed(place):  # type: ignore[no-untyped-def]
+def fixed_point_coordinate(place):  # type: ignore[no-untyped-def]
     """A place as a whole number of 2^-32 px, half a step of a sample added, so that what is cut off rounds it."""
-    return np.int64(place * FIXED) + HALF_STEP
+    return np.int64(place * FIXED_POINT_ONE) + HALF_STEP
 
 
 @compiled
-def fixed_step(length):  # type: ignore[no-untyped-def]
+def fixed_point_length(length):  # type: ignore[no-untyped-def]
     """A length as a whole number of 2^-32 px."""
-    return np.int64(length * FIXED)
+    return np.int64(length * FIXED_POINT_ONE)
 
 
 @compiled
-def room_for_samples():  # type: ignore[no-untyped-def]
-    """A ``Room``."""
-    return Room(
-        np.zeros(3 * POINTS, np.int64),
-        np.zeros(4 * POINTS, np.uint32),
-        np.zeros(5 * POINTS, np.float32),
-        np.zeros(7 * POINTS),
+def allocate_sample_buffers():  # type: ignore[no-untyped-def]
+    """A ``SampleBuffers``."""
+    return SampleBuffers(
+        np.zeros(3 * BATCH_POINTS, np.int64),
+        np.zeros(4 * BATCH_POINTS, np.uint32),
+        np.zeros(5 * BATCH_POINTS, np.float32),
+        np.zeros(7 * BATCH_POINTS),
     )
 
 
 @compiled
-def _aim(height, width, places, shares, count):  # type: ignore[no-untyped-def]
+def _fill_pixel_indices(height, width, places, shares, count):  # type: ignore[no-untyped-def]
     """Write where the four pixels around each fixed place begin in the flat image, and how far beyond it lies."""
     for i in range(count):
         x, y = places[X + i], places[Y + i]
         ix, iy = min(x >> 32, width - 2), min(y >> 32, height - 2)
-        places[AT + i] = 3 * (iy * width + ix)
-        shares[ACROSS + i], shares[DOWN + i] = (x >> 24) - STEPS * ix, (y >> 24) - STEPS * iy
+        places[PIXEL_INDEX + i] = 3 * (iy * width + ix)
+        shares[FRACTION_X + i], shares[FRACTION_Y + i] = (
+            (x >> 24) - SUBPIXEL_STEPS * ix,
+            (y >> 24) - SUBPIXEL_STEPS * iy,
+        )
 
 
 @compiled
-def _word(flat, at):  # type: ignore[no-untyped-def]
+def _read_word(flat, at):  # type: ignore[no-untyped-def]
     """Four bytes as one number, which the machine reads at once."""
     a, b, c, d = flat[at], flat[at + np.uint64(1)], flat[at + np.uint64(2)], flat[at + np.uint64(3)]
     low = np.uint32(a) | np.uint32(b) << np.uint32(8)
@@ -80,13 +85,16 @@ def _word(flat, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fetch(flat, width, places, words, count):  # type: ignore[no-untyped-def]
+def _fill_pixel_words(flat, width, places, words, count):  # type: ignore[no-untyped-def]
     """Read the first and the last four of the six bytes of two pixels, and of the two below."""
     two, below = np.uint64(2), np.uint64(3 * width)
     for i in range(count):
-        k = np.uint64(places[AT + i])
-        words[i], words[POINTS + i] = _word(flat, k), _word(flat, k + two)
-        words[2 * POINTS + i], words[3 * POINTS + i] = _word(flat, k + below), _word(flat, k + below + two)
+        k = np.uint64(places[PIXEL_INDEX + i])
+        words[i], words[BATCH_POINTS + i] = _read_word(flat, k), _read_word(flat, k + two)
+        words[2 * BATCH_POINTS + i], words[3 * BATCH_POINTS + i] = (
+            _read_word(flat, k + below),
+            _read_word(flat, k + below + two),
+        )
 
 
 @compiled
@@ -96,12 +104,17 @@ def _byte(word, number):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _mix(words, parts, count):  # type: ignore[no-untyped-def]
+def _fill_channel_sums(words, parts, count):  # type: ignore[no-untyped-def]
     """Write the sums of the channels; whole numbers below 2^24, which these floats hold exactly."""
-    steps = np.float32(STEPS)
+    steps = np.float32(SUBPIXEL_STEPS)
     for i in range(count):
-        a, b, c, d = words[i], words[POINTS + i], words[2 * POINTS + i], words[3 * POINTS + i]
-        across, down = parts[ACROSS + i], parts[DOWN + i]
+        a, b, c, d = (
+            words[i],
+            words[BATCH_POINTS + i],
+            words[2 * BATCH_POINTS + i],
+            words[3 * BATCH_POINTS + i],
+        )
+        across, down = parts[FRACTION_X + i], parts[FRACTION_Y + i]
         both = across * down
         right, under = steps * across - both, steps * down - both
         rest = steps * (steps - across - down) + both
@@ -114,40 +127,40 @@ def _mix(words, parts, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def sample_points(flat, height, width, count, room):  # type: ignore[no-untyped-def]
-    """Take the samples at the first ``count`` places of a ``Room``, which must lie in the image."""
-    _aim(height, width, room.places, room.parts, count)
-    _fetch(flat, width, room.places, room.words, count)
-    _mix(room.words, room.parts, count)
+def fill_point_samples(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+    """Take the samples at the first ``count`` places of a ``SampleBuffers``, which must lie in the image."""
+    _fill_pixel_indices(height, width, room.places, room.channel_sums, count)
+    _fill_pixel_words(flat, width, room.places, room.pixel_words, count)
+    _fill_channel_sums(room.pixel_words, room.channel_sums, count)
 
 
 @compiled
-def sample_patches(flat, height, width, count, room):  # type: ignore[no-untyped-def]
-    """``sample_patch`` for the first ``count`` patches of a ``Room``."""
-    patches, parts = room.patches, room.parts
+def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+    """``sample_patch`` for the first ``count`` patches of a ``SampleBuffers``."""
+    patches, parts = room.patches, room.channel_sums
     for i in range(count):
         x, y, r = patches[X + i], patches[Y + i], patches[RADIUS + i]
         inside = (r >= 0.0) & (x >= r) & (y >= r) & (x <= width - 1.0 - r) & (y <= height - 1.0 - r)
         patches[INSIDE + i] = inside
         for channel in range(3):
-            patches[COLOR + channel * POINTS + i] = 0.0
-    for k in range(HEXAGON.shape[0]):
-        _place_around(height, width, k, patches, room.places, count)
-        sample_points(flat, height, width, count, room)
+            patches[COLOR + channel * BATCH_POINTS + i] = 0.0
+    for k in range(HEXAGON_POINTS.shape[0]):
+        _fill_hexagon_points(height, width, k, patches, room.places, count)
+        fill_point_samples(flat, height, width, count, room)
         for channel in range(3):
             for i in range(count):
-                patches[COLOR + channel * POINTS + i] += parts[channel * POINTS + i]
+                patches[COLOR + channel * BATCH_POINTS + i] += parts[channel * BATCH_POINTS + i]
     for channel in range(3):
         for i in range(count):
-            patches[COLOR + channel * POINTS + i] *= 1.0 / (7 * STEPS * STEPS)
+            patches[COLOR + channel * BATCH_POINTS + i] *= 1.0 / (7 * SUBPIXEL_STEPS * SUBPIXEL_STEPS)
 
 
 @compiled
-def _place_around(height, width, k, patches, places, count):  # type: ignore[no-untyped-def]
+def _fill_hexagon_points(height, width, k, patches, places, count):  # type: ignore[no-untyped-def]
     """Place a sample in every patch, at its center or a corner of its hexagon; somewhere where it lies outside."""
-    u, v = HEXAGON[k]
+    u, v = HEXAGON_POINTS[k]
     for i in range(count):
         x, y = patches[X + i] + patches[RADIUS + i] * u, patches[Y + i] + patches[RADIUS + i] * v
         inside = patches[INSIDE + i] > 0.0
-        places[X + i] = fixed(min(x, width - SHORT) if inside else 0.0)
-        places[Y + i] = fixed(min(y, height - SHORT) if inside else 0.0)
+        places[X + i] = fixed_point_coordinate(min(x, width - BORDER_PX) if inside else 0.0)
+        places[Y + i] = fixed_point_coordinate(min(y, height - BORDER_PX) if inside else 0.0)

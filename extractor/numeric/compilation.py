@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-ANY_ORDER = {"reassoc", "contract", "nsz", "arcp"}
+REORDERING_FLAGS = {"reassoc", "contract", "nsz", "arcp"}
 
 log = logging.getLogger("extractor")
 
@@ -26,7 +26,7 @@ except ImportError:  # slow, but right
 
 def compiled(function: Function) -> Function:
     """Compile ``function`` with numba on its first call; the result is cached beside its source file."""
-    return _compiled(function, False)
+    return _jit(function, False)
 
 
 def vectorized(function: Function) -> Function:
@@ -34,35 +34,35 @@ def vectorized(function: Function) -> Function:
 
     NaN and infinity keep their meaning.
     """
-    return _compiled(function, ANY_ORDER)
+    return _jit(function, REORDERING_FLAGS)
 
 
 def inlined(function: Function) -> Function:
     """The same for what a loop calls for every item: a call with some arrays costs as much as a hundred additions."""
-    return _compiled(function, False, forceinline=True)
+    return _jit(function, False, forceinline=True)
 
 
-def lent(function: Function) -> Function:
+def inlined_no_refcount(function: Function) -> Function:
     """The same as ``inlined`` for what neither makes nor returns arrays: references to those it is lent are not
     counted.
 
     Every row or slice of an array that is taken counts as one until it is dropped, each time by a locked write: where
     a loop takes some for every item, that is a good part of its time.
     """
-    return _compiled(function, False, forceinline=True, _nrt=False)
+    return _jit(function, False, forceinline=True, _nrt=False)
 
 
-def lent_call(function: Function) -> Function:
+def compiled_no_refcount(function: Function) -> Function:
     """The same for what is too long to be put in place wherever it is called."""
-    return _compiled(function, False, _nrt=False)
+    return _jit(function, False, _nrt=False)
 
 
-def lent_vectorized(function: Function) -> Function:
+def vectorized_no_refcount(function: Function) -> Function:
     """The same for loops whose sums may be taken in any order."""
-    return _compiled(function, ANY_ORDER, forceinline=True, _nrt=False)
+    return _jit(function, REORDERING_FLAGS, forceinline=True, _nrt=False)
 
 
-def _compiled(function: Function, fastmath: bool | set[str], **more: bool) -> Function:
+def _jit(function: Function, fastmath: bool | set[str], **more: bool) -> Function:
     if numba is None:
         return function
     options = {"cache": True, "nogil": True, "error_model": "numpy", **more}

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 
-FAR = 64.0  # of the points' extent, to the corners of the triangle that holds them all
-SLACK = 1e-15  # in units of the extent: points on a line, or on a circle, to within rounding
-CELL_POINTS = 3.0  # to a cell of the grid that orders the insertion
+OUTER_RADIUS = 64.0  # of the points' extent, to the corners of the triangle that holds them all
+ROUNDING_TOLERANCE = 1e-15  # in units of the extent: points on a line, or on a circle, to within rounding
+POINTS_PER_BUCKET = 3.0  # to a cell of the grid that orders the insertion
 
 
 @compiled
-def _order(points):  # type: ignore[no-untyped-def]
+def _insertion_order(points):  # type: ignore[no-untyped-def]
     """The points' order along rows of a grid, every other row backwards."""
     count = points.shape[0]
     low_x, low_y = points[:, 0].min(), points[:, 1].min()
     width, height = points[:, 0].max() - low_x, points[:, 1].max() - low_y
-    step = np.sqrt(max(width * height * CELL_POINTS / count, 1e-300))
+    step = np.sqrt(max(width * height * POINTS_PER_BUCKET / count, 1e-300))
     key = np.empty(count)
     for i in range(count):
         row = np.floor((points[i, 1] - low_y) / step)
@@ -33,14 +33,14 @@ def _order(points):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _side(xy, a, b, p):  # type: ignore[no-untyped-def]
+def _doubled_area(xy, a, b, p):  # type: ignore[no-untyped-def]
     """Twice the area of a, b, p; positive where p lies on the inner side of a triangle's edge a-b."""
     ax, ay = xy[a, 0], xy[a, 1]
     return (xy[b, 0] - ax) * (xy[p, 1] - ay) - (xy[b, 1] - ay) * (xy[p, 0] - ax)
 
 
 @compiled
-def _in_circle(xy, a, b, c, p):  # type: ignore[no-untyped-def]
+def _in_circle_determinant(xy, a, b, c, p):  # type: ignore[no-untyped-def]
     """Positive when p lies in the circle through a, b, c (which turn positively)."""
     px, py = xy[p, 0], xy[p, 1]
     ax, ay, bx, by, cx, cy = (
@@ -56,13 +56,13 @@ def _in_circle(xy, a, b, c, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _find(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-untyped-def]
+def _locate_triangle(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-untyped-def]
     """The triangle of those found that holds p, walked to from another; -1 should rounding lead in circles."""
     f = start
     for _ in range(4 * found):
         outside = -1
         for k in range(3):
-            if _side(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -slack:
+            if _doubled_area(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -slack:
                 outside = k
                 break
         if outside < 0:
@@ -74,7 +74,7 @@ def _find(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-unt
 
 
 @compiled
-def _replace(neighbours, face, old, new):  # type: ignore[no-untyped-def]
+def _update_neighbour(neighbours, face, old, new):  # type: ignore[no-untyped-def]
     """Let a face's neighbour ``old`` be ``new``."""
     if face >= 0:
         for k in range(3):
@@ -83,7 +83,7 @@ def _replace(neighbours, face, old, new):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _split(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
+def _update_split_triangle(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
     """Split face f by the point p, which becomes vertex 0 of f and of the two new faces count and count + 1."""
     a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
     na, nb, nc = neighbours[f, 0], neighbours[f, 1], neighbours[f, 2]
@@ -94,12 +94,12 @@ def _split(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
     neighbours[f, 0], neighbours[f, 1], neighbours[f, 2] = na, g, h
     neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = nb, h, f
     neighbours[h, 0], neighbours[h, 1], neighbours[h, 2] = nc, f, g
-    _replace(neighbours, nb, f, g)
-    _replace(neighbours, nc, f, h)
+    _update_neighbour(neighbours, nb, f, g)
+    _update_neighbour(neighbours, nc, f, h)
 
 
 @compiled
-def _legalise(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-untyped-def]
+def _update_by_flips(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-untyped-def]
     """Flip the edges opposite to the new point, vertex 0 of the faces on the stack, until none is in a circle."""
     for _ in range(stack.shape[0] - height):  # more flips than that only rounding can ask for
         if height == 0:
@@ -112,7 +112,7 @@ def _legalise(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-u
         p, a, b = faces[f, 0], faces[f, 1], faces[f, 2]
         k = 0 if neighbours[g, 0] == f else 1 if neighbours[g, 1] == f else 2
         d = faces[g, k]
-        if not _in_circle(xy, p, a, b, d) > slack:
+        if not _in_circle_determinant(xy, p, a, b, d) > slack:
             continue
         # f = p, a, b and g = d, b, a become f = p, a, d and g = p, d, b
         beyond_ad, beyond_db = neighbours[g, (k + 1) % 3], neighbours[g, (k + 2) % 3]
@@ -121,8 +121,8 @@ def _legalise(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-u
         faces[g, 0], faces[g, 1], faces[g, 2] = p, d, b
         neighbours[f, 0], neighbours[f, 1] = beyond_ad, g
         neighbours[g, 0], neighbours[g, 1], neighbours[g, 2] = beyond_db, beyond_pb, f
-        _replace(neighbours, beyond_ad, g, f)
-        _replace(neighbours, beyond_pb, f, g)
+        _update_neighbour(neighbours, beyond_ad, g, f)
+        _update_neighbour(neighbours, beyond_pb, f, g)
         stack[height], stack[height + 1] = f, g
         height += 2
 
@@ -139,7 +139,7 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
     xy[:count] = (points - middle) / extent
     for k in range(3):
         angle = 0.3 + 2.0 * np.pi * k / 3.0
-        xy[count + k, 0], xy[count + k, 1] = FAR * np.cos(angle), FAR * np.sin(angle)
+        xy[count + k, 0], xy[count + k, 1] = OUTER_RADIUS * np.cos(angle), OUTER_RADIUS * np.sin(angle)
     faces = np.full((2 * count + 1, 3), -1, np.int32)
     neighbours = np.full((2 * count + 1, 3), -1, np.int32)
     stack = np.empty(4 * count + 64, np.int32)
@@ -147,7 +147,7 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
         faces[0, k] = count + k
     found, last = 1, 0
     for i in order:
-        f = _find(xy, faces, neighbours, last, found, i, SLACK)
+        f = _locate_triangle(xy, faces, neighbours, last, found, i, ROUNDING_TOLERANCE)
         if f < 0:
             continue
         twice = False
@@ -155,16 +155,16 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
             twice = twice or (xy[faces[f, k], 0] == xy[i, 0] and xy[faces[f, k], 1] == xy[i, 1])
         if twice:
             continue
-        _split(faces, neighbours, f, found, i)
+        _update_split_triangle(faces, neighbours, f, found, i)
         stack[0], stack[1], stack[2] = f, found, found + 1
         found += 2
-        _legalise(xy, faces, neighbours, stack, 3, SLACK)
+        _update_by_flips(xy, faces, neighbours, stack, 3, ROUNDING_TOLERANCE)
         last = f
     return faces[:found], neighbours[:found]
 
 
 @compiled
-def _inner(faces, neighbours, count):  # type: ignore[no-untyped-def]
+def _inner_triangles(faces, neighbours, count):  # type: ignore[no-untyped-def]
     """The triangles whose corners are all points, numbered anew."""
     number = np.full(faces.shape[0], -1, np.int32)
     kept = 0
@@ -192,5 +192,5 @@ def delaunay(points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np
     """
     if len(points) < 3:
         return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)
-    faces, neighbours = _triangulate(points, _order(points))
-    return _inner(faces, neighbours, len(points))  # type: ignore[no-any-return]
+    faces, neighbours = _triangulate(points, _insertion_order(points))
+    return _inner_triangles(faces, neighbours, len(points))  # type: ignore[no-any-return]

@@ -8,13 +8,13 @@ from extractor.numeric.compilation import compiled
 
 
 @compiled
-def dot(a, b):  # type: ignore[no-untyped-def]
+def dot3(a, b):  # type: ignore[no-untyped-def]
     """The product of two vectors of three."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
-def cholesky_solve(gram, right, count):  # type: ignore[no-untyped-def]
+def update_to_cholesky_solution(gram, right, count):  # type: ignore[no-untyped-def]
     """Replace the rows of ``right`` by the solutions of gram x = row.
 
     ``gram`` is symmetric and positive definite; its first ``count`` rows' lower triangle is read, and overwritten.

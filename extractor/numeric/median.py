@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import lent
+from extractor.numeric.compilation import inlined_no_refcount
 
 
-@lent
+@inlined_no_refcount
 def median_of(values, count):  # type: ignore[no-untyped-def]
     """The median of the first ``count`` values, at least one and none of them NaN."""
     low, high = -np.inf, -np.inf

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import compiled, lent, lent_call
+from extractor.numeric.compilation import compiled, compiled_no_refcount, inlined_no_refcount
 
-BUCKET = 2.0  # points to a bucket
+POINTS_PER_BUCKET = 2.0  # points to a bucket
 
 
 @compiled
-def bucketed(xy):  # type: ignore[no-untyped-def]
+def bucket_grid(xy):  # type: ignore[no-untyped-def]
     """A grid over points (N, 2), finite, at least one: its origin and step, (rows, columns + 1) where the buckets of a
     row begin, and (N,) the points, bucket by bucket."""
     count = xy.shape[0]
     low_x, low_y = xy[:, 0].min(), xy[:, 1].min()
     width, height = xy[:, 0].max() - low_x, xy[:, 1].max() - low_y
     # never more buckets along a side than points, however long and thin the cloud
-    step = max(np.sqrt(width * height * BUCKET / count), max(width, height) / count, 1e-9)
+    step = max(np.sqrt(width * height * POINTS_PER_BUCKET / count), max(width, height) / count, 1e-9)
     columns, rows = int(width / step) + 1, int(height / step) + 1
     begin = np.zeros(rows * columns + 1, np.int32)
     bucket = np.empty(count, np.int32)
@@ -36,10 +36,10 @@ def bucketed(xy):  # type: ignore[no-untyped-def]
     return low_x, low_y, step, columns, begin, order
 
 
-@lent_call
-def nearest(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
+@compiled_no_refcount
+def fill_nearest_points(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
     """Write the points nearest to (x, y), the nearest first, into ``index`` and their squared distances into
-    ``square``, as many as these hold; how many there are."""
+    ``squared_distance``, as many as these hold; how many there are."""
     low_x, low_y, step, columns, begin, order = grid
     rows, wanted, found = (begin.shape[0] - 1) // columns, index.shape[0], 0
     column = min(max(int(np.floor((x - low_x) / step)), 0), columns - 1)
@@ -63,23 +63,23 @@ def nearest(xy, grid, x, y, index, square):  # type: ignore[no-untyped-def]
         for line in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
             first = line * columns
             if abs(line - row) == ring:
-                found = _take(
+                found = _update_nearest(
                     xy, order, begin[first + left], begin[first + right + 1], x, y, index, square, found
                 )
                 continue
             if column >= ring:
-                found = _take(
+                found = _update_nearest(
                     xy, order, begin[first + left], begin[first + left + 1], x, y, index, square, found
                 )
             if column + ring < columns:
-                found = _take(
+                found = _update_nearest(
                     xy, order, begin[first + right], begin[first + right + 1], x, y, index, square, found
                 )
     return found
 
 
-@lent
-def _take(xy, order, begin, end, x, y, index, square, found):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _update_nearest(xy, order, begin, end, x, y, index, square, found):  # type: ignore[no-untyped-def]
     """Put those of the ordered points that are nearer than the last into their places; how many there are now."""
     wanted = index.shape[0]
     for k in range(begin, end):

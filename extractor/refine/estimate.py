@@ -8,24 +8,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.refine.measure.gridline_offsets import Reading
+from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.solve.fisher_information import Information
-from extractor.refine.synthesis.ink_levels import Levels, level_change
+from extractor.refine.synthesis.ink_levels import InkLevels, level_change
 
-MUCH_BLUR, MUCH_LIGHT = 0.06, 0.03  # of the blur and the levels, that no start can take for granted
+MAX_BLUR_CHANGE, MAX_LEVEL_CHANGE = (
+    0.06,
+    0.03,
+)  # of the blur and the levels, that no start can take for granted
 
 
-class Seen(NamedTuple):
+class Appearance(NamedTuple):
     """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
     the inks' levels, and the grain: noise as pixels show it that lie side by side, whatever the pattern explains."""
 
     scale: int
     sigma: float
     noise: float
-    levels: Levels
-    grain: float
+    levels: InkLevels
+    pixel_noise: float
 
-    def relit(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Seen:
+    def with_lighting(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Appearance:
         """The same in another light.
 
         Args:
@@ -37,14 +40,14 @@ class Seen(NamedTuple):
         cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
         return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
 
-    def near(self, other: Seen) -> bool:
+    def near(self, other: Appearance) -> bool:
         """Whether blur and levels are nearly the same."""
-        blur = abs(self.sigma - other.sigma) < MUCH_BLUR * other.sigma
-        return blur and bool(level_change(other.levels.cell, self.levels.cell) < MUCH_LIGHT)
+        blur = abs(self.sigma - other.sigma) < MAX_BLUR_CHANGE * other.sigma
+        return blur and bool(level_change(other.levels.cell, self.levels.cell) < MAX_LEVEL_CHANGE)
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
+class RefinedMarkers:
     """Markers after refinement.
 
     Attributes:
@@ -62,14 +65,14 @@ class Refined:
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     explained: NDArray[np.bool_]
-    free_px: NDArray[np.float64]
+    bend_deviation_px: NDArray[np.float64]
     blur_px: float
     noise: float
-    seen: Seen | None
+    seen: Appearance | None
     points: NDArray[np.float64]
 
 
-class Fit(NamedTuple):
+class Estimate(NamedTuple):
     """The current estimate.
 
     Attributes:
@@ -79,7 +82,7 @@ class Fit(NamedTuple):
         guiding: (M, 2), the same with NaN where the image hardly shows them.
         beyond: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
-        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks. grain: as in ``Seen``.
+        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks. grain: as in ``Appearance``.
         information: about the markers.
         rough: (M,) px^2, how rough the markers are around each.
         loose: (E,) px^2, how freely gridlines may bend beyond the map there.
@@ -93,25 +96,25 @@ class Fit(NamedTuple):
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
-    guiding: NDArray[np.float64]
+    reliable: NDArray[np.float64]
     beyond: NDArray[np.bool_]
     maps: NDArray[np.float64]
     sigma: float
     noise: float
-    levels: Levels
-    grain: float
+    levels: InkLevels
+    pixel_noise: float
     information: Information
-    rough: NDArray[np.float64]
-    loose: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    bend_variance: NDArray[np.float64]
     bend: NDArray[np.float64]
-    strides: NDArray[np.float64]
-    reading: Reading | None
-    usual: float = np.nan
-    swelling: float = 0.0
-    unsettled: NDArray[np.float64] | None = None
+    normalized_steps: NDArray[np.float64]
+    reading: GridlineReading | None
+    median_misfit: float = np.nan
+    dot_gain: float = 0.0
+    convergence_cov_px2: NDArray[np.float64] | None = None
 
 
-class Across(NamedTuple):
+class EdgeContrasts(NamedTuple):
     """What changes across the gridlines; moves of a pixel do not change it.
 
     Attributes:
@@ -121,4 +124,4 @@ class Across(NamedTuple):
 
     contrasts: NDArray[np.float64]
     weights: NDArray[np.float64]
-    room: NDArray[np.float64]
+    clearance: NDArray[np.float64]

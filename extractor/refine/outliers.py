@@ -13,79 +13,85 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.pyramid import Sight
+from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
-from extractor.numbering.marker_places import MAX_APART, Places
+from extractor.numbering.marker_places import MAX_PLACE_ERROR, InitialMarkers
 from extractor.numeric.compilation import compiled
 from extractor.numeric.median import median_of
-from extractor.refine.estimate import Fit
+from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import third_difference
-from extractor.refine.synthesis.gridlines import FIRST_RING, continued
+from extractor.refine.synthesis.gridlines import FIRST_RING, extrapolate_rings
 
-DOUBTED = 0.55  # mean trust in the gridlines read at a marker, below which it is doubted
+MIN_MEAN_WEIGHT = 0.55  # mean trust in the gridlines read at a marker, below which it is doubted
 # To stray, a marker must have to move by so many times what those around it must, if doubted, and if not;
-UNUSUAL = 3.0, 6.0
-LEAST = 0.02, 0.03  # and by so much of an edge.
+OUTLIER_RATIOS = 3.0, 6.0
+MIN_OUTLIER_SHIFTS = 0.02, 0.03  # and by so much of an edge.
 # Its gridlines agree on a move if more than this share of them, and no fewer than so many,
-MOST, FEWEST = 0.7, 3
-ALIKE = 0.5  # ask for one that differs by less than this share of it.
-RINGS = 2  # of strays that the markers around are continued to
-ROUNDS = 6  # one marker that strays hides what is wrong with its neighbours
+MIN_AGREEING_SHARE, MIN_AGREEING_GRIDLINES = 0.7, 3
+AGREEMENT_TOLERANCE = 0.5  # ask for one that differs by less than this share of it.
+EXTRAPOLATED_RINGS = 2  # of strays that the markers around are continued to
+MAX_ROUNDS = 6  # one marker that strays hides what is wrong with its neighbours
 # The share of a third difference that is the error of one of its two inner markers; all of it is, of an outer one.
-PART = 1.0 / 3.0
+INNER_MARKER_SHARE = 1.0 / 3.0
 
 
-def collected(
-    view: Sight, mesh: Topology, fit: Fit, trusted: NDArray[np.float64], places: Places
-) -> tuple[Fit, Places]:
+def correct_outliers(
+    view: PyramidLevel, mesh: Topology, fit: Estimate, trusted: NDArray[np.float64], places: InitialMarkers
+) -> tuple[Estimate, InitialMarkers]:
     """The fit and the places (of the full image), those that dirt has led astray put where their neighbours say;
     ``trusted`` (E,) is how far gridlines look as they should."""
     assert fit.reading is not None
-    of_fit = fit.measured, fit.guiding, fit.beyond, fit.maps
+    of_fit = fit.measured, fit.reliable, fit.beyond, fit.maps
     of_places = places.xy_px, places.edge_px, places.agreed, places.whole
-    doubted, some = doubted_ones(trusted, fit.reading.use, mesh.spokes)
+    doubted, some = suspect_markers(trusted, fit.reading.weight, mesh.spokes)
     if not some:
         return fit, places
-    led, measured, guiding, xy, agreed, whole = _collected(
-        of_fit, of_places, doubted, view.scale, _lattice(mesh), mesh.offset, mesh.stencil
+    led, measured, guiding, xy, agreed, whole = _correct_outliers(
+        of_fit,
+        of_places,
+        doubted,
+        view.scale,
+        _topology_tables(mesh),
+        mesh.ring_vectors,
+        mesh.derivative_stencil,
     )
     if not led:
         return fit, places
-    fit = fit._replace(measured=measured, guiding=guiding)
+    fit = fit._replace(measured=measured, reliable=guiding)
     return fit, replace(places, xy_px=xy, agreed=agreed, whole=whole)
 
 
 @compiled
-def _collected(of_fit, of_places, doubted, scale, lattice, offset, stencil):  # type: ignore[no-untyped-def]
-    """Whether any markers were led astray; ``measured`` and ``guiding`` of the fit and ``xy_px``, ``agreed`` and
+def _correct_outliers(of_fit, of_places, doubted, scale, lattice, offset, stencil):  # type: ignore[no-untyped-def]
+    """Whether any markers were led astray; ``measured`` and ``reliable`` of the fit and ``xy_px``, ``agreed`` and
     ``whole`` of the places, those put where their neighbours say."""
     measured, guiding, beyond, maps = of_fit
     start, edge, agreed, whole = of_places
     known = guiding.copy()
     known[beyond] = np.nan
-    led = straying(known, maps, doubted, edge / scale, *lattice)
+    led = outlier_markers(known, maps, doubted, edge / scale, *lattice)
     led |= doubted & ~agreed
     if not np.any(led):
         return False, measured, guiding, start, agreed, whole
     measured, guiding, start = measured.copy(), guiding.copy(), start.copy()
     agreed, whole = agreed.copy(), whole.copy()
     known[led] = np.nan
-    xy = continued(known, lattice[-1], offset, stencil, RINGS)
+    xy = extrapolate_rings(known, lattice[-1], offset, stencil, EXTRAPOLATED_RINGS)
     for m in np.flatnonzero(led):
         if not np.isfinite(xy[m, 0]):
             continue
         measured[m], guiding[m] = xy[m], xy[m]
         x, y = (xy[m, 0] + 0.5) * scale - 0.5, (xy[m, 1] + 0.5) * scale - 0.5
         apart = np.sqrt((x - start[m, 0]) ** 2 + (y - start[m, 1]) ** 2)
-        agreed[m] &= not apart > MAX_APART * edge[m]
+        agreed[m] &= not apart > MAX_PLACE_ERROR * edge[m]
         whole[m] = False
         start[m, 0], start[m, 1] = x, y
     return True, measured, guiding, start, agreed, whole
 
 
-def astray(
+def find_outliers(
     mesh: Topology,
-    fit: Fit,
+    fit: Estimate,
     xy: NDArray[np.float64],
     trusted: NDArray[np.float64],
     edge_px: NDArray[np.float64],
@@ -93,20 +99,21 @@ def astray(
     """(M,) which of the markers ``xy`` (M, 2) strayed, and (M,) which have gridlines that look unlike the pattern;
     without any of these, none strayed."""
     assert fit.reading is not None
-    doubted, some = doubted_ones(trusted, fit.reading.use, mesh.spokes)
+    doubted, some = suspect_markers(trusted, fit.reading.weight, mesh.spokes)
     if not some:
         return doubted, doubted
-    return straying(xy, fit.maps, doubted, edge_px, *_lattice(mesh)), doubted
+    return outlier_markers(xy, fit.maps, doubted, edge_px, *_topology_tables(mesh)), doubted
 
 
-def _lattice(mesh: Topology) -> tuple[NDArray[Any], ...]:
-    """What ``straying`` needs of the mesh."""
-    return mesh.edges, mesh.ahead, mesh.third, mesh.spokes, mesh.onward, mesh.near
+def _topology_tables(mesh: Topology) -> tuple[NDArray[Any], ...]:
+    """What ``outlier_markers`` needs of the mesh."""
+    return mesh.edges, mesh.next_markers, mesh.third_differences, mesh.spokes, mesh.next_edges, mesh.near
 
 
 @compiled
-def doubted_ones(trusted, use, spokes):  # type: ignore[no-untyped-def]
-    """(M,) bool: markers whose gridlines, of those in ``use`` (E,), are little ``trusted`` (E,); and whether there are
+def suspect_markers(trusted, use, spokes):  # type: ignore[no-untyped-def]
+    """(M,) bool: markers whose gridlines, of those in ``weight`` (E,), are little ``trusted`` (E,); and whether
+    there are
     any."""
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
@@ -116,12 +123,12 @@ def doubted_ones(trusted, use, spokes):  # type: ignore[no-untyped-def]
             if e >= 0 and use[e] > 0.0:
                 total += trusted[e]
                 count += 1
-        out[m] = total < DOUBTED * count
+        out[m] = total < MIN_MEAN_WEIGHT * count
     return out, np.any(out)
 
 
 @compiled
-def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near):  # type: ignore[no-untyped-def]
+def outlier_markers(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near):  # type: ignore[no-untyped-def]
     """(M,) bool, the markers that strayed.
 
     ``doubted``: (M,) bool. ``edge``: (M,) px, the length of the edges at each. ``xy``: NaN where nothing is known.
@@ -129,34 +136,36 @@ def straying(xy, maps, doubted, edge, edges, ahead, third, spokes, onward, near)
     count = xy.shape[0]
     out, strays, anew = xy.copy(), np.zeros(count, np.bool_), np.ones(count, np.bool_)
     move, far, alike = np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)
-    least = np.where(doubted, LEAST[0], LEAST[1]) * edge
+    least = np.where(doubted, MIN_OUTLIER_SHIFTS[0], MIN_OUTLIER_SHIFTS[1]) * edge
     # few markers could have to move at all; only these, and those around them, are asked
     moving, asked, bent = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.empty((edges.shape[0], 2))
-    for _ in range(ROUNDS):
-        _third_differences(out, anew, maps, edges, ahead, third, bent)
-        _may_move(anew, least, bent, spokes, onward, moving, asked)
-        _ask(moving, bent, edges, ahead, spokes, onward, asked, move, far, alike)
+    for _ in range(MAX_ROUNDS):
+        _update_third_differences(out, anew, maps, edges, ahead, third, bent)
+        _update_candidates(anew, least, bent, spokes, onward, moving, asked)
+        _update_agreed_shifts(moving, bent, edges, ahead, spokes, onward, asked, move, far, alike)
         moving &= alike & (far > least)
-        _ask(_around(moving, near), bent, edges, ahead, spokes, onward, asked, move, far, alike)
+        _update_agreed_shifts(
+            _within_two_rings(moving, near), bent, edges, ahead, spokes, onward, asked, move, far, alike
+        )
         anew[:] = False
         for m in np.flatnonzero(moving):
             first = True  # of its neighbours in how far it would have to move
             for k in range(FIRST_RING):
                 n = near[m, k]
                 first = first and not (n >= 0 and far[n] > far[m])
-            if first and far[m] > UNUSUAL[0 if doubted[m] else 1] * _usual(far, near[m]):
+            if first and far[m] > OUTLIER_RATIOS[0 if doubted[m] else 1] * _median_shift(far, near[m]):
                 out[m, 0] -= move[m, 0]
                 out[m, 1] -= move[m, 1]
                 strays[m] = anew[m] = True
         if not np.any(anew):
             break
-        anew |= _around(anew, near)
+        anew |= _within_two_rings(anew, near)
     return strays
 
 
 @compiled
-def _around(which, near):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers in the two rings of ``which`` (M,)."""
+def _within_two_rings(which, near):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers in the two rings of ``gridlines`` (M,)."""
     out = np.zeros(which.shape[0], np.bool_)
     for m in np.flatnonzero(which):
         for n in near[m]:
@@ -165,7 +174,7 @@ def _around(which, near):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _third_differences(xy, anew, maps, edges, ahead, third, out):  # type: ignore[no-untyped-def]
+def _update_third_differences(xy, anew, maps, edges, ahead, third, out):  # type: ignore[no-untyped-def]
     """Fill in (E, 2) px along the gridlines with an end that is ``anew`` (M,), NaN where one of the four markers along
     a gridline is not known."""
     for e in range(edges.shape[0]):
@@ -176,27 +185,30 @@ def _third_differences(xy, anew, maps, edges, ahead, third, out):  # type: ignor
 
 
 @compiled
-def _may_move(anew, least, bent, spokes, onward, moving, asked):  # type: ignore[no-untyped-def]
+def _update_candidates(anew, least, bent, spokes, onward, moving, asked):  # type: ignore[no-untyped-def]
     """Of the markers that are ``anew``: none is ``asked`` yet, and those are ``moving`` whose gridlines could agree on
-    a move by more than ``least`` px: by no more than what the largest third differences ask for in x and in y."""
+    a move by more than ``min_places`` px: by no more than what the largest third differences ask for in x and in y."""
     for m in range(anew.shape[0]):
         if not anew[m]:
             continue
         x, y, known = 0.0, 0.0, 0
         for k in range(spokes.shape[1]):
-            e, part = spokes[m, k], PART
+            e, part = spokes[m, k], INNER_MARKER_SHARE
             if e < 0 or not np.isfinite(bent[e, 0]):
                 e, part = onward[m, k], 1.0
             if e >= 0 and np.isfinite(bent[e, 0]):
                 x, y = max(x, part * abs(bent[e, 0])), max(y, part * abs(bent[e, 1]))
                 known += 1
         asked[m] = False
-        moving[m] = known >= FEWEST and x * x + y * y > 0.99 * least[m] ** 2  # rounding left aside
+        moving[m] = (
+            known >= MIN_AGREEING_GRIDLINES and x * x + y * y > 0.99 * least[m] ** 2
+        )  # rounding left aside
 
 
 @compiled
-def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  # type: ignore[no-untyped-def]
-    """Fill in, of the markers ``which`` (M,) that are not ``asked`` yet: ``move`` (M, 2), the error that the gridlines
+def _update_agreed_shifts(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  # type: ignore[no-untyped-def]
+    """Fill in, of the markers ``gridlines`` (M,) that are not ``asked`` yet: ``move`` (M, 2), the error that the
+    gridlines
     through each agree on (their median, by their third differences ``bent``), ``far`` (M,), how large it is, NaN where
     fewer than three are known, and whether they are ``alike`` (M,)."""
     said, column = np.empty((spokes.shape[1], 2)), np.empty(spokes.shape[1])
@@ -205,7 +217,7 @@ def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  #
             continue
         asked[m], known = True, 0
         for k in range(spokes.shape[1]):
-            e, part = spokes[m, k], PART
+            e, part = spokes[m, k], INNER_MARKER_SHARE
             if e < 0 or not np.isfinite(bent[e, 0]):
                 # where no gridline goes on behind the marker, it is the last of the next four
                 e, part = onward[m, k], 1.0
@@ -213,7 +225,7 @@ def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  #
                 part = part if edges[e, 1] == m or ahead[e, 0] == m else -part
                 said[known, 0], said[known, 1] = part * bent[e, 0], part * bent[e, 1]
                 known += 1
-        if known < FEWEST:
+        if known < MIN_AGREEING_GRIDLINES:
             continue
         for axis in range(2):
             for k in range(known):
@@ -224,12 +236,12 @@ def _ask(which, bent, edges, ahead, spokes, onward, asked, move, far, alike):  #
         like = 0
         for k in range(known):
             dx, dy = said[k, 0] - move[m, 0], said[k, 1] - move[m, 1]
-            like += dx * dx + dy * dy < ALIKE**2 * square
-        alike[m] = like >= FEWEST and like > MOST * known
+            like += dx * dx + dy * dy < AGREEMENT_TOLERANCE**2 * square
+        alike[m] = like >= MIN_AGREEING_GRIDLINES and like > MIN_AGREEING_SHARE * known
 
 
 @compiled
-def _usual(far, near):  # type: ignore[no-untyped-def]
+def _median_shift(far, near):  # type: ignore[no-untyped-def]
     """The median of how far the markers around would have to move."""
     kept, count = np.empty(near.shape[0]), 0
     for n in near:

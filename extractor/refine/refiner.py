@@ -12,34 +12,45 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.pyramid import Sight, Sights
+from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.layout.topology import Topology
-from extractor.numbering.marker_places import AGREED, Places
+from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
 from extractor.numeric.compilation import compiled
-from extractor.presets import STEPS, Preset
-from extractor.refine.acceptance import dirtied, doubt, lost_ones, sure_ones, unsure_ones
-from extractor.refine.estimate import Across, Fit, Refined, Seen
-from extractor.refine.first_look import across, cleared, first_look
-from extractor.refine.measure.gridline_bending import around
-from extractor.refine.measure.gridline_offsets import measure
-from extractor.refine.measure.gridline_weights import MIN_NOISE, SHORTEST, short_edges, usual_edge
-from extractor.refine.outliers import astray, collected
-from extractor.refine.profile_rounds import profiled
-from extractor.refine.recovered_markers import regain
-from extractor.refine.refinement_step import completed, lines_of, placed, roughened
+from extractor.presets import SCHEDULES, Preset
+from extractor.refine.acceptance import (
+    accepted_markers,
+    add_dirt_variance,
+    update_lost_markers,
+    update_obstructed_markers,
+    update_unaccepted_markers,
+)
+from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate, RefinedMarkers
+from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
+from extractor.refine.measure.gridline_bending import mean_at_markers
+from extractor.refine.measure.gridline_offsets import measure_virtual_markers
+from extractor.refine.measure.gridline_weights import MIN_NOISE, SHORTEST_RARITY, median_edge, short_edges
+from extractor.refine.outliers import correct_outliers, find_outliers
+from extractor.refine.profile_rounds import profile_step
+from extractor.refine.recovered_markers import fill_recovered_markers
+from extractor.refine.refinement_step import (
+    extrapolate_pattern,
+    gridlines_of,
+    with_pattern_moved,
+    with_roughness,
+)
 from extractor.refine.solve.fisher_information import Information
-from extractor.refine.synthesis.dot_gain import shrunk
-from extractor.refine.synthesis_steps import MIN_SIGMA_PX, SMALL_BLUR, WIDE_BLUR, Draughtsman
+from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
+from extractor.refine.synthesis_steps import MIN_SIGMA_PX, SMALL_BLUR, WIDE_BLUR, SynthesisSolver
 
 SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: the scale for it is looked at first
-SHORT = 30  # one in so many gridlines may be smaller than that at a reduced scale
+SHORT_RARITY = 30  # one in so many gridlines may be smaller than that at a reduced scale
 MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
 # A first step may be taken where usual gridlines have so many pixels, and the blur so much of what the preset asks for.
 COARSE_EDGE_PX, COARSE_BLUR = 4.5, 0.9
 # Where the drawing leaves more than so many times the noise, it explains nothing so well that it may move a marker far.
-STRANGE = 3.0
+UNEXPLAINED_NOISE_RATIO = 3.0
 
 
 class Refiner:
@@ -48,11 +59,13 @@ class Refiner:
     def __init__(self, mesh: Topology, preset: Preset, virtual_per_edge: int) -> None:
         self._mesh = mesh
         self._virtual = virtual_per_edge
-        self._steps = STEPS[preset]
-        self._draughtsman = Draughtsman(mesh)
-        self._all = np.ones(len(mesh.spokes), np.bool_)
+        self._steps = SCHEDULES[preset]
+        self._synthesis_solver = SynthesisSolver(mesh)
+        self._every_marker = np.ones(len(mesh.spokes), np.bool_)
 
-    def __call__(self, sights: Sights, places: Places, before: Seen | None = None) -> Refined:
+    def __call__(
+        self, sights: Pyramid, places: InitialMarkers, before: Appearance | None = None
+    ) -> RefinedMarkers:
         """Solve all markers together.
 
         Args:
@@ -62,136 +75,153 @@ class Refiner:
 
         A marker that would be moved by more than ``sure.MAX_SHIFT`` of an edge is lost.
         """
-        edge, usual = short_edges(places.xy_px, self._mesh.edges, SHORTEST, SHORT)
-        if before is not None and before.scale == self._scale(before.scale * before.sigma, usual):
+        edge, usual = short_edges(places.xy_px, self._mesh.edges, SHORTEST_RARITY, SHORT_RARITY)
+        if before is not None and before.scale == self._reduction_scale(before.scale * before.sigma, usual):
             view = sights.at(before.scale)
-            refined = self._finish(view, *self._begin(view, places, places.xy_px, before), edge)
+            refined = self._final_steps(view, *self._first_estimate(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
-        view = sights.at(min(self._scale(SHARP_SIGMA_PX, usual), 2))
-        fit, sides, places = self._begin(view, places, places.xy_px)
-        scale = self._scale(view.scale * fit.sigma, usual)
+        view = sights.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual), 2))
+        fit, sides, places = self._first_estimate(view, places, places.xy_px)
+        scale = self._reduction_scale(view.scale * fit.sigma, usual)
         if scale > view.scale:
-            fit, sides = rescaled(fit, view, sights.at(scale)), magnified(sides, view.scale / scale)
+            fit, sides = rescaled(fit, view, sights.at(scale)), rescaled_contrasts(sides, view.scale / scale)
         elif scale < view.scale:
-            xy = np.where(np.isfinite(places.xy_px), view.full(fit.measured), np.nan)
-            fit, sides, places = self._begin(sights.at(scale), places, xy)
-        return self._finish(sights.at(scale), fit, sides, places, edge, sights)
+            xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(fit.measured), np.nan)
+            fit, sides, places = self._first_estimate(sights.at(scale), places, xy)
+        return self._final_steps(sights.at(scale), fit, sides, places, edge, sights)
 
-    def _scale(self, sigma_px: float, edge_px: float) -> int:
+    def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
-        scale = min(int(sigma_px / self._steps.finest), int(edge_px / MIN_EDGE_PX))
+        scale = min(int(sigma_px / self._steps.reduction_blur_px), int(edge_px / MIN_EDGE_PX))
         if sigma_px > SMALL_BLUR * edge_px:
             scale = min(scale, max(int(sigma_px / MIN_BLUR_PX), int(edge_px / MIN_BLURRED_EDGE_PX)))
         return max(1, scale)
 
-    def _begin(
-        self, view: Sight, places: Places, start: NDArray[np.float64], before: Seen | None = None
-    ) -> tuple[Fit, Across, Places]:
+    def _first_estimate(
+        self,
+        view: PyramidLevel,
+        places: InitialMarkers,
+        start: NDArray[np.float64],
+        before: Appearance | None = None,
+    ) -> tuple[Estimate, EdgeContrasts, InitialMarkers]:
         """The inks' levels, the blur, and the first round of profiles from ``start`` (M, 2), px in the full image; and
         the places without those that strayed."""
         mesh = self._mesh
-        xy, beyond, maps = completed(mesh, view.reduced(start))
+        xy, beyond, maps = extrapolate_pattern(mesh, view.reduced(start))
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
-        seen = before or first_look(view, mesh, xy)
-        about = seen.sigma, seen.noise, seen.levels, seen.grain
+        seen = before or initial_appearance(view, mesh, xy)
+        about = seen.sigma, seen.noise, seen.levels, seen.pixel_noise
         free = smooth, stiff, straight, smooth
-        fit = Fit(xy, xy, xy, beyond, maps, *about, nothing, *free, None)
-        lines = lines_of(mesh, fit)
-        sides = across(view, mesh, fit, lines)
+        fit = Estimate(xy, xy, xy, beyond, maps, *about, nothing, *free, None)
+        lines = gridlines_of(mesh, fit)
+        sides = update_edge_contrasts(view, mesh, fit, lines)
         if before is None:
-            fit, sides = cleared(view, mesh, fit, lines, sides)
-        fit, trusted = profiled(view, mesh, fit, lines, sides, self._steps.profiles[0], judged=False)
-        fit, places = collected(view, mesh, fit, trusted, places)
+            fit, sides = update_blur_and_bleed(view, mesh, fit, lines, sides)
+        fit, trusted = profile_step(
+            view, mesh, fit, lines, sides, self._steps.max_profile_rows[0], judged=False
+        )
+        fit, places = correct_outliers(view, mesh, fit, trusted, places)
         return fit, sides, places
 
-    def _finish(
+    def _final_steps(
         self,
-        view: Sight,
-        fit: Fit,
-        sides: Across,
-        places: Places,
+        view: PyramidLevel,
+        fit: Estimate,
+        sides: EdgeContrasts,
+        places: InitialMarkers,
         edge_px: float,
-        sights: Sights | None = None,
-    ) -> Refined:
+        sights: Pyramid | None = None,
+    ) -> RefinedMarkers:
         """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge. With
         ``sights``, a first step may be taken at twice the scale, where blur and usual gridlines allow that and only
         short ones do not."""
-        mesh, steps, places, edge_px = self._mesh, self._steps, _in(view, places), edge_px / view.scale
-        if fit.swelling != 0.0:
-            places = replace(places, xy_px=shrunk(places.xy_px, mesh.cells, fit.swelling))
-        start = placed(mesh, fit)
-        if fit.sigma < steps.sharp * edge_px and view.scale < steps.reduced:
-            start = roughened(mesh, start)
-            lines = lines_of(mesh, start)
-            fit, use = profiled(view, mesh, start, lines, sides, steps.profiles[1], judged=True)
-            xy, cov = self._sure(fit, places)
-            strays, doubted = astray(mesh, fit, xy, use, places.edge_px)
+        mesh, steps, places, edge_px = (
+            self._mesh,
+            self._steps,
+            _at_reduced_scale(view, places),
+            edge_px / view.scale,
+        )
+        if fit.dot_gain != 0.0:
+            places = replace(places, xy_px=markers_without_dot_gain(places.xy_px, mesh.cells, fit.dot_gain))
+        start = with_pattern_moved(mesh, fit)
+        if fit.sigma < steps.sharp_blur_share * edge_px and view.scale < steps.reduced:
+            start = with_roughness(mesh, start)
+            lines = gridlines_of(mesh, start)
+            fit, use = profile_step(view, mesh, start, lines, sides, steps.max_profile_rows[1], judged=True)
+            xy, cov = self._accepted_markers(fit, places)
+            strays, doubted = find_outliers(mesh, fit, xy, use, places.edge_px)
             xy[strays], cov[strays] = np.nan, np.nan
-            doubt(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
-            return self._refined(view, fit, xy, cov, ~doubted, places)
-        coarser = start.sigma >= 2 * COARSE_BLUR * steps.finest
+            update_obstructed_markers(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
+            return self._refined_markers(view, fit, xy, cov, ~doubted, places)
+        coarser = start.sigma >= 2 * COARSE_BLUR * steps.reduction_blur_px
         blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
-        usual_px, spent = usual_edge(start.xy, mesh.edges) if blurred else edge_px, 0.0
+        usual_px, spent = median_edge(start.xy, mesh.edges) if blurred else edge_px, 0.0
         if sights and coarser and usual_px >= 2 * COARSE_EDGE_PX:
-            start, spent = self._nearer(view, start, sights.at(2 * view.scale))
-        fit = self._draughtsman.steps(view, start, steps, edge_px, usual_px, spent)
-        return self._result(view, fit, sides, places)
+            start, spent = self._coarse_step(view, start, sights.at(2 * view.scale))
+        fit = self._synthesis_solver.steps(view, start, steps, edge_px, usual_px, spent)
+        return self._accept_or_recover(view, fit, sides, places)
 
-    def _nearer(self, view: Sight, fit: Fit, coarse: Sight) -> tuple[Fit, float]:
+    def _coarse_step(self, view: PyramidLevel, fit: Estimate, coarse: PyramidLevel) -> tuple[Estimate, float]:
         """The fit after a first step in a coarser view, and what this cost: the markers start nearer then, for a
         fraction of a step."""
-        stepped, spent = self._draughtsman.approach(coarse, rescaled(fit, view, coarse))
-        return placed(self._mesh, rescaled(stepped, coarse, view)), spent
+        stepped, spent = self._synthesis_solver.first_step(coarse, rescaled(fit, view, coarse))
+        return with_pattern_moved(self._mesh, rescaled(stepped, coarse, view)), spent
 
-    def _result(self, view: Sight, fit: Fit, sides: Across, places: Places) -> Refined:
+    def _accept_or_recover(
+        self, view: PyramidLevel, fit: Estimate, sides: EdgeContrasts, places: InitialMarkers
+    ) -> RefinedMarkers:
         """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
-        xy, cov = self._sure(fit, places)
-        strange = fit.noise > STRANGE * fit.grain
+        xy, cov = self._accepted_markers(fit, places)
+        strange = fit.noise > UNEXPLAINED_NOISE_RATIO * fit.pixel_noise
         start = places.xy_px, places.edge_px
-        unsure, some = unsure_ones(xy, cov, fit.guiding, *start, strange, fit.swelling)
+        unsure, some = update_unaccepted_markers(xy, cov, fit.reliable, *start, strange, fit.dot_gain)
         if not some:
-            return self._refined(view, fit, xy, cov, ~unsure, places)
-        there = placed(self._mesh, fit, unsure)
-        lost = lost_ones(xy, cov, unsure, there.xy, *start)
-        regain(view, self._mesh, there, sides, places, lost, xy, cov)
-        return self._refined(view, fit, xy, cov, ~lost, places)
+            return self._refined_markers(view, fit, xy, cov, ~unsure, places)
+        there = with_pattern_moved(self._mesh, fit, unsure)
+        lost = update_lost_markers(xy, cov, unsure, there.xy, *start)
+        fill_recovered_markers(view, self._mesh, there, sides, places, lost, xy, cov)
+        return self._refined_markers(view, fit, xy, cov, ~lost, places)
 
-    def _refined(
+    def _refined_markers(
         self,
-        view: Sight,
-        fit: Fit,
+        view: PyramidLevel,
+        fit: Estimate,
         xy: NDArray[np.float64],
         cov: NDArray[np.float64],
         explained: NDArray[np.bool_],
-        places: Places,
-    ) -> Refined:
+        places: InitialMarkers,
+    ) -> RefinedMarkers:
         """The markers at the image's full scale; what was lost though all triangles agree on it is where these say."""
         mesh, scale, reading = self._mesh, view.scale, fit.reading
         assert reading is not None
-        picture = self._draughtsman.board(view.image.shape).picture
-        points = measure(view.image, picture, reading, self._virtual, scale)
+        picture = self._synthesis_solver.buffers(view.image.shape).synthetic_image
+        points = measure_virtual_markers(view.image, picture, reading, self._virtual, scale)
         left = places.xy_px, places.edge_px, places.agreed
-        xy, cov, free = _in_full(xy, cov, fit.loose, mesh.spokes, *left, scale)
+        xy, cov, free = _at_full_scale(xy, cov, fit.bend_variance, mesh.spokes, *left, scale)
         blur, noise = scale * fit.sigma, scale * fit.noise
-        seen = Seen(scale, fit.sigma, fit.noise, fit.levels, fit.grain) if reading.drawn else None
-        return Refined(xy, cov, explained, free, blur, noise, seen, points)
+        seen = Appearance(scale, fit.sigma, fit.noise, fit.levels, fit.pixel_noise) if reading.drawn else None
+        return RefinedMarkers(xy, cov, explained, free, blur, noise, seen, points)
 
-    def _sure(self, fit: Fit, places: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _accepted_markers(
+        self, fit: Estimate, places: InitialMarkers
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit; NaN where it is far from the places or not sure."""
         tables = self._mesh.edges, self._mesh.spokes
         start = places.xy_px, places.edge_px, places.whole
-        xy, cov = sure_ones(fit.measured, *fit.information, fit.loose, *tables, *start, self._all)
+        xy, cov = accepted_markers(
+            fit.measured, *fit.information, fit.bend_variance, *tables, *start, self._every_marker
+        )
         assert fit.reading is not None
-        dirtied(cov, fit.reading.use, self._mesh.spokes, places.edge_px)
-        if fit.unsettled is not None:
-            cov += fit.unsettled
+        add_dirt_variance(cov, fit.reading.weight, self._mesh.spokes, places.edge_px)
+        if fit.convergence_cov_px2 is not None:
+            cov += fit.convergence_cov_px2
         return xy, cov
 
 
-def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
+def rescaled(fit: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:
     """A fit of one view in another one of another scale."""
     ratio = old.scale / view.scale
     # a pixel's own variance is a twelfth of its area
@@ -200,42 +230,42 @@ def rescaled(fit: Fit, old: Sight, view: Sight) -> Fit:
     return fit._replace(
         xy=ratio * fit.xy + there,
         measured=ratio * fit.measured + there,
-        guiding=ratio * fit.guiding + there,
+        reliable=ratio * fit.reliable + there,
         maps=ratio * fit.maps,
         sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
-        swelling=ratio * fit.swelling,
+        dot_gain=ratio * fit.dot_gain,
         noise=max(ratio * fit.noise, MIN_NOISE),
-        grain=max(ratio * fit.grain, MIN_NOISE),
+        pixel_noise=max(ratio * fit.pixel_noise, MIN_NOISE),
         levels=fit.levels._replace(slope=fit.levels.slope / ratio),
         bend=ratio * fit.bend,
         information=Information(fit.information.diagonal / ratio**2, fit.information.beside / ratio**2),
     )
 
 
-def magnified(sides: Across, ratio: float) -> Across:
+def rescaled_contrasts(sides: EdgeContrasts, ratio: float) -> EdgeContrasts:
     """What changes across the gridlines in a view in which these are so many times as long."""
-    room = sides.room.copy()
+    room = sides.clearance.copy()
     room[:, 0] *= ratio
-    return sides._replace(room=room)
+    return sides._replace(clearance=room)
 
 
 @compiled
-def _in_full(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignore[no-untyped-def]
+def _at_full_scale(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignore[no-untyped-def]
     """Markers and covariances in the full image, and (M,) px how freely gridlines bend at each; what was lost though
     triangles ``agreed`` is where these put it."""
-    places, wide, free = np.empty_like(xy), scale**2 * cov, scale * np.sqrt(around(loose, spokes))
+    places, wide, free = np.empty_like(xy), scale**2 * cov, scale * np.sqrt(mean_at_markers(loose, spokes))
     for m in range(xy.shape[0]):
         left = np.isnan(xy[m, 0]) and agreed[m] and np.isfinite(start[m, 0])
         for axis in range(2):
             places[m, axis] = ((start[m, axis] if left else xy[m, axis]) + 0.5) * scale - 0.5
         if left:
-            wide[m, 0, 0] = wide[m, 1, 1] = scale**2 * (AGREED * edge[m]) ** 2
+            wide[m, 0, 0] = wide[m, 1, 1] = scale**2 * (AGREED_DEVIATION * edge[m]) ** 2
             wide[m, 0, 1] = wide[m, 1, 0] = 0.0
     return places, wide, free
 
 
-def _in(view: Sight, places: Places) -> Places:
+def _at_reduced_scale(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
     """Places of the full image in a reduced one."""
-    return Places(
+    return InitialMarkers(
         view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.whole
     )

@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 MAX_ITERATIONS = 60
 CONVERGED = 1e-13  # of normalised coordinates: far below what a pixel tells
-HALVINGS = 12
-MAX_SKEW = 1e-6  # of R R^T from the identity
+MAX_HALVINGS = 12
+MAX_ORTHONORMALITY_ERROR = 1e-6  # of R R^T from the identity
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,9 @@ class View:
 
     def _check_pose(self, rotation: Array, shift: Array) -> None:
         where = f"view {self.name!r}: "
-        if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=MAX_SKEW):
+        if rotation.shape != (3, 3) or not np.allclose(
+            rotation @ rotation.T, np.eye(3), atol=MAX_ORTHONORMALITY_ERROR
+        ):
             raise RigError(f"{where}R_camera_from_layout is not a 3 x 3 rotation or reflection")
         if shift.shape != (3,) or not np.isfinite(shift).all():
             raise RigError(f"{where}t_camera_from_layout_mm is {shift}; expected 3 finite numbers")
@@ -144,7 +146,7 @@ class View:
         depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
         plain = camera[:, :2] / depth[:, None]
         plain[np.hypot(*plain.T) >= self.fold_radius] = np.nan
-        bent, by_plain = distorted(plain, self.distortion)
+        bent, by_plain = distort_points(plain, self.distortion)
         by_camera = np.zeros((len(plain), 2, 3))
         by_camera[:, 0, 0] = by_camera[:, 1, 1] = 1 / depth
         by_camera[:, :, 2] = -plain / depth[:, None]
@@ -156,7 +158,7 @@ class View:
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""
         bent = np.asarray((xy_px - self.centre_px) / self.focal_px)
-        return undistorted(bent, self.distortion, self.fold_radius)
+        return undistort_points(bent, self.distortion, self.fold_radius)
 
     def rays(self, xy_px: Array) -> Array:
         """(N, 3) unit directions in the layout frame, from the camera through pixels (N, 2); NaN as above."""
@@ -165,14 +167,14 @@ class View:
         return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
 
-def finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
+def is_finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
     """Where all numbers along the last axes are finite."""
     return np.asarray(np.isfinite(values).all(axis=tuple(range(-axes, 0))))
 
 
 def is_covariance(cov_px2: Array) -> NDArray[np.bool_]:
     """Which (..., 2, 2) are finite and positive definite; a pixel whose covariance is not is taken for unseen."""
-    safe = np.where(finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
+    safe = np.where(is_finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
     determinant = safe[..., 0, 0] * safe[..., 1, 1] - safe[..., 0, 1] * safe[..., 1, 0]
     return np.asarray((safe[..., 0, 0] > 0) & (determinant > 0))
 
@@ -185,7 +187,7 @@ def cross_matrix(vectors: Array) -> Array:
     return out
 
 
-def distorted(plain: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
+def distort_points(plain: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
     """(N, 2) distorted normalised coordinates and (N, 2, 2) their derivatives by the plain ones."""
     k1, k2, p1, p2, k3 = distortion
     x, y = plain.T
@@ -205,7 +207,7 @@ def distorted(plain: Array, distortion: tuple[float, ...]) -> tuple[Array, Array
     return bent, by_plain
 
 
-def undistorted(bent: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
+def undistort_points(bent: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
     """(N, 2) plain normalised coordinates, by damped Newton steps to 1e-13; NaN where there are none.
 
     A fixed-point iteration, as is common, diverges at strong distortion and does not say so. Here a result is inside
@@ -219,24 +221,26 @@ def undistorted(bent: Array, distortion: tuple[float, ...], fold_radius: float =
     plain[radius == 0] = 0.0
     error = np.full(len(bent), np.inf)
     for _ in range(MAX_ITERATIONS):
-        there, by_plain = distorted(plain, distortion)
+        there, by_plain = distort_points(plain, distortion)
         away = bent - there
         error = np.hypot(*away.T)
         todo = np.flatnonzero(error > CONVERGED * (1 + radius))
         if not len(todo):
             break
-        moved = _step(plain[todo], bent[todo], away[todo], by_plain[todo], distortion, fold_radius)
+        moved = _damped_newton_step(
+            plain[todo], bent[todo], away[todo], by_plain[todo], distortion, fold_radius
+        )
         if np.array_equal(moved, plain[todo], equal_nan=True):
             break
         plain[todo] = moved
-    _, by_plain = distorted(plain, distortion)
+    _, by_plain = distort_points(plain, distortion)
     good = np.asarray((error < 1e-9 * (1 + radius)) & (np.hypot(*plain.T) < fold_radius))
     good &= np.linalg.det(np.where(np.isfinite(by_plain), by_plain, 0.0)) > 0
     plain[~good] = np.nan
     return np.asarray(plain)
 
 
-def _step(
+def _damped_newton_step(
     plain: Array,
     bent: Array,
     away: Array,
@@ -251,9 +255,9 @@ def _step(
         step /= (a * d - b * c)[:, None]
     out, error = plain.copy(), np.hypot(*away.T)
     waiting = np.isfinite(step).all(axis=1)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         tried = plain + step
-        better = np.hypot(*(bent - distorted(tried, distortion)[0]).T) < error
+        better = np.hypot(*(bent - distort_points(tried, distortion)[0]).T) < error
         better &= waiting & (np.hypot(*tried.T) < fold_radius)
         out[better] = tried[better]
         waiting &= ~better

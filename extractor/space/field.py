@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.reference import Reference
-from extractor.space.camera import Array, finite
+from extractor.space.camera import Array, is_finite
 
-CUBIC, QUADRATIC = 10, 5  # known neighbours for the polynomials of 9 and 5 terms; fewer get the plane
+MIN_CUBIC_NEIGHBOURS, MIN_QUADRATIC_NEIGHBOURS = (
+    10,
+    5,
+)  # known neighbours for the polynomials of 9 and 5 terms; fewer get the plane
 MAX_CONDITION = 1e3  # of the normal equations; whole rings have 4 to 170
 CANDIDATES = 12  # triangles whose centroids are nearest, one of which holds a point
-INSIDE = -1e-9
+MIN_BARYCENTRIC = -1e-9
 
 
 class Field:
@@ -48,7 +51,7 @@ class Field:
 
     def gradients(self, values: Array) -> Array:
         """(M, k, 2): derivatives by the layout's x and y of values (M, k) with NaN where unknown; NaN likewise."""
-        known = finite(values)
+        known = is_finite(values)
         stencil = self._stencil(known)
         rise = np.where(known[self._near][..., None], values[self._near] - values[:, None], 0.0)
         return np.asarray(np.swapaxes(stencil @ rise, 1, 2))
@@ -63,13 +66,13 @@ class Field:
             have = (self._near >= 0) & known[self._near] & known[:, None]
             step = np.where(have[..., None], self.xy_mm[self._near] - self.xy_mm[:, None], 0.0)
             out = np.full((len(known), 2, have.shape[1]), np.nan)
-            for terms, needed in ((2, 2), (5, QUADRATIC), (9, CUBIC)):
+            for terms, needed in ((2, 2), (5, MIN_QUADRATIC_NEIGHBOURS), (9, MIN_CUBIC_NEIGHBOURS)):
                 some = np.flatnonzero(have.sum(axis=1) >= needed)
-                self._fit(step / self._edge_mm, have, terms, some, out)
+                self._fill_stencil_weights(step / self._edge_mm, have, terms, some, out)
             self._last = key, out
         return self._last[1]
 
-    def _fit(
+    def _fill_stencil_weights(
         self, step: Array, have: NDArray[np.bool_], terms: int, some: NDArray[np.intp], out: Array
     ) -> None:
         """Write the weights that polynomials with this many terms give, where the neighbours determine them."""
@@ -103,14 +106,14 @@ class Field:
         for k in range(count):
             todo = np.flatnonzero(triangle < 0)
             place = self._barycentric(candidates[todo, k], xy_mm[todo])
-            hit = place.min(axis=1) > INSIDE
+            hit = place.min(axis=1) > MIN_BARYCENTRIC
             triangle[todo[hit]], inside[todo[hit]] = candidates[todo[hit], k], place[hit]
         return triangle, inside
 
     def _barycentric(self, triangle: NDArray[np.intp], xy_mm: Array) -> Array:
         a, b, c = np.moveaxis(self.xy_mm[self.triangles[triangle]], 1, 0)
-        twice = _cross(b - a, c - a)
-        second, third = _cross(xy_mm - a, c - a) / twice, _cross(b - a, xy_mm - a) / twice
+        twice = _cross_2d(b - a, c - a)
+        second, third = _cross_2d(xy_mm - a, c - a) / twice, _cross_2d(b - a, xy_mm - a) / twice
         return np.column_stack([1 - second - third, second, third])
 
     def at(self, values: Array, xy_mm: Array, smooth: bool = True) -> Array:
@@ -134,7 +137,7 @@ class Field:
         return out
 
 
-def along_edge(start: Array, end: Array, slope: Array, slope_end: Array, fraction: Array) -> Array:
+def hermite_along_edge(start: Array, end: Array, slope: Array, slope_end: Array, fraction: Array) -> Array:
     """Cubic Hermite between values (E, k) with derivatives (E, k) by the fraction: (E, m, k). Clough and
     Tocher's field is this on an edge."""
     t = fraction[:, None]
@@ -180,7 +183,7 @@ def clough_tocher(xy: Array, values: Array, gradients: Array, inside: Array) -> 
     return np.asarray(outer + rest + 3 * w * w * (u * deep[0] + v * deep[1]) + w**3 * core)
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross_2d(a: Array, b: Array) -> Array:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 

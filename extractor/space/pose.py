@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import PoseError
-from extractor.space.camera import Array, View, finite, is_covariance
+from extractor.space.camera import Array, View, is_covariance, is_finite
 
 MIN_MARKERS = 6
 MAX_CONDITION = 1e4  # of the markers' scatter; markers on a line fix no pose
 ITERATIONS = 30
 CONVERGED = 1e-6  # of a standard deviation
-OUTLIER = 6.0  # times the usual misfit
-ROUNDS = 3
-GAP = 25.0  # by which chi^2 of the second pose must be larger, as 5 standard deviations are
+OUTLIER_RATIO = 6.0  # times the usual misfit
+MAX_OUTLIER_ROUNDS = 3
+MIN_CHI2_GAP = 25.0  # by which chi^2 of the second pose must be larger, as 5 standard deviations are
 MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges
 RIDGE = 1e-12  # on correlations, so that each has an inverse
 SAME_DEG = 0.5  # poses nearer than this are one
@@ -49,7 +49,7 @@ class Poses:
     used: NDArray[np.bool_]
 
 
-def place_views(
+def estimate_poses(
     views: Sequence[View], xy_mm: Array, xy_px: Array, cov_px2: Array, spread_mm: tuple[float, float, float]
 ) -> Poses:
     """The poses of the views that have none, from markers at rest on the layout's plane.
@@ -67,32 +67,34 @@ def place_views(
     """
     flat = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
     xy_px = np.where(is_covariance(cov_px2)[..., None], xy_px, np.nan)
-    started = [v if v.placed else _alone(v, flat, xy_px[i], cov_px2[i]) for i, v in enumerate(views)]
+    started = [
+        v if v.placed else _estimate_planar_pose(v, flat, xy_px[i], cov_px2[i]) for i, v in enumerate(views)
+    ]
     free = np.array([not view.placed for view in views])
-    weighted = np.where(finite(xy_px)[..., None, None], cov_px2, np.nan)
-    used = np.asarray(finite(weighted, 2).any(axis=0))
-    for _ in range(ROUNDS):
-        fit = _refined(started, flat, np.where(used[:, None], xy_px, np.nan), weighted, spread_mm, free)
+    weighted = np.where(is_finite(xy_px)[..., None, None], cov_px2, np.nan)
+    used = np.asarray(is_finite(weighted, 2).any(axis=0))
+    for _ in range(MAX_OUTLIER_ROUNDS):
+        fit = _refine_poses(started, flat, np.where(used[:, None], xy_px, np.nan), weighted, spread_mm, free)
         started = fit.views
         typical = np.nanmedian(fit.misfit) if used.any() else np.nan
         with np.errstate(invalid="ignore"):
-            outlier = fit.misfit > OUTLIER * max(typical, 1.0)
+            outlier = fit.misfit > OUTLIER_RATIO * max(typical, 1.0)
         if not outlier.any():
             break
         used &= ~outlier
     _require_fit(views, fit, xy_mm, xy_px)
-    rms = np.sqrt([np.nanmean(away**2) if np.isfinite(away).any() else np.nan for away in fit.away_px])
-    freedom = int(np.isfinite(fit.away_px).sum()) - 6 * int(free.sum())
+    rms = np.sqrt([np.nanmean(away**2) if np.isfinite(away).any() else np.nan for away in fit.residual_px])
+    freedom = int(np.isfinite(fit.residual_px).sum()) - 6 * int(free.sum())
     misfit = float(np.sqrt(fit.chi2 / freedom)) if free.any() and freedom > 0 else float("nan")
     cov = fit.cov * max(1.0, misfit**2) if free.any() else fit.cov
     _require_one_side(started)
     return Poses(tuple(started), cov, misfit, rms, used)
 
 
-def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
+def _estimate_planar_pose(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     """The better of the plane's two poses in one view."""
     plain = view.normalised(xy_px)
-    known = finite(xy_px) & finite(plain)
+    known = is_finite(xy_px) & is_finite(plain)
     where = f"view {view.name!r}: "
     if known.sum() < MIN_MARKERS:
         raise PoseError(f"{where}{int(known.sum())} markers at rest; a pose needs {MIN_MARKERS}")
@@ -100,11 +102,11 @@ def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     if np.linalg.cond(spread) > MAX_CONDITION:
         raise PoseError(f"{where}the markers at rest lie on a line; a pose needs a plane")
     seen = np.where(known[:, None], xy_px, np.nan)
-    poses = _two_poses(flat[known], plain[known], bool(view.mirrored))
+    poses = _planar_pose_candidates(flat[known], plain[known], bool(view.mirrored))
     if not poses:
         raise PoseError(f"{where}the markers at rest fix no pose")
     fits = [
-        _refined([view.at(*pose)], flat, seen[None], cov_px2[None], (0.0, 0.0, 0.0), np.array([True]))
+        _refine_poses([view.at(*pose)], flat, seen[None], cov_px2[None], (0.0, 0.0, 0.0), np.array([True]))
         for pose in poses
     ]
     fits.sort(key=lambda fit: fit.chi2)
@@ -113,7 +115,7 @@ def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     apart_deg = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
     freedom = 2 * int(known.sum()) - 6
     gap = (fits[1].chi2 - fits[0].chi2) / max(1.0, fits[0].chi2 / freedom)
-    if apart_deg > SAME_DEG and not gap > GAP:
+    if apart_deg > SAME_DEG and not gap > MIN_CHI2_GAP:
         raise PoseError(
             f"{where}two poses, {apart_deg:.1f} degrees apart, explain the markers at rest equally well; "
             "give R_camera_from_layout and t_camera_from_layout_mm, or a view with more perspective"
@@ -121,7 +123,7 @@ def _alone(view: View, flat: Array, xy_px: Array, cov_px2: Array) -> View:
     return best
 
 
-def _two_poses(xyz: Array, plain: Array, mirrored: bool) -> list[tuple[Array, Array]]:
+def _planar_pose_candidates(xyz: Array, plain: Array, mirrored: bool) -> list[tuple[Array, Array]]:
     """The pose that a homography implies, and its mirror image about the line of sight to the markers' middle.
 
     None where there is no homography.
@@ -151,29 +153,29 @@ def _nearest_rotation(first: Array, second: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _PoseFit:
     """Refined views, their covariance, chi^2, (M,) misfit in standard deviations and (V, M, 2) residuals."""
 
     views: list[View]
     cov: Array
     chi2: float
     misfit: Array
-    away_px: Array
+    residual_px: Array
 
 
-def _refined(
+def _refine_poses(
     views: Sequence[View],
     flat: Array,
     xy_px: Array,
     cov_px2: Array,
     spread_mm: tuple[float, float, float],
     free: NDArray[np.bool_],
-) -> _Fit:
+) -> _PoseFit:
     """The most likely poses of the free views; the markers' own places off the layout are summed out."""
     spread = np.diag(np.square(spread_mm))
     chosen = np.repeat(free, 6)
     now, damping = list(views), 1e-6
-    system = _system(now, flat, xy_px, cov_px2, spread)
+    system = _linearise_residuals(now, flat, xy_px, cov_px2, spread)
     for _ in range(ITERATIONS):
         away, by_pose, weight = system
         design = np.swapaxes(by_pose, 1, 2) @ weight
@@ -183,10 +185,10 @@ def _refined(
             break
         scale = np.diag(normal.diagonal())
         step = np.zeros(len(chosen))
-        step[chosen] = _solved(normal + damping * scale, gradient)
-        tried = [_moved(view, step[6 * i : 6 * i + 6]) for i, view in enumerate(now)]
-        system_there = _system(tried, flat, xy_px, cov_px2, spread)
-        if _cost(system_there[0], weight) <= _cost(away, weight):
+        step[chosen] = _solve_normal_equations(normal + damping * scale, gradient)
+        tried = [_perturbed_view(view, step[6 * i : 6 * i + 6]) for i, view in enumerate(now)]
+        system_there = _linearise_residuals(tried, flat, xy_px, cov_px2, spread)
+        if _chi_square(system_there[0], weight) <= _chi_square(away, weight):
             now, system, damping = tried, system_there, damping / 10
         else:
             damping *= 10
@@ -196,15 +198,17 @@ def _refined(
     normal = (np.swapaxes(by_pose, 1, 2) @ weight @ by_pose).sum(axis=0)
     cov = np.zeros_like(normal)
     if free.any():
-        cov[np.ix_(chosen, chosen)] = _solved(normal[np.ix_(chosen, chosen)], np.eye(int(chosen.sum())))
+        cov[np.ix_(chosen, chosen)] = _solve_normal_equations(
+            normal[np.ix_(chosen, chosen)], np.eye(int(chosen.sum()))
+        )
     squares = np.einsum("mi,mij,mj->m", away, weight, away)
-    seen = finite(xy_px).sum(axis=0)
+    seen = is_finite(xy_px).sum(axis=0)
     misfit = np.sqrt(squares / np.where(seen > 0, 2.0 * seen, np.nan))
     residual = np.where(np.isfinite(xy_px), away.reshape(len(flat), -1, 2).swapaxes(0, 1), np.nan)
-    return _Fit(now, cov, _cost(away, weight), misfit, residual)
+    return _PoseFit(now, cov, _chi_square(away, weight), misfit, residual)
 
 
-def _solved(normal: Array, right: Array) -> Array:
+def _solve_normal_equations(normal: Array, right: Array) -> Array:
     """Solution of a normal system in its own scale.
 
     Raises:
@@ -221,11 +225,11 @@ def _solved(normal: Array, right: Array) -> Array:
     return np.asarray(even @ (right.T / scale).T / (scale if right.ndim == 1 else scale[:, None]))
 
 
-def _cost(away: Array, weight: Array) -> float:
+def _chi_square(away: Array, weight: Array) -> float:
     return float(np.einsum("mi,mij,mj->", away, weight, away))
 
 
-def _system(
+def _linearise_residuals(
     views: Sequence[View], flat: Array, xy_px: Array, cov_px2: Array, spread: Array
 ) -> tuple[Array, Array, Array]:
     """Residuals (M, 2 V), their derivatives (M, 2 V, 6 V) and weights (M, 2 V, 2 V); 0 where nothing is seen."""
@@ -236,8 +240,8 @@ def _system(
     noise = np.zeros((markers, count, 2, count, 2))
     for v, view in enumerate(views):
         there, point, pose = view.linearised(flat)
-        seen = finite(xy_px[v])
-        lost = seen & ~finite(there)
+        seen = is_finite(xy_px[v])
+        lost = seen & ~is_finite(there)
         away[seen, v] = (xy_px[v] - there)[seen]
         away[lost, v] = 1e6  # behind the camera: a step that goes there is refused
         seen &= ~lost
@@ -252,7 +256,7 @@ def _system(
     return away.reshape(markers, -1), by_pose.reshape(shape), np.asarray(weight)
 
 
-def _moved(view: View, step: Array) -> View:
+def _perturbed_view(view: View, step: Array) -> View:
     """The view after a small turn and shift; exactly orthonormal again."""
     if not step.any():
         return view
@@ -261,11 +265,11 @@ def _moved(view: View, step: Array) -> View:
     return view.at(left @ right, view.t_camera_from_layout_mm + step[3:])
 
 
-def _require_fit(views: Sequence[View], fit: _Fit, xy_mm: Array, xy_px: Array) -> None:
+def _require_fit(views: Sequence[View], fit: _PoseFit, xy_mm: Array, xy_px: Array) -> None:
     """The markers at rest lie near where the layout puts them; a lens is a matter of pixels, not of edges."""
     step_mm = np.linalg.norm(xy_mm[:, None] - xy_mm[None], axis=2)
     nearest = np.where(step_mm > 0, step_mm, np.inf).argmin(axis=1)
-    for view, away, px in zip(views, fit.away_px, xy_px, strict=True):
+    for view, away, px in zip(views, fit.residual_px, xy_px, strict=True):
         edge_px = np.linalg.norm(px - px[nearest], axis=1)
         if not np.isfinite(away).any() or not np.isfinite(edge_px).any():
             continue
@@ -283,10 +287,10 @@ def _require_one_side(views: Sequence[View]) -> None:
     back = [view.name for view in views if view.position_mm[2] <= 0]
     if front and back:
         raise PoseError(
-            f"{_listed(front)} would look at the pattern's front, {_listed(back)} at its back; "
+            f"{_view_list_text(front)} would look at the pattern's front, {_view_list_text(back)} at its back; "
             "check which of them are mirrored"
         )
 
 
-def _listed(names: Sequence[str]) -> str:
+def _view_list_text(names: Sequence[str]) -> str:
     return ("view " if len(names) == 1 else "views ") + ", ".join(repr(name) for name in names)

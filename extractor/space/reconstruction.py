@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from extractor.errors import PoseError
 from extractor.layout.reference import Reference
 from extractor.result import Markers, Status, VirtualStatus
-from extractor.space.camera import Array, View, finite
-from extractor.space.field import Field, along_edge
-from extractor.space.pose import Poses, place_views
+from extractor.space.camera import Array, View, is_finite
+from extractor.space.field import Field, hermite_along_edge
+from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
-from extractor.space.triangulation import DOUBT_SIGMAS, GATE_SIGMAS, PointReason, Points, triangulate
+from extractor.space.triangulation import GATE_SIGMAS, INFLATION_SIGMAS, PointReason, Points, triangulate
 
-MAX_SIGMA_EDGES = 0.1  # standard deviation of a position, above which it is not reported
-CROWD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
-MIN_REST = 3  # markers that must have a place at rest
+MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position, above which it is not reported
+NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
+MIN_REST_MARKERS = 3  # markers that must have a place at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,18 +121,18 @@ class Reconstructor:
         self.field = Field(layout)
         edge_mm = np.linalg.norm(np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0], axis=1)
         self._max_sigma_mm = (
-            MAX_SIGMA_EDGES * float(np.median(edge_mm)) if max_sigma_mm is None else max_sigma_mm
+            MAX_DEVIATION_EDGES * float(np.median(edge_mm)) if max_sigma_mm is None else max_sigma_mm
         )
         self._gate_sigmas = gate_sigmas
         spread = np.broadcast_to(np.asarray(flatness_mm, np.float64), 3)
-        self.poses = self._placed(rest, (float(spread[0]), float(spread[1]), float(spread[2])))
+        self.poses = self._estimate_poses(rest, (float(spread[0]), float(spread[1]), float(spread[2])))
         self.model_px = 0.0 if model_px is None else model_px
         flat = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
         self._rest: Points | None = None
         self.rest_xyz_mm: Array = flat
         if rest is not None:
             if model_px is None:
-                self.model_px = self._unexplained_px(rest)
+                self.model_px = self._estimate_model_px(rest)
             self._rest = self._points(rest)
             self._require_depth(rest, self._rest)
             self.rest_xyz_mm = self._rest.xyz_mm
@@ -144,11 +144,11 @@ class Reconstructor:
         Args:
             markers: view by view, in the rig's order and the frame of the full image; None: no picture was had.
         """
-        kept, problem = self._sorted_out(markers)
-        points = self._widened(self._points(kept))
+        kept, problem = self._select_views(markers)
+        points = self._inflated_covariances(self._points(kept))
         status = np.max(
             [
-                np.where(_seen(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
+                np.where(_has_position(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
                 for m in kept
             ],
             axis=0,
@@ -156,8 +156,8 @@ class Reconstructor:
         status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
         normals = self.field.normals(points.xyz_mm)
         virtual_mm = self._virtual(points.xyz_mm)
-        known = finite(virtual_mm)
-        cov = points.cov_mm2 + _through(points.by_pose, self.poses.cov)
+        known = is_finite(virtual_mm)
+        cov = points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
         return Shape(
             xyz_mm=points.xyz_mm,
             cov_mm2=cov,
@@ -180,7 +180,7 @@ class Reconstructor:
         """(M + E m, 3) float64, where all points were at rest, the virtual ones last."""
         return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
 
-    def _placed(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
+    def _estimate_poses(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
         views = self.rig.views
         if rest is None:
             missing = [view.name for view in views if not view.placed]
@@ -197,7 +197,7 @@ class Reconstructor:
                 )
         measured = [np.where((m.status == Status.MEASURED)[:, None], m.xy_px, np.nan) for m in rest]
         cov = np.stack([m.cov_px2 for m in rest])
-        poses = place_views(views, self.layout.xy_mm, np.stack(measured), cov, spread_mm)
+        poses = estimate_poses(views, self.layout.xy_mm, np.stack(measured), cov, spread_mm)
         for view, markers in zip(poses.views, rest, strict=True):
             if markers.mirrored is not None and markers.mirrored != _appears_mirrored(view):
                 raise PoseError(
@@ -211,9 +211,9 @@ class Reconstructor:
             raise ValueError(f"markers of {len(markers)} views; the rig has {len(self.rig.views)}")
 
     def _require_depth(self, rest: Sequence[Markers], points: Points) -> None:
-        if np.isfinite(points.xyz_mm[:, 0]).sum() >= MIN_REST:
+        if np.isfinite(points.xyz_mm[:, 0]).sum() >= MIN_REST_MARKERS:
             return
-        both = np.logical_and.reduce([_seen(markers) for markers in rest])
+        both = np.logical_and.reduce([_has_position(markers) for markers in rest])
         reasons = np.bincount(points.reason[both], minlength=len(PointReason)) if both.any() else np.zeros(1)
         why = PointReason(int(reasons.argmax())) if both.any() else PointReason.ONE_VIEW
         names = " and ".join(repr(view.name) for view in self.rig.views)
@@ -226,7 +226,7 @@ class Reconstructor:
         }
         raise PoseError(f"views {names} {says.get(why, 'show no marker in common')}")
 
-    def _sorted_out(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
+    def _select_views(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
         """The views that show the pattern as their pose says, and what is wrong with the others."""
         self._require_count(markers)
         kept: list[Markers | None] = []
@@ -258,22 +258,22 @@ class Reconstructor:
             gate_sigmas=np.inf if model_px is not None else self._gate_sigmas,
         )
 
-    def _widened(self, points: Points) -> Points:
+    def _inflated_covariances(self, points: Points) -> Points:
         """Covariances where a whole neighbourhood's rays miss each other by more than they should.
 
         Under a sharp contact gridlines bend more than extraction can follow, and its covariances do not say so.
         """
         around = self.field.mean_around(points.misfit**2)
-        more = np.where(around > CROWD_SIGMAS**2, around, 1.0)
-        done = np.where(points.misfit > DOUBT_SIGMAS, points.misfit**2, 1.0)
+        more = np.where(around > NEIGHBOURHOOD_SIGMAS**2, around, 1.0)
+        done = np.where(points.misfit > INFLATION_SIGMAS, points.misfit**2, 1.0)
         factor = np.where(np.isfinite(more), np.maximum(more / done, 1.0), 1.0)
         return replace(points, cov_mm2=points.cov_mm2 * factor[:, None, None])
 
-    def _unexplained_px(self, rest: Sequence[Markers]) -> float:
+    def _estimate_model_px(self, rest: Sequence[Markers]) -> float:
         """What the rest frame's rays miss each other by beyond their covariances; those far off do not count."""
         misfit = self._points(rest, 0.0).misfit
         misfit = misfit[np.isfinite(misfit)]
-        if len(misfit) < MIN_REST:
+        if len(misfit) < MIN_REST_MARKERS:
             return 0.0
         usual = misfit[misfit <= GATE_SIGMAS * np.median(misfit)]
         variance = np.mean([np.nanmedian(np.trace(m.cov_px2, axis1=1, axis2=2)) / 2 for m in rest])
@@ -281,9 +281,9 @@ class Reconstructor:
 
     def _displacement_cov(self, points: Points) -> Array:
         if self._rest is None:
-            return points.cov_mm2 + _through(points.by_pose, self.poses.cov)
+            return points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
         moved = points.by_pose - self._rest.by_pose
-        return points.cov_mm2 + self._rest.cov_mm2 + _through(moved, self.poses.cov)
+        return points.cov_mm2 + self._rest.cov_mm2 + _propagate_covariance(moved, self.poses.cov)
 
     def _virtual(self, xyz_mm: Array) -> Array:
         """(E, m, 3) on the smooth surface through markers (M, 3); straight where too few neighbours are known."""
@@ -293,7 +293,7 @@ class Reconstructor:
         chord = xyz_mm[end] - xyz_mm[start]
         at_ends = [np.einsum("ekd,ed->ek", slopes[ids], step) for ids in (start, end)]
         first, last = (np.where(np.isfinite(slope), slope, chord) for slope in at_ends)
-        return along_edge(xyz_mm[start], xyz_mm[end], first, last, self._fractions)
+        return hermite_along_edge(xyz_mm[start], xyz_mm[end], first, last, self._fractions)
 
     @property
     def _fractions(self) -> Array:
@@ -316,8 +316,8 @@ class Reconstructor:
         return np.asarray(np.where(known[..., None], unit, np.nan))
 
 
-def _seen(markers: Markers) -> NDArray[np.bool_]:
-    return finite(markers.xy_px)
+def _has_position(markers: Markers) -> NDArray[np.bool_]:
+    return is_finite(markers.xy_px)
 
 
 def _appears_mirrored(view: View) -> bool:
@@ -325,11 +325,11 @@ def _appears_mirrored(view: View) -> bool:
     return bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0)
 
 
-def _through(by_pose: Array, cov: Array) -> Array:
+def _propagate_covariance(by_pose: Array, cov: Array) -> Array:
     return np.asarray(by_pose @ cov @ np.swapaxes(by_pose, 1, 2))
 
 
-def shifted(markers: Markers, offset_px: tuple[float, float]) -> Markers:
+def translate_markers(markers: Markers, offset_px: tuple[float, float]) -> Markers:
     """The same markers in a frame whose origin lies this much further left and up."""
     offset = np.asarray(offset_px, np.float64)
     return replace(markers, xy_px=markers.xy_px + offset, virtual_xy_px=markers.virtual_xy_px + offset)

@@ -25,9 +25,9 @@ from extractor.errors import RigError
 from extractor.layout.json_fields import shown
 from extractor.space.camera import View
 
-NUMBERS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "area_px": 4, "t_camera_from_layout_mm": 3}
-NEEDED = ("focal_px", "centre_px")
-KNOWN = ("name", *NUMBERS, "mirrored", "R_camera_from_layout")
+NUMBER_COUNTS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "area_px": 4, "t_camera_from_layout_mm": 3}
+REQUIRED_FIELDS = ("focal_px", "centre_px")
+KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,55 +86,55 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
         tables = document.get("view")
         if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
             raise RigError("view is missing; expected at least one [[view]] table")
-        return Rig(tuple(_view(table, index) for index, table in enumerate(tables)))
+        return Rig(tuple(_parse_view(table, index) for index, table in enumerate(tables)))
     except tomllib.TOMLDecodeError as error:
         raise RigError(f"{name}: not TOML: {error}") from None
     except RigError as error:
         raise RigError(f"{name}: {error}") from None
 
 
-def _view(table: Mapping[str, Any], index: int) -> View:
+def _parse_view(table: Mapping[str, Any], index: int) -> View:
     where = f"view[{index}]."
     for field in table:
-        if field not in KNOWN:
-            _fail(where + shown(field), "unknown", f"only the fields {', '.join(KNOWN)}")
-    for field in NEEDED:
+        if field not in KNOWN_FIELDS:
+            _raise_rig_error(where + shown(field), "unknown", f"only the fields {', '.join(KNOWN_FIELDS)}")
+    for field in REQUIRED_FIELDS:
         if field not in table:
-            _fail(where + field, "missing", f"{NUMBERS[field]} numbers")
+            _raise_rig_error(where + field, "missing", f"{NUMBER_COUNTS[field]} numbers")
     values: dict[str, Any] = {
-        field: _numbers(table[field], where + field, count, field == "area_px")
-        for field, count in NUMBERS.items()
+        field: _parse_numbers(table[field], where + field, count, field == "area_px")
+        for field, count in NUMBER_COUNTS.items()
         if field in table
     }
     name = table.get("name", f"view{index}")
     if not isinstance(name, str) or not name or not name.isprintable():
-        _fail(where + "name", shown(name), "a printable text")
+        _raise_rig_error(where + "name", shown(name), "a printable text")
     if "mirrored" in table:
         if not isinstance(table["mirrored"], bool):
-            _fail(where + "mirrored", shown(table["mirrored"]), "true or false")
+            _raise_rig_error(where + "mirrored", shown(table["mirrored"]), "true or false")
         values["mirrored"] = table["mirrored"]
     if "R_camera_from_layout" in table:
-        values["R_camera_from_layout"] = _matrix(
+        values["R_camera_from_layout"] = _parse_matrix(
             table["R_camera_from_layout"], where + "R_camera_from_layout"
         )
     return View(name=name, **values)
 
 
-def _matrix(value: object, field: str) -> list[tuple[float, ...]]:
+def _parse_matrix(value: object, field: str) -> list[tuple[float, ...]]:
     if not isinstance(value, list) or len(value) != 3:
-        _fail(field, shown(value), "3 rows of 3 numbers")
-    return [_numbers(row, f"{field}[{i}]", 3, False) for i, row in enumerate(value)]
+        _raise_rig_error(field, shown(value), "3 rows of 3 numbers")
+    return [_parse_numbers(row, f"{field}[{i}]", 3, False) for i, row in enumerate(value)]
 
 
-def _numbers(value: object, field: str, count: int, whole: bool) -> tuple[float, ...]:
+def _parse_numbers(value: object, field: str, count: int, whole: bool) -> tuple[float, ...]:
     kinds = (int,) if whole else (int, float)
     if not isinstance(value, list) or len(value) != count:
-        _fail(field, shown(value), f"{count} numbers")
+        _raise_rig_error(field, shown(value), f"{count} numbers")
     for i, item in enumerate(value):
         if type(item) not in kinds or not np.isfinite(item):
-            _fail(f"{field}[{i}]", shown(item), "a whole number" if whole else "a finite number")
+            _raise_rig_error(f"{field}[{i}]", shown(item), "a whole number" if whole else "a finite number")
     return tuple(value)
 
 
-def _fail(field: str, value: str, expected: str) -> NoReturn:
+def _raise_rig_error(field: str, value: str, expected: str) -> NoReturn:
     raise RigError(f"{field} is {value}; expected {expected}")

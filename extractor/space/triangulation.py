@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.space.camera import Array, View, finite, is_covariance
+from extractor.space.camera import Array, View, is_covariance, is_finite
 
 ITERATIONS = 12
 CONVERGED = 1e-5  # of a standard deviation
@@ -22,9 +22,11 @@ GATE_SIGMAS = 6.0
 TOLERANCE_PX = (
     0.1  # gridlines that bend more than extraction can follow err by so much beyond their covariance
 )
-SINGULAR = 1e-13  # smallest eigenvalue of information with a unit diagonal, below which it has no inverse
-DOUBT_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
-SOUND = 1e-14  # half the squared angle between two rays, below which they are one
+MIN_EIGENVALUE = (
+    1e-13  # smallest eigenvalue of information with a unit diagonal, below which it has no inverse
+)
+INFLATION_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
+MIN_RAY_DIVERGENCE = 1e-14  # half the squared angle between two rays, below which they are one
 
 
 class PointReason(IntEnum):
@@ -79,28 +81,30 @@ def triangulate(
         gate_sigmas: misfit above which a point is ``DISAGREE``,
         tolerance_px: if its residuals' norm over all views also is above this.
     """
-    seen = finite(xy_px) & is_covariance(cov_px2)
+    seen = is_finite(xy_px) & is_covariance(cov_px2)
     reason = np.where(seen.sum(axis=0) == 1, PointReason.ONE_VIEW, PointReason.NONE).astype(np.uint8)
     reason[~seen.any(axis=0)] = PointReason.UNSEEN
-    start, ray = _nearest_to_rays(views, xy_px, seen)
+    start, ray = _intersect_rays(views, xy_px, seen)
     reason[(reason == PointReason.NONE) & (seen & ~ray).any(axis=0)] = PointReason.NO_RAY
-    reason[(reason == PointReason.NONE) & ~finite(start)] = PointReason.PARALLEL
+    reason[(reason == PointReason.NONE) & ~is_finite(start)] = PointReason.PARALLEL
     use = np.flatnonzero(reason == PointReason.NONE)
-    out = _empty(len(reason), len(views), reason)
+    out = _empty_points(len(reason), len(views), reason)
     if not len(use):
         return out
-    miss_px = _solve(views, xy_px[:, use], cov_px2[:, use], seen[:, use], start[use], cov_pose, use, out)
+    miss_px = _fill_solution(
+        views, xy_px[:, use], cov_px2[:, use], seen[:, use], start[use], cov_pose, use, out
+    )
     gate = np.where(miss_px > tolerance_px, gate_sigmas, np.inf)
-    _judge(out, use, max_sigma_mm, gate)
+    _update_rejecting_points(out, use, max_sigma_mm, gate)
     return out
 
 
-def _empty(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
+def _empty_points(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
     unknown = np.full((count, 3, 6 * views), np.nan)
     return Points(unknown[:, :, 0].copy(), unknown[:, :, :3].copy(), unknown, unknown[:, 0, 0].copy(), reason)
 
 
-def _nearest_to_rays(
+def _intersect_rays(
     views: Sequence[View], xy_px: Array, seen: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_]]:
     """(N, 3) the points nearest to all rays, NaN where these are parallel; (V, N) which pixels have rays."""
@@ -109,13 +113,13 @@ def _nearest_to_rays(
     on_plane = np.full((len(views), xy_px.shape[1], 3), np.nan)
     for v, view in enumerate(views):
         ray, origin = view.rays(xy_px[v]), view.position_mm
-        have[v] = finite(ray) & seen[v]
+        have[v] = is_finite(ray) & seen[v]
         across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
         across[~have[v]] = 0.0
         normal += across
         right += across @ origin
         on_plane[v] = np.where(have[v, :, None], origin - ray * (origin[2] / ray[:, 2:]), np.nan)
-    sound = np.linalg.eigvalsh(normal)[:, 0] > SOUND
+    sound = np.linalg.eigvalsh(normal)[:, 0] > MIN_RAY_DIVERGENCE
     out = np.full(right.shape, np.nan)
     out[sound] = np.linalg.solve(normal[sound], right[sound, :, None])[:, :, 0]
     for v, view in enumerate(
@@ -126,7 +130,7 @@ def _nearest_to_rays(
     return out, have
 
 
-def _solve(
+def _fill_solution(
     views: Sequence[View],
     xy_px: Array,
     cov_px2: Array,
@@ -136,7 +140,7 @@ def _solve(
     use: NDArray[np.intp],
     out: Points,
 ) -> Array:
-    """Fill ``out`` at ``use``: all points step together, each by its own damped Gauss-Newton step.
+    """Fill ``out`` at ``weight``: all points step together, each by its own damped Gauss-Newton step.
 
     Returns:
         (N,) the norm of the residuals over all views, px.
@@ -149,9 +153,9 @@ def _solve(
         design = np.swapaxes(by_point, 2, 3) @ weight
         normal = (design @ by_point).sum(axis=0)
         gradient = (design @ away[..., None]).sum(axis=0)[..., 0]
-        step = _solved(normal * (1 + damping[:, None, None] * np.eye(3)), gradient)
+        step = _solve_scaled(normal * (1 + damping[:, None, None] * np.eye(3)), gradient)
         there = _residuals(views, xyz + step, xy_px, seen)
-        better = _cost(there[0], weight) <= _cost(away, weight) * (1 + 1e-12)
+        better = _chi_square(there[0], weight) <= _chi_square(away, weight) * (1 + 1e-12)
         xyz[better] += step[better]
         for old, new in zip((away, by_point, by_pose), there, strict=True):
             old[:, better] = new[:, better]
@@ -159,7 +163,7 @@ def _solve(
         if not (np.einsum("na,na->n", step, gradient) > CONVERGED**2).any():
             break
     design = np.swapaxes(by_point, 2, 3) @ weight
-    out.xyz_mm[use], out.cov_mm2[use] = xyz, _inverse((design @ by_point).sum(axis=0))
+    out.xyz_mm[use], out.cov_mm2[use] = xyz, _scaled_inverse((design @ by_point).sum(axis=0))
     bounded = np.where(np.isfinite(out.cov_mm2[use]), out.cov_mm2[use], 0.0)  # what is not is refused below
     toward = -bounded @ (design @ by_pose)
     out.by_pose[use] = np.moveaxis(toward, 0, 2).reshape(len(use), 3, -1)
@@ -174,7 +178,7 @@ def _residuals(
     linearised = [view.linearised(xyz) for view in views]
     away = np.stack([xy_px[v] - part[0] for v, part in enumerate(linearised)])
     by_point, by_pose = (np.stack([part[k] for part in linearised]) for k in (1, 2))
-    nowhere = seen & ~finite(away)
+    nowhere = seen & ~is_finite(away)
     away[nowhere] = 1e6  # a step to where there is no picture is refused
     by_point[nowhere], by_pose[nowhere] = 0.0, 0.0
     for values in (away, by_point, by_pose):
@@ -182,25 +186,25 @@ def _residuals(
     return away, by_point, by_pose
 
 
-def _cost(away: Array, weight: Array) -> Array:
+def _chi_square(away: Array, weight: Array) -> Array:
     return np.asarray((away[:, :, None] @ weight @ away[..., None]).sum(axis=0)[:, 0, 0])
 
 
-def _solved(normal: Array, gradient: Array) -> Array:
+def _solve_scaled(normal: Array, gradient: Array) -> Array:
     """Solutions of 3 x 3 systems in their own scale; 0 where singular."""
-    inverse = np.nan_to_num(_inverse(normal), posinf=0, neginf=0)
+    inverse = np.nan_to_num(_scaled_inverse(normal), posinf=0, neginf=0)
     return np.asarray((inverse @ gradient[..., None])[..., 0])
 
 
-def _inverse(normal: Array) -> Array:
+def _scaled_inverse(normal: Array) -> Array:
     """Inverses of 3 x 3 matrices, in their own scale; infinite variances where singular."""
     out = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
     scale = np.diagonal(normal, axis1=1, axis2=2)
-    sound = finite(normal, 2) & (scale > 0).all(axis=1)
+    sound = is_finite(normal, 2) & (scale > 0).all(axis=1)
     root = np.sqrt(scale[sound])
     root = root[:, :, None] * root[:, None, :]
     even = normal[sound] / root
-    good = np.linalg.eigvalsh(even)[:, 0] > SINGULAR
+    good = np.linalg.eigvalsh(even)[:, 0] > MIN_EIGENVALUE
     out[np.flatnonzero(sound)[good]] = np.linalg.inv(even[good]) / root[good]
     return out
 
@@ -222,16 +226,16 @@ def _misfit(
             moved[v, :, :, 6 * v : 6 * v + 6] += by_pose[v]
         spread = moved @ cov_pose @ np.swapaxes(moved, 2, 3)
         freedom = freedom + np.einsum("vnij,vnji->n", weight, spread)
-    return np.asarray(np.sqrt(_cost(away, weight) / freedom))
+    return np.asarray(np.sqrt(_chi_square(away, weight) / freedom))
 
 
-def _judge(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate: Array) -> None:
+def _update_rejecting_points(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate: Array) -> None:
     """Widen the covariance of what is doubtful, take back what cannot be believed."""
-    doubtful = use[out.misfit[use] > DOUBT_SIGMAS]
+    doubtful = use[out.misfit[use] > INFLATION_SIGMAS]
     out.cov_mm2[doubtful] *= out.misfit[doubtful, None, None] ** 2
     cov = out.cov_mm2[use]
     worst = np.full(len(use), np.inf)
-    sound = finite(cov, 2)
+    sound = is_finite(cov, 2)
     worst[sound] = np.sqrt(np.maximum(np.linalg.eigvalsh(cov[sound])[:, -1], 0))
     for doubt, reason in (
         (~(worst <= max_sigma_mm) | ~np.isfinite(worst), PointReason.PARALLEL),

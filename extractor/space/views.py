@@ -16,14 +16,14 @@ from extractor.pipeline import Extractor
 from extractor.presets import Preset
 from extractor.result import Markers
 from extractor.space.camera import View
-from extractor.space.reconstruction import Reconstructor, Shape, shifted
+from extractor.space.reconstruction import Reconstructor, Shape, translate_markers
 from extractor.space.rig import Rig
 from extractor.track.tracker import FrameStatus, Tracked, Tracker
 
 Image = NDArray[Any]
 
 
-def cut(image: Any, view: View) -> Any:
+def crop_to_view(image: Any, view: View) -> Any:
     """The part of an image that a view fills.
 
     Raises:
@@ -44,11 +44,11 @@ def cut(image: Any, view: View) -> Any:
     return np.ascontiguousarray(image[y : y + height, x : x + width])
 
 
-def _origin(view: View) -> tuple[float, float]:
+def _view_origin_px(view: View) -> tuple[float, float]:
     return (0.0, 0.0) if view.area_px is None else (float(view.area_px[0]), float(view.area_px[1]))
 
 
-def _images(image: Image | Sequence[Image | None] | None, rig: Rig) -> list[Image | None]:
+def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> list[Image | None]:
     """An image for every view."""
     if image is None or isinstance(image, np.ndarray):
         return [image] * len(rig.views)
@@ -78,8 +78,10 @@ class ViewExtractor:
             ImageError: not an image, or smaller than a view's area.
         """
         found = []
-        for view, picture in zip(self.rig.views, _images(image, self.rig), strict=True):
-            found.append(shifted(self._extractor.extract(cut(picture, view)), _origin(view)))
+        for view, picture in zip(self.rig.views, _images_by_view(image, self.rig), strict=True):
+            found.append(
+                translate_markers(self._extractor.extract(crop_to_view(picture, view)), _view_origin_px(view))
+            )
         return tuple(found)
 
 
@@ -130,9 +132,9 @@ class ShapeTracker:
         """
         started = time.perf_counter()
         rig = self.reconstructor.rig
-        pictures = _images(image, rig)
+        pictures = _images_by_view(image, rig)
         tracked = tuple(
-            self._view(view, tracker, picture, time_s, reason)
+            self._track_view(view, tracker, picture, time_s, reason)
             for view, tracker, picture in zip(rig.views, self._trackers, pictures, strict=True)
         )
         shown = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
@@ -144,7 +146,7 @@ class ShapeTracker:
             index=self._count,
             time_s=time_s,
             status=FrameStatus(status),
-            reason=_reason(rig, tracked, shape, found),
+            reason=_frame_reason(rig, tracked, shape, found),
             shape=shape,
             views=tracked,
             elapsed_ms=1e3 * (time.perf_counter() - started),
@@ -152,16 +154,18 @@ class ShapeTracker:
         self._count += 1
         return frame
 
-    def _view(self, view: View, tracker: Tracker, image: Image | None, time_s: float, reason: str) -> Tracked:
+    def _track_view(
+        self, view: View, tracker: Tracker, image: Image | None, time_s: float, reason: str
+    ) -> Tracked:
         try:
-            part = None if image is None else cut(image, view)
+            part = None if image is None else crop_to_view(image, view)
         except ImageError as error:
             part, reason = None, str(error)
         frame = tracker.track(part, time_s=time_s, reason=reason)
-        return replace(frame, markers=shifted(frame.markers, _origin(view)))
+        return replace(frame, markers=translate_markers(frame.markers, _view_origin_px(view)))
 
 
-def _reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: bool) -> str:
+def _frame_reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: bool) -> str:
     said = [f"{name}: {frame.reason}" for name, frame in zip(rig.names, tracked, strict=True) if frame.reason]
     if not said and shape.problem:
         said = [shape.problem]

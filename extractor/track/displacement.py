@@ -44,10 +44,12 @@ class Rest:
             return (xy_px - self.xy_px) * (self.mm_per_px, -self.mm_per_px)
         if self.layout_from_image is None:
             return np.full_like(xy_px, np.nan)
-        return through(self.layout_from_image, xy_px) - through(self.layout_from_image, self.xy_px)
+        return apply_homography(self.layout_from_image, xy_px) - apply_homography(
+            self.layout_from_image, self.xy_px
+        )
 
 
-def rest_at(xy_px: Points, reference: Reference, mm_per_px: float | None = None) -> Rest:
+def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None) -> Rest:
     """The rest state with its markers at (M, 2) px, NaN where lost."""
     xy_px = xy_px.copy()
     if mm_per_px is not None:
@@ -60,11 +62,11 @@ def rest_at(xy_px: Points, reference: Reference, mm_per_px: float | None = None)
     if homography is None:
         return Rest(xy_px, None, None, float("nan"))
     h = np.asarray(homography, dtype=np.float64)
-    residual = float(np.sqrt(np.mean((through(h, px) - mm) ** 2)))
+    residual = float(np.sqrt(np.mean((apply_homography(h, px) - mm) ** 2)))
     return Rest(xy_px, h, None, residual)
 
 
-def through(homography: NDArray[np.float64], xy: Points) -> Points:
+def apply_homography(homography: NDArray[np.float64], xy: Points) -> Points:
     """Points (N, 2) through a homography; NaN stays NaN."""
     x, y, w = homography @ np.column_stack([xy, np.ones(len(xy))]).T
     return np.column_stack([x / w, y / w])

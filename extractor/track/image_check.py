@@ -7,43 +7,43 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.numeric.bilinear import sample_dot, sample_patch
+from extractor.numeric.bilinear import fill_patch_mean, weighted_sample
 from extractor.numeric.compilation import compiled
-from extractor.numeric.dense_systems import dot
-from extractor.track.warm_tables import BLACK_CELL, NO_CELL, WHITE_CELL, Tables
+from extractor.numeric.dense_systems import dot3
+from extractor.track.warm_tables import BLACK_CELL, NO_CELL, WHITE_CELL, WarmTables
 
-WHITE_RATIO = (
+MIN_WHITE_RATIO = (
     0.75  # the white cell's brightness against an ink's, summed over the channels; black stays below
 )
 MIN_COSINE = 0.8  # between an ink and the same cell's ink a frame ago, black subtracted
-STRENGTH = (0.4, 2.5)  # of an ink against the same cell's a frame ago
-INNER = 0.5  # of the way from the middle to each corner, where the ink is looked at again
-MIN_INNER = 0.4  # of the ink's strength that must be there
+STRENGTH_RANGE = (0.4, 2.5)  # of an ink against the same cell's a frame ago
+INNER_SAMPLE_POSITION = 0.5  # of the way from the middle to each corner, where the ink is looked at again
+MIN_INNER_STRENGTH = 0.4  # of the ink's strength that must be there
 LEVEL_RADIUS = 0.15  # of the middle's distance to the corners, over which the ink is averaged
 
-UNSEEN, WRONG, RIGHT = range(3)  # what the image says of a cell
+UNSEEN, CONTRADICTED, CONFIRMED = range(3)  # what the image says of a cell
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
+class CellCheck:
     """What the image says of predicted cells.
 
     Attributes:
-        verdict: (C,) uint8, ``UNSEEN`` (outside the image or not predicted), ``WRONG`` or ``RIGHT``.
+        verdict: (C,) uint8, ``UNSEEN`` (outside the image or not predicted), ``CONTRADICTED`` or ``CONFIRMED``.
         look: (2, C, 3) float64 BGR, each seen cell's ink minus the black around it, and this black.
         white, not_white: how many edges of inked cells see the white cell beyond them where it belongs, and do not.
         other_white: how many see something as bright where a black cell belongs.
     """
 
     verdict: NDArray[np.uint8]
-    look: NDArray[np.float64]
+    cell_levels: NDArray[np.float64]
     white: int
-    not_white: int
-    other_white: int
+    white_missing_count: int
+    white_elsewhere_count: int
 
 
 @compiled
-def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[no-untyped-def]
+def _check_cells(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[no-untyped-def]
     """Verdict and look of every cell with the corners ``xy`` (C, 3, 2); how often white is seen where it belongs."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     count = xy.shape[0]
@@ -55,7 +55,7 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
         x, y = xy[i, :, 0].mean(), xy[i, :, 1].mean()
         size = np.hypot(xy[i, 0, 0] - x, xy[i, 0, 1] - y)
         radius = LEVEL_RADIUS * size
-        if not sample_patch(flat, height, width, x, y, radius, middle):
+        if not fill_patch_mean(flat, height, width, x, y, radius, middle):
             continue
         blacks, fits, outside = 0, True, False
         black[:] = 0.0
@@ -64,10 +64,10 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
                 continue
             mx = xy[i, k, 0] + xy[i, (k + 1) % 3, 0] - x
             my = xy[i, k, 1] + xy[i, (k + 1) % 3, 1] - y
-            if not sample_patch(flat, height, width, mx, my, radius, other[k]):
+            if not fill_patch_mean(flat, height, width, mx, my, radius, other[k]):
                 outside = True
                 continue
-            bright = other[k].sum() > WHITE_RATIO * middle.sum()
+            bright = other[k].sum() > MIN_WHITE_RATIO * middle.sum()
             if beyond[i, k] == WHITE_CELL:
                 white += bright
                 not_white += not bright
@@ -82,32 +82,41 @@ def _examine(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[
         for channel in range(3):
             own[channel] = middle[channel] - black[channel] / blacks
             look[1, i, channel] = black[channel] / blacks
-        strength = dot(own, own)
+        strength = dot3(own, own)
         for k in range(3):
-            px, py = x + INNER * (xy[i, k, 0] - x), y + INNER * (xy[i, k, 1] - y)
-            at = sample_dot(flat, height, width, px, py, own[0], own[1], own[2])
-            fits = fits and at - dot(own, black) / blacks > MIN_INNER * strength
+            px, py = (
+                x + INNER_SAMPLE_POSITION * (xy[i, k, 0] - x),
+                y + INNER_SAMPLE_POSITION * (xy[i, k, 1] - y),
+            )
+            at = weighted_sample(flat, height, width, px, py, own[0], own[1], own[2])
+            fits = fits and at - dot3(own, black) / blacks > MIN_INNER_STRENGTH * strength
             if beyond[i, k] == BLACK_CELL:
-                fits = fits and dot(other[k], own) - dot(black, own) / blacks < MIN_INNER * strength
+                fits = (
+                    fits and dot3(other[k], own) - dot3(black, own) / blacks < MIN_INNER_STRENGTH * strength
+                )
         if compare:
-            ratio = dot(own, before[i]) / max(dot(before[i], before[i]), 1e-9)
-            fits = fits and ratio > STRENGTH[0] and ratio < STRENGTH[1]
+            ratio = dot3(own, before[i]) / max(dot3(before[i], before[i]), 1e-9)
+            fits = fits and ratio > STRENGTH_RANGE[0] and ratio < STRENGTH_RANGE[1]
             best, best_cosine = 0, -1.0
             for k in range(3):
                 hue = before[nearest[i, k]]
-                cosine = dot(own, hue) / np.sqrt(max(strength * dot(hue, hue), 1e-9))
+                cosine = dot3(own, hue) / np.sqrt(max(strength * dot3(hue, hue), 1e-9))
                 if cosine > best_cosine:
                     best, best_cosine = k + 1, cosine
             fits = fits and best == ink[i] and best_cosine > MIN_COSINE
-        verdict[i] = RIGHT if fits else WRONG
+        verdict[i] = CONFIRMED if fits else CONTRADICTED
     return verdict, look, white, not_white, other_white
 
 
-def examine(
-    image: NDArray[np.uint8], corner_px: NDArray[np.float64], tables: Tables, look: NDArray[np.float64] | None
-) -> Proof:
-    """Compare cells with corners at (C, 3, 2) (NaN: not predicted) with the image, and their inks with ``look``."""
+def check_cells(
+    image: NDArray[np.uint8],
+    corner_px: NDArray[np.float64],
+    tables: WarmTables,
+    look: NDArray[np.float64] | None,
+) -> CellCheck:
+    """Compare cells with corners at (C, 3, 2) (NaN: not predicted) with the image, and their inks with
+    ``cell_levels``."""
     before = np.zeros((len(tables.ink), 3)) if look is None else look[0]
-    return Proof(
-        *_examine(image, corner_px, tables.ink, tables.beyond, tables.nearest, before, look is not None)
+    return CellCheck(
+        *_check_cells(image, corner_px, tables.ink, tables.beyond, tables.nearest, before, look is not None)
     )

@@ -11,24 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import ImageError
-from extractor.image.input import prepare
-from extractor.image.pyramid import Sights
+from extractor.image.input import convert_to_bgr
+from extractor.image.pyramid import Pyramid
 from extractor.layout.reference import Reference
 from extractor.pipeline import Extractor, Stages
-from extractor.refine.estimate import Seen
-from extractor.refine.measure.gridline_weights import SHORTEST, short_edges
+from extractor.refine.estimate import Appearance
+from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
 from extractor.result import Markers, Origin, Reason, Status
-from extractor.track.displacement import Rest, rest_at
-from extractor.track.image_check import examine
-from extractor.track.warm_start import WarmStart, predict, prove
-from extractor.track.warm_tables import Tables, completed, tables_of
+from extractor.track.displacement import Rest, fit_rest
+from extractor.track.image_check import check_cells
+from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
+from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
-MIN_KEPT = 0.97  # of the markers of the last cold start; below it, a cold start may find more
+MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; below it, a cold start may find more
 WARM_EDGE_PX = (
     8.0  # a warm start looks at the image at a scale that leaves edges of so many px, or up to twice
 )
-EVERY = 8  # edges of the layout; one of so many is looked at for that
-COLD_EVERY = 200  # frames; a cold start at least this often
+EDGE_SAMPLING_STEP = 8  # edges of the layout; one of so many is looked at for that
+COLD_START_INTERVAL = 200  # frames; a cold start at least this often
 
 
 class FrameStatus(IntEnum):
@@ -76,18 +76,18 @@ class Tracked:
 
 
 @dataclass(frozen=True, eq=False)
-class _Memory:
+class _TrackState:
     """What a frame leaves to the next: positions, which of them were measured, those before, every cell's look, and how
     the image looks to refinement."""
 
     xy_px: NDArray[np.float64]
     known: NDArray[np.bool_]
-    before_px: NDArray[np.float64] | None
-    look: NDArray[np.float64]
-    seen: Seen | None
+    previous_px: NDArray[np.float64] | None
+    cell_levels: NDArray[np.float64]
+    seen: Appearance | None
     mirrored: bool
-    expected: int  # markers of the last cold start, or more
-    age: int  # frames since
+    expected_count: int  # markers of the last cold start, or more
+    frames_since_cold: int  # frames since
     gap: bool = False  # the frame after was lost
 
 
@@ -121,13 +121,13 @@ class Tracker:
         self.rest: Rest | None = None
         self._extractor = Extractor(layout)
         self._mm_per_px = mm_per_px
-        self._tables: Tables | None = tables_of(layout) if warm else None
-        self._some_edges = np.ascontiguousarray(layout.edges[::EVERY])
-        self._memory: _Memory | None = None
+        self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
+        self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])
+        self._state: _TrackState | None = None
         self._size: tuple[int, ...] | None = None
         self._count = 0
         if rest is not None:
-            self.rest = rest_at(rest.xy_px, layout, mm_per_px)
+            self.rest = fit_rest(rest.xy_px, layout, mm_per_px)
 
     def track(self, image: NDArray[Any] | None, *, time_s: float = float("nan"), reason: str = "") -> Tracked:
         """The next frame, whatever it holds: a frame that cannot be tracked says so and keeps its place.
@@ -142,7 +142,7 @@ class Tracker:
             if image is None:
                 reason = reason or "no image"
             elif self._size not in (None, np.shape(image)[:2]):
-                status, reason = FrameStatus.OTHER_SIZE, self._other_size(image)
+                status, reason = FrameStatus.OTHER_SIZE, self._size_mismatch_text(image)
             else:
                 markers, start = self._find(image)
                 self._size = self._size or image.shape[:2]
@@ -150,77 +150,87 @@ class Tracker:
                 status = FrameStatus.LOST if markers.reason else FrameStatus.TRACKED
         except ImageError as error:
             reason = str(error)
-        markers = markers or self._extractor._nothing(Reason.NO_PATTERN, Stages())
+        markers = markers or self._extractor._no_markers(Reason.NO_PATTERN, Stages())
         elapsed_ms = 1e3 * (time.perf_counter() - started)
         if status == FrameStatus.TRACKED and self.rest is None:
-            self.rest = rest_at(markers.xy_px, self.layout, self._mm_per_px)
-        return self._booked(time_s, status, reason, start, markers, elapsed_ms)
+            self.rest = fit_rest(markers.xy_px, self.layout, self._mm_per_px)
+        return self._make_tracked(time_s, status, reason, start, markers, elapsed_ms)
 
     def _find(self, image: NDArray[Any]) -> tuple[Markers, StartKind | None]:
-        found = self._warm(image)
+        found = self._try_warm_start(image)
         if found is not None:
             return found
         markers = self._extractor.extract(image)
         if markers.reason is not None:
-            if self._memory is not None:  # positions are worth another try, velocities are not
-                self._memory = replace(self._memory, before_px=None, gap=True)
+            if self._state is not None:  # positions are worth another try, velocities are not
+                self._state = replace(self._state, previous_px=None, gap=True)
             return markers, None
-        bgr = prepare(image)
+        bgr = convert_to_bgr(image)
         if self._tables is not None and bgr is not None:
             corner_px = markers.xy_px[self._tables.corners]
-            look = _filled(examine(bgr, corner_px, self._tables, None).look, self._tables)
+            look = _fill_unseen_levels(
+                check_cells(bgr, corner_px, self._tables, None).cell_levels, self._tables
+            )
             count = int((markers.status == Status.MEASURED).sum())
-            self._remember(markers, look, count, 0)
+            self._update_state(markers, look, count, 0)
         return markers, StartKind.COLD
 
-    def _warm(self, image: NDArray[Any]) -> tuple[Markers, StartKind] | None:
+    def _try_warm_start(self, image: NDArray[Any]) -> tuple[Markers, StartKind] | None:
         """The markers of a warm start, or None where it is not proved."""
-        memory, tables = self._memory, self._tables
-        if memory is None or tables is None or memory.age >= COLD_EVERY:
+        memory, tables = self._state, self._tables
+        if memory is None or tables is None or memory.frames_since_cold >= COLD_START_INTERVAL:
             return None
         stages = Stages()
-        bgr = stages.done("image", prepare(image))
+        bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
             return None
-        sights = Sights(bgr)
-        edge_px = float(short_edges(memory.xy_px, self._some_edges, SHORTEST, SHORTEST)[0])
+        sights = Pyramid(bgr)
+        edge_px = float(short_edges(memory.xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
         view = sights.at(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
         guesses = [view.reduced(memory.xy_px)]
-        if memory.before_px is not None:
-            moving = view.reduced(2 * memory.xy_px - memory.before_px)
+        if memory.previous_px is not None:
+            moving = view.reduced(2 * memory.xy_px - memory.previous_px)
             guesses.append(np.where(np.isfinite(moving), moving, guesses[0]))
-        predicted = stages.done("predict", predict(view.image, guesses, tables, memory.look))
+        predicted = stages.record(
+            "predict", select_prediction(view.image, guesses, tables, memory.cell_levels)
+        )
         if predicted is None:
             return None
-        start = prove(view, completed(tables, predicted), memory.known, tables, memory.look)
-        if stages.done("prove", start) is None:
+        start = verify_prediction(
+            view, predict_missing_markers(tables, predicted), memory.known, tables, memory.cell_levels
+        )
+        if stages.record("prove", start) is None:
             return None
         assert start is not None
-        return self._finished(sights, start, stages)
+        return self._refine_warm_start(sights, start, stages)
 
-    def _finished(self, sights: Sights, start: WarmStart, stages: Stages) -> tuple[Markers, StartKind] | None:
+    def _refine_warm_start(
+        self, sights: Pyramid, start: WarmStart, stages: Stages
+    ) -> tuple[Markers, StartKind] | None:
         """Refined, which moves no marker by more than a quarter of an edge; None where too few are left."""
-        memory = self._memory
+        memory = self._state
         assert memory is not None
         origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        seen = memory.seen and memory.seen.relit(memory.look, start.look)
+        seen = memory.seen and memory.seen.with_lighting(memory.cell_levels, start.cell_levels)
         markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages, seen)
         count = int((markers.status == Status.MEASURED).sum())
-        if count < MIN_KEPT * memory.expected:
+        if count < MIN_KEPT_SHARE * memory.expected_count:
             return None
-        self._remember(markers, start.look, max(count, memory.expected), memory.age + 1)
+        self._update_state(
+            markers, start.cell_levels, max(count, memory.expected_count), memory.frames_since_cold + 1
+        )
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
-    def _remember(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:
-        last = self._memory
+    def _update_state(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:
+        last = self._state
         before = last.xy_px if last is not None and not last.gap else None
         known = markers.status == Status.MEASURED
         seen = markers.stages["refine"].seen
-        self._memory = _Memory(
+        self._state = _TrackState(
             markers.xy_px, known, before, look, seen, bool(markers.mirrored), expected, age
         )
 
-    def _booked(
+    def _make_tracked(
         self,
         time_s: float,
         status: FrameStatus,
@@ -244,13 +254,13 @@ class Tracker:
         self._count += 1
         return frame
 
-    def _other_size(self, image: NDArray[Any]) -> str:
+    def _size_mismatch_text(self, image: NDArray[Any]) -> str:
         height, width = np.shape(image)[:2]
         assert self._size is not None
         return f"{width} x {height} px instead of {self._size[1]} x {self._size[0]} px"
 
 
-def _filled(look: NDArray[np.float64], tables: Tables) -> NDArray[np.float64]:
+def _fill_unseen_levels(look: NDArray[np.float64], tables: WarmTables) -> NDArray[np.float64]:
     """Cells that were not seen look like the mean of their ink."""
     seen = np.isfinite(look[0, :, 0])
     for ink in (1, 2, 3):

@@ -14,7 +14,7 @@ NO_CELL, BLACK_CELL, WHITE_CELL = range(3)  # what the layout has beyond an edge
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
+class WarmTables:
     """What the warm start needs of a triangular layout; C counts its inked cells.
 
     Attributes:
@@ -40,22 +40,22 @@ class Tables:
     weights: NDArray[np.float64]
 
 
-def tables_of(reference: Reference) -> Tables:
+def build_warm_tables(reference: Reference) -> WarmTables:
     """The tables of a triangular layout."""
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE)).astype(np.int32)
     corners = np.ascontiguousarray(reference.cell_corners[inked])
     ink = (reference.cell_color[inked] + 1).astype(np.uint8)
     around = np.full((len(reference.layer), 3), -1, np.int32)
     around[corners, (ink - 1)[:, None]] = np.arange(len(inked))[:, None]
-    completion, weights, across = _completion(reference)
+    completion, weights, across = _completion_rows(reference)
     kind = np.array([BLACK_CELL, WHITE_CELL, NO_CELL], np.uint8)
     color = np.append(np.where(reference.cell_color == WHITE, 1, 0), 2)
     beyond = kind[color[across[inked]]]
-    return Tables(
+    return WarmTables(
         corners=corners,
         ink=ink,
         beyond=beyond,
-        nearest=_nearest(reference.xy_mm[corners].mean(axis=1), ink),
+        nearest=_nearest_by_ink(reference.xy_mm[corners].mean(axis=1), ink),
         cells_of_marker=around,
         white=(beyond == WHITE_CELL).any(axis=1),
         rim=(reference.layer[corners] == reference.layers).any(axis=1),
@@ -64,7 +64,7 @@ def tables_of(reference: Reference) -> Tables:
     )
 
 
-def _completion(
+def _completion_rows(
     reference: Reference,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int32]]:
     """Rows (a, b, c, d) with their weights, and (cells, 3) the cell across each edge, -1 without one."""
@@ -86,7 +86,7 @@ def _completion(
     return rows, np.column_stack([1 - of_b - of_c, of_b, of_c]), across
 
 
-def _nearest(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[np.int32]:
+def _nearest_by_ink(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[np.int32]:
     from scipy.spatial import cKDTree
 
     nearest = np.empty((len(ink), 3), np.int32)
@@ -96,13 +96,13 @@ def _nearest(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[
     return nearest
 
 
-def completed(tables: Tables, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+def predict_missing_markers(tables: WarmTables, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
     """The markers (M, 2) with those that are lost beside known cells predicted from these."""
-    return np.asarray(_completed(tables.completion, tables.weights, xy_px))
+    return np.asarray(_predict_missing(tables.completion, tables.weights, xy_px))
 
 
 @compiled
-def _completed(completion, weights, xy):  # type: ignore[no-untyped-def]
+def _predict_missing(completion, weights, xy):  # type: ignore[no-untyped-def]
     out, votes = xy.copy(), np.zeros(xy.shape[0])
     for row in range(completion.shape[0]):
         a, b, c, d = completion[row]

@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.suites.article.corners import plain_triangles
-from benchmarks.suites.comparison.measure import errors_of, measure
-from benchmarks.suites.comparison.methods import METHODS, REFERENCE
-from benchmarks.suites.comparison.report import markdown, picture
-from benchmarks.support.published import filled
-from benchmarks.support.scenes import Case, checkerboard, inner_markers
+from benchmarks.suites.article.corners import fit_plain_triangles
+from benchmarks.suites.comparison.measure import measure_case, point_errors
+from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD
+from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture
+from benchmarks.support.published import replace_blocks
+from benchmarks.support.scenes import SceneCase, checkerboard_layout, inner_markers
 from cmpdesign.patterns.colors import BLACK, RED, WHITE
 from cmpdesign.scene import Rendered, Truth, standard_layout
 from extractor.cells.region_growing import Regions
@@ -81,12 +81,12 @@ def test_exponents_are_slopes_in_the_logarithm() -> None:
 
 def test_a_block_of_a_page_is_written_anew() -> None:
     page = "# A\n\n<!-- one: written by make bench -->\nold\n<!-- end of one -->\n\nprose\n"
-    once = filled(page, {"one": "| new |", "other": "never"})
+    once = replace_blocks(page, {"one": "| new |", "other": "never"})
     assert once == "# A\n\n<!-- one: written by make bench -->\n\n| new |\n\n<!-- end of one -->\n\nprose\n"
-    assert filled(once, {"one": "| new |"}) == once
+    assert replace_blocks(once, {"one": "| new |"}) == once
     for broken in (page.replace("<!-- end of one -->", ""), page + page):
         with pytest.raises(ValueError, match="the block one"):
-            filled(broken, {"one": "| new |"})
+            replace_blocks(broken, {"one": "| new |"})
 
 
 def rendered_at(true: np.ndarray) -> Rendered:
@@ -100,19 +100,19 @@ def test_errors_are_the_markers_and_wrong_ones_are_counted() -> None:
     layout = standard_layout("honeycomb", 2)
     true = 20.0 * layout.marker_xy_mm
     shifted = true + (0.1, -0.2)
-    errors, wrong = errors_of(shifted, True, layout, rendered_at(true))
+    errors, wrong = point_errors(shifted, True, layout, rendered_at(true))
     np.testing.assert_allclose(errors, np.broadcast_to((0.1, -0.2), true.shape))
     assert wrong == 0
     shifted[[3, 4]] = shifted[[4, 3]]
     shifted[5] = np.nan
-    errors, wrong = errors_of(shifted, True, layout, rendered_at(true))
+    errors, wrong = point_errors(shifted, True, layout, rendered_at(true))
     assert wrong == 2 and list(np.flatnonzero(np.isnan(errors[:, 0]))) == [3, 4, 5]
     # without numbers a swap is none; what lies between markers, and the second at one marker, is invented
     listed = np.concatenate([shifted[np.arange(len(true)) != 5], true[:2] + 9.9, true[:1] + 0.3])
-    errors, wrong = errors_of(listed, False, layout, rendered_at(true))
+    errors, wrong = point_errors(listed, False, layout, rendered_at(true))
     assert wrong == 3 and list(np.flatnonzero(np.isnan(errors[:, 0]))) == [5]
     np.testing.assert_allclose(np.nanmean(errors, axis=0), (0.1, -0.2))
-    errors, wrong = errors_of(np.empty((0, 2)), False, layout, rendered_at(true))
+    errors, wrong = point_errors(np.empty((0, 2)), False, layout, rendered_at(true))
     assert wrong == 0 and np.isnan(errors).all()
 
 
@@ -125,7 +125,7 @@ def test_the_articles_corners_are_those_of_the_triangles() -> None:
     regions = Regions(
         owner, np.array([2, 3], np.uint8), np.zeros((2, 2), np.int32), np.zeros((2, 10)), np.ones(2, int)
     )
-    found = plain_triangles(regions)
+    found = fit_plain_triangles(regions)
     assert list(found.region) == [0] and list(found.ink) == [2]
     away = np.linalg.norm(found.corner_px[0][:, None] - corner[None], axis=2)
     assert away.min(axis=0).max() < 1.0
@@ -135,23 +135,23 @@ def test_the_articles_corners_are_those_of_the_triangles() -> None:
 
 def test_the_checkerboard_is_one() -> None:
     """Squares alternate, the red cell gone, and nothing black is outside."""
-    board = checkerboard(plain=True)
+    board = checkerboard_layout(plain=True)
     assert len(board.cell_color) == 441 and set(board.cell_color) == {BLACK, WHITE}
     side = board.cell_color.reshape(21, 21)
     assert (side[1:] != side[:-1]).all() and (side[:, 1:] != side[:, :-1]).all()
     assert inner_markers(board).sum() == 400
-    assert (checkerboard(plain=False).cell_color == RED).sum() == 1
+    assert (checkerboard_layout(plain=False).cell_color == RED).sum() == 1
 
 
 @pytest.mark.slow
 def test_the_comparison_runs_on_one_scene() -> None:
     """All methods read the flat scene; ours are numbered without a mistake, and the first of the bound."""
-    results = {result.method: result for result in measure(Case(), 2)}
+    results = {result.method: result for result in measure_case(SceneCase(), 2)}
     assert set(results) == {method.name for method in METHODS}
     for name, limit in (("fast", 2.0), ("balanced", 1.5), ("accurate", 1.1)):
         mine = results[f"cmpdesign, {name}"]
         assert mine.found_share == 1 and mine.wrong == 0 and mine.inner_px < limit * mine.bound_px
     best = min(results.values(), key=lambda r: r.inner_px / r.bound_px)
-    assert best.method.startswith("cmpdesign") and results[REFERENCE].ratio == 1
-    assert picture(list(results.values())).startswith(b"\x89PNG")
-    assert markdown(list(results.values())).count("\n") == len(METHODS) + 1
+    assert best.method.startswith("cmpdesign") and results[REFERENCE_METHOD].ratio == 1
+    assert comparison_picture(list(results.values())).startswith(b"\x89PNG")
+    assert comparison_markdown(list(results.values())).count("\n") == len(METHODS) + 1

@@ -9,23 +9,33 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.damage import Read, alone, case_of, drawn, main, name_of, table, taken_for_others, totals
-from benchmarks.suites.scoring.reading import extractor_of, read
+from benchmarks.damage import (
+    DamageResult,
+    case_name,
+    count_swapped_markers,
+    main,
+    parse_case,
+    read_one_image,
+    sample_cases,
+    totals_by_kind,
+    totals_table,
+)
+from benchmarks.suites.scoring.reading import cached_extractor, read_case
 from benchmarks.suites.stress.conditions import BY_NAME
-from benchmarks.suites.stress.drawn import DRAWN
-from benchmarks.suites.stress.frames import PATTERNS, Frame, plain
-from benchmarks.suites.stress.kinds import frame_of
+from benchmarks.suites.stress.drawn import RANDOM_KINDS
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
+from benchmarks.suites.stress.kinds import make_frame
 
 IMAGES, SEED = 42, 60000  # every kind in every pattern, twice
 
 
 def test_no_marker_is_wrong() -> None:
     wrong, kept, sure = [], 0, 0
-    for case in drawn(IMAGES, SEED):
-        result = read(case, 1, timing=False)[0]
-        assert not result.raised, name_of(case)
+    for case in sample_cases(IMAGES, SEED):
+        result = read_case(case, 1, timing=False)[0]
+        assert not result.raised, case_name(case)
         if result.score.wrong:
-            wrong.append((name_of(case), result.score.wrong))
+            wrong.append((case_name(case), result.score.wrong))
         if not result.reason:
             kept, sure = kept + result.score.kept, sure + result.score.sure
     assert wrong == []
@@ -47,54 +57,63 @@ def test_no_marker_is_wrong() -> None:
     ],
 )
 def test_what_has_been_read_wrong_once(name: str) -> None:
-    result = read(case_of(name), 1, timing=False)[0]
+    result = read_case(parse_case(name), 1, timing=False)[0]
     assert result.score.wrong == 0 and not result.raised
 
 
 def test_drawn_cases_are_all_kinds_in_all_patterns_and_the_same_again() -> None:
-    cases = drawn(IMAGES, SEED)
-    assert {(case.kind, case.pattern) for case in cases} == {(k.name, p) for k in DRAWN for p in PATTERNS}
+    cases = sample_cases(IMAGES, SEED)
+    assert {(case.kind, case.pattern) for case in cases} == {
+        (k.name, p) for k in RANDOM_KINDS for p in PATTERNS
+    }
     assert len({case.seed for case in cases}) == IMAGES
     case = cases[20]
     kind = BY_NAME[case.kind]
-    first, again = frame_of(case, kind), frame_of(case, kind)
-    other = kind.change(plain(case.pattern, case.seed + 1), 0)
-    assert isinstance(first, Frame) and isinstance(again, Frame) and isinstance(other, Frame)
+    first, again = make_frame(case, kind), make_frame(case, kind)
+    other = kind.change(plain_frame(case.pattern, case.seed + 1), 0)
+    assert (
+        isinstance(first, PatternFrame)
+        and isinstance(again, PatternFrame)
+        and isinstance(other, PatternFrame)
+    )
     assert first.scene.damage == again.scene.damage != other.scene.damage
     np.testing.assert_array_equal(first.shoot().image, again.shoot().image)
 
 
 def test_names_lead_back_to_their_images() -> None:
-    for case in drawn(21, 7):
-        assert case_of(name_of(case)) == case
+    for case in sample_cases(21, 7):
+        assert parse_case(case_name(case)) == case
     for name in ("blur/round/3", "random blobs/square/3", "random blobs/round/x", "random blobs"):
         with pytest.raises(ValueError, match="no image is named"):
-            case_of(name)
+            parse_case(name)
 
 
 def test_markers_taken_for_others_are_told_from_moved_ones() -> None:
-    shot = plain("honeycomb", 0).shoot()
-    found = extractor_of("honeycomb", 11).extract(shot.image)
+    shot = plain_frame("honeycomb", 0).shoot()
+    found = cached_extractor("honeycomb", 11).extract(shot.image)
     true_px = shot.truths[0].marker_xy_px.copy()
-    assert taken_for_others(shot, replace(found, xy_px=true_px)) == 0
+    assert count_swapped_markers(shot, replace(found, xy_px=true_px)) == 0
     moved = true_px.copy()
     moved[5] += [8.0, 0.0]  # of 20
-    assert taken_for_others(shot, replace(found, xy_px=moved)) == 0
+    assert count_swapped_markers(shot, replace(found, xy_px=moved)) == 0
     moved[[7, 8]] = moved[[8, 7]]
-    assert taken_for_others(shot, replace(found, xy_px=moved)) == 2
+    assert count_swapped_markers(shot, replace(found, xy_px=moved)) == 2
 
 
 def test_totals_name_the_images_with_wrong_markers() -> None:
-    case = drawn(1, 11)[0]
-    result = read(case, 1, timing=False)[0]
+    case = sample_cases(1, 11)[0]
+    result = read_case(case, 1, timing=False)[0]
     bad = replace(result, score=replace(result.score, wrong=3))
-    rows = totals([Read(result, 0), Read(bad, 2)])
+    rows = totals_by_kind([DamageResult(result, 0), DamageResult(bad, 2)])
     assert [row.kind for row in rows] == [case.kind, "together"]
     assert (rows[-1].images, rows[-1].wrong, rows[-1].others) == (2, 3, 2)
     assert rows[-1].kept == 2 * result.score.kept
-    assert f"WRONG    3  {name_of(case)}" in table(rows)
+    assert f"WRONG    3  {case_name(case)}" in totals_table(rows)
     silent = replace(result, reason="reference_lost")
-    assert totals([Read(silent, 0)])[-1].unread == 1 and totals([Read(silent, 0)])[-1].sure == 0
+    assert (
+        totals_by_kind([DamageResult(silent, 0)])[-1].unread == 1
+        and totals_by_kind([DamageResult(silent, 0)])[-1].sure == 0
+    )
 
 
 def test_a_run_prints_and_writes_and_one_image_is_saved(
@@ -104,7 +123,7 @@ def test_a_run_prints_and_writes_and_one_image_is_saved(
     assert main(["--images", "3", "--seed", "300", "--processes", "1", "--json", str(out)]) == 0
     assert "3 images, seeds 300 to 302" in capsys.readouterr().out
     assert [row["images"] for row in json.loads(out.read_text())] == [1, 1, 1, 3]
-    assert alone(case_of("random scratches/honeycomb/300"), tmp_path).score.wrong == 0
+    assert read_one_image(parse_case("random scratches/honeycomb/300"), tmp_path).score.wrong == 0
     assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png"}
     with pytest.raises(SystemExit):
         main(["--only", "nothing"])

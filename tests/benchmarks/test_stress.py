@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from benchmarks.stress.__main__ import main
-from benchmarks.suites.scoring.reading import Result, extractor_of, read
-from benchmarks.suites.scoring.report import PROMISED_SHARE, failures, rows_of
-from benchmarks.suites.scoring.score import score, smallest_contrast
-from benchmarks.suites.stress.conditions import BY_NAME, KINDS, cases
-from benchmarks.suites.stress.frames import PATTERNS, Shot, plain
-from benchmarks.suites.stress.kinds import Case, Kind
+from benchmarks.suites.scoring.reading import CaseResult, cached_extractor, read_case
+from benchmarks.suites.scoring.report import PROMISED_SHARE, condition_rows, failure_lines
+from benchmarks.suites.scoring.score import score_markers, smallest_contrast
+from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases
+from benchmarks.suites.stress.frames import PATTERNS, CaseImage, plain_frame
+from benchmarks.suites.stress.kinds import ConditionKind, StressCase
 from extractor import Markers, Status
 
 STANDARD_STEPS = ("megapixels", "small cells", "medium cells", "large cells")  # whose later steps are large
@@ -29,26 +29,26 @@ LESS_KEPT = {
 }
 
 
-def hard_but_promised(kind: Kind) -> float:
+def hard_but_promised(kind: ConditionKind) -> float:
     """The step in the middle: hard enough to tell, mild enough for the promise."""
     return kind.steps[0] if kind.name in STANDARD_STEPS else kind.steps[len(kind.steps) // 2]
 
 
-def cut() -> list[Case]:
+def cut() -> list[StressCase]:
     """One image of every kind of condition, the patterns in turn."""
     chosen = []
     for number, kind in enumerate(kind for kind in KINDS if kind.group != "nothing"):
         turn = number % len(PATTERNS)
-        chosen.append(Case(kind.name, hard_but_promised(kind), PATTERNS[turn], 100 * turn))
+        chosen.append(StressCase(kind.name, hard_but_promised(kind), PATTERNS[turn], 100 * turn))
     return chosen
 
 
-def result_of(case: Case) -> Result:
-    return read(case, runs=1, timing=False)[0]
+def result_of(case: StressCase) -> CaseResult:
+    return read_case(case, runs=1, timing=False)[0]
 
 
 @pytest.mark.parametrize("case", cut(), ids=lambda case: case.name)
-def test_no_marker_is_wrong_and_the_promise_is_kept(case: Case) -> None:
+def test_no_marker_is_wrong_and_the_promise_is_kept(case: StressCase) -> None:
     figures = result_of(case).score
     assert figures.wrong == 0
     assert figures.outside == 0
@@ -57,7 +57,7 @@ def test_no_marker_is_wrong_and_the_promise_is_kept(case: Case) -> None:
 
 def test_a_blur_far_from_the_first_estimate_is_drawn_anew() -> None:
     """Inks that bled look a third wider blurred than their middles tell; with the narrow blur rim markers are lost."""
-    figures = result_of(Case("bleeding inks", 0.1, "elliptical", 200)).score
+    figures = result_of(StressCase("bleeding inks", 0.1, "elliptical", 200)).score
     assert figures.wrong == 0 and figures.kept >= PROMISED_SHARE * figures.sure
 
 
@@ -66,22 +66,22 @@ def test_nothing_is_read_where_nothing_is(kind: str) -> None:
     steps = BY_NAME[kind].steps
     for image in range(EMPTY_IMAGES):
         # Odd seeds make small images.
-        case = Case(kind, steps[image % len(steps)], PATTERNS[image % len(PATTERNS)], 1001 + 2 * image)
+        case = StressCase(kind, steps[image % len(steps)], PATTERNS[image % len(PATTERNS)], 1001 + 2 * image)
         assert result_of(case).score.reported == 0, case.name
 
 
 def test_the_suite_is_as_large_as_it_says() -> None:
-    full = cases(quick=False)
+    full = make_cases(quick=False)
     assert len(KINDS) == len(BY_NAME) >= 60
     assert len(set(full)) == len(full)
     assert {case.pattern for case in full} == set(PATTERNS)
     assert sum(BY_NAME[case.kind].group == "nothing" for case in full) >= 1000
 
 
-def perfect() -> tuple[Markers, Shot]:
+def perfect() -> tuple[Markers, CaseImage]:
     """The plain frame, and markers made from its truth."""
-    shot = plain("honeycomb", 0).shoot()
-    found = extractor_of("honeycomb", 11).extract(np.zeros_like(shot.image))
+    shot = plain_frame("honeycomb", 0).shoot()
+    found = cached_extractor("honeycomb", 11).extract(np.zeros_like(shot.image))
     visible = shot.truths[0].visible
     xy_px = np.where(visible[:, None], shot.truths[0].marker_xy_px, np.nan)
     return replace(found, xy_px=xy_px, status=visible.astype(np.uint8)), shot
@@ -89,22 +89,22 @@ def perfect() -> tuple[Markers, Shot]:
 
 def test_the_score_sees_swapped_shifted_and_lost_markers() -> None:
     markers, shot = perfect()
-    good = score(markers, shot, promised=True)
+    good = score_markers(markers, shot, promised=True)
     assert (good.wrong, good.lost, good.outside, good.hidden) == (0, 0, 0, 0)
     assert good.promised and good.kept == good.sure == good.measured == good.visible
     assert good.rms_px == 0
 
     swapped = markers.xy_px.copy()
     swapped[[3, 4]] = swapped[[4, 3]]
-    assert score(replace(markers, xy_px=swapped), shot, promised=True).wrong == 2
+    assert score_markers(replace(markers, xy_px=swapped), shot, promised=True).wrong == 2
     for share, wrong in ((0.29, 0), (0.31, 1)):
         moved = markers.xy_px.copy()
         moved[7] += [20 * share, 0]
-        assert score(replace(markers, xy_px=moved), shot, promised=True).wrong == wrong
+        assert score_markers(replace(markers, xy_px=moved), shot, promised=True).wrong == wrong
     status = markers.status.copy()
     status[:5] = Status.LOST
     status[5] = Status.FITTED
-    some = score(replace(markers, status=status), shot, promised=True)
+    some = score_markers(replace(markers, status=status), shot, promised=True)
     assert (some.lost, some.fitted, some.kept) == (5, 1, good.kept - 6)
 
 
@@ -112,26 +112,26 @@ def test_a_reported_marker_without_a_place_is_wrong() -> None:
     markers, shot = perfect()
     xy_px = markers.xy_px.copy()
     xy_px[0] = np.nan
-    assert score(replace(markers, xy_px=xy_px), shot, promised=True).wrong == 1
+    assert score_markers(replace(markers, xy_px=xy_px), shot, promised=True).wrong == 1
 
 
 def test_markers_on_an_empty_image_are_wrong_and_reported_as_such() -> None:
     markers, shot = perfect()
-    figures = score(markers, Shot(shot.image, (), None), promised=False)
+    figures = score_markers(markers, CaseImage(shot.image, (), None), promised=False)
     assert figures.wrong == figures.reported == int((markers.status > 0).sum())
-    case = Case("nothing: noise", 1, "honeycomb", 0)
-    rows = rows_of([Result(case, figures, 10.0, 1.0, "", False)], KINDS)
-    assert failures(rows)[0].startswith("WRONG")
+    case = StressCase("nothing: noise", 1, "honeycomb", 0)
+    rows = condition_rows([CaseResult(case, figures, 10.0, 1.0, "", False)], KINDS)
+    assert failure_lines(rows)[0].startswith("WRONG")
 
 
 def test_two_patterns_may_be_read_as_either_but_not_mixed() -> None:
     markers, shot = perfect()
     far = replace(shot.truths[0], marker_xy_px=shot.truths[0].marker_xy_px + 700.0)
     both = replace(shot, truths=(far, shot.truths[0]))
-    assert score(markers, both, promised=True).wrong == 0
+    assert score_markers(markers, both, promised=True).wrong == 0
     mixed = markers.xy_px.copy()
     mixed[:10] += 700
-    assert score(replace(markers, xy_px=mixed), both, promised=True).wrong == 10
+    assert score_markers(replace(markers, xy_px=mixed), both, promised=True).wrong == 10
 
 
 @pytest.mark.parametrize(
@@ -150,15 +150,15 @@ def test_two_patterns_may_be_read_as_either_but_not_mixed() -> None:
     ],
 )
 def test_the_promise_applies_as_stated(kind: str, step: float, promised: bool) -> None:
-    assert result_of(Case(kind, step, "honeycomb", 0)).score.promised is promised
+    assert result_of(StressCase(kind, step, "honeycomb", 0)).score.promised is promised
 
 
 def test_contrast_is_the_weakest_cells_under_its_light() -> None:
-    shot = plain("honeycomb", 0).shoot()
+    shot = plain_frame("honeycomb", 0).shoot()
     assert shot.scene is not None
     size = (shot.image.shape[1], shot.image.shape[0])
     assert smallest_contrast(shot.scene, shot.truths[0], size) == 130  # green: 150 on 20
-    dim = plain("honeycomb", 0).lit(rgb=(0.5, 0.5, 0.5))
+    dim = plain_frame("honeycomb", 0).lit(rgb=(0.5, 0.5, 0.5))
     assert smallest_contrast(dim.scene, shot.truths[0], size) == 65
 
 

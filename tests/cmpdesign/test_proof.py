@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.colors import BLUE, GREEN, RED
 from cmpdesign.products.drawing.svg import layout_to_svg
 from extractor import Extractor, Status, parse_layout
@@ -114,7 +114,9 @@ def mixed_views() -> Iterator[View]:
 
 
 def test_every_triangular_pattern_is_proven() -> None:
-    assert {name for name in patterns() if small_layout(name).cell_corners.shape[1] == 3} == set(TRIANGULAR)
+    assert {name for name in registered_patterns() if small_layout(name).cell_corners.shape[1] == 3} == set(
+        TRIANGULAR
+    )
 
 
 @pytest.mark.parametrize("ink", [RED, GREEN, BLUE])

@@ -39,7 +39,7 @@ def test_the_demo_runs(
 
 def test_the_truth_scores_full_marks() -> None:
     truth = picture().truth
-    figures = demo.score(markers_at(truth.marker_xy_px), truth)
+    figures = demo.score_markers(markers_at(truth.marker_xy_px), truth)
     assert (figures.visible, figures.measured, figures.lost, figures.wrong) == (61, 61, 0, 0)
     assert figures.rms_px == figures.max_px == 0
 
@@ -52,7 +52,7 @@ def test_errors_wrong_ids_and_repairs_are_counted() -> None:
     markers = markers_at(xy_px)
     status = markers.status.copy()
     status[[7, 8]], status[9] = 2, 3
-    figures = demo.score(replace(markers, status=status), truth)
+    figures = demo.score_markers(replace(markers, status=status), truth)
     assert (figures.measured, figures.repaired, figures.lost, figures.wrong) == (57, 3, 1, 2)
     assert figures.rms_px == pytest.approx(np.sqrt((0.09 + 0.01) / 2))
     assert figures.max_px == pytest.approx(np.hypot(0.3, 0.1))

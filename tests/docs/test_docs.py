@@ -33,7 +33,7 @@ from cmpdesign import demo
 from cmpdesign.cli import app
 from cmpdesign.design.design import Design
 from cmpdesign.design.templates import templates
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from docs.figures import everything, fields
 
 ROOT = Path(__file__).parents[2]
@@ -225,7 +225,7 @@ def test_generated_pages_are_up_to_date() -> None:
 
 def test_everything_registered_is_in_the_gallery(drawn: dict[str, bytes]) -> None:
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    for kind, names in (("pattern", patterns()), ("template", templates())):
+    for kind, names in (("pattern", registered_patterns()), ("template", templates())):
         for name in names:
             assert f"\n### {name}\n" in page
             assert f"(images/{kind}-{name}.png)" in page and f"{kind}-{name}.png" in drawn

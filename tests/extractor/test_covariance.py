@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.support.scenes import KINDS, Case, extractor_of, inner_markers
+from benchmarks.support.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus
 from extractor.presets import PRESETS
@@ -34,8 +34,8 @@ def normalised(preset: str, kind: str) -> tuple[Squares, Squares]:
     """Of the measured inner markers and the measured virtual markers of all patterns."""
     markers_found, virtual_found = [], []
     for pattern in PATTERNS:
-        case = Case(pattern, kind, layers=LAYERS)
-        scene, extractor = case.scene(), extractor_of(case, preset)  # type: ignore[arg-type]
+        case = SceneCase(pattern, kind, layers=LAYERS)
+        scene, extractor = case.scene(), cached_extractor(case, preset)  # type: ignore[arg-type]
         inner = inner_markers(scene.layout)
         for seed in range(SEEDS):
             seen = render(replace(scene, seed=seed), size=SIZE)
@@ -50,7 +50,7 @@ def normalised(preset: str, kind: str) -> tuple[Squares, Squares]:
     return np.concatenate(markers_found), np.concatenate(virtual_found)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCENE_KINDS)
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     found, _ = normalised(preset, kind)
@@ -60,7 +60,7 @@ def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> 
     assert np.sqrt(found.max()) < 6
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCENE_KINDS)
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_covariance_of_a_measured_virtual_marker_is_true(preset: str, kind: str) -> None:
     _, found = normalised(preset, kind)

@@ -33,23 +33,23 @@ from cmpdesign.scene import (
 )
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout, standard_scene
 from extractor import Extractor, Markers, Status, parse_layout
-from extractor.cells.cell_mesh import build_mesh
+from extractor.cells.cell_mesh import build_cell_mesh
 from extractor.cells.cells import Cells
 from extractor.cells.region_growing import grow
 from extractor.cells.seeds import find_seeds
 from extractor.cells.triangle_fit import fit_triangles
-from extractor.complete.repair import repair
+from extractor.complete.repair import repair_markers
 from extractor.image.ink_segmentation import Segmentation
 from extractor.layout.lattice_tables import lattice_of
 from extractor.layout.topology import topology_of
-from extractor.localmap.neighbour_prediction import predicted
-from extractor.numbering.marker_places import Places
+from extractor.localmap.neighbour_prediction import predict_markers
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.presets import PRESETS
-from extractor.refine.drawn_pattern import Board, room_for
-from extractor.refine.estimate import Refined
-from extractor.refine.solve.fisher_information import covariances, solve
+from extractor.refine.drawn_pattern import DrawingBuffers, allocate_drawing_buffers
+from extractor.refine.estimate import RefinedMarkers
+from extractor.refine.solve.fisher_information import covariances, solve_shifts
 from extractor.refine.solve.shared_pixels import overlap
-from extractor.refine.synthesis_steps import Draughtsman
+from extractor.refine.synthesis_steps import SynthesisSolver
 
 ROOT = Path(__file__).parents[2]
 NAMED_TEST = re.compile(r"`([\w/]+)::(test_\w+)`")  # folder/file::function, below tests/
@@ -182,7 +182,7 @@ def test_a_pattern_amid_colored_noise_is_read(pattern: str, grain_px: float) -> 
     mask = cv2.dilate(cv2.fillConvexPoly(np.zeros(SIZE[::-1], np.uint8), within, 1), np.ones((15, 15)))
     image[: SIZE[1], : SIZE[0]][mask > 0] = seen.image[mask > 0]
     markers = extractor(pattern).extract(image)
-    assert markers.stages["seeds"].crowded
+    assert markers.stages["seeds"].cluttered
     assert sound(markers, seen).all() and rms(markers, seen) < 0.05
 
 
@@ -192,7 +192,7 @@ def test_of_an_image_of_noise_hardly_any_domain_becomes_a_cell() -> None:
     image = np.clip(127 + 70 * grain / grain.std(), 0, 255).astype(np.uint8)
     markers = extractor().extract(image)
     assert not sound(markers).any() and markers.reason is not None
-    assert markers.stages["seeds"].crowded
+    assert markers.stages["seeds"].cluttered
     everything = find_seeds(markers.stages["segment"])
     assert len(markers.stages["cells"].ink) < 0.2 * len(everything.ink)
 
@@ -217,8 +217,8 @@ def test_centers_on_a_line_or_on_one_point_make_no_mesh() -> None:
     ink = (np.arange(30) % 3 + 1).astype(np.uint8)
     along = np.stack([np.arange(30.0), 0.5 * np.arange(30.0)], axis=1)
     for centers in (along, np.zeros((30, 2)), along + 1e-9 * np.random.default_rng(1).normal(size=(30, 2))):
-        mesh = build_mesh(cells_at(centers, ink))
-        assert mesh is None or not mesh.turn.any()
+        mesh = build_cell_mesh(cells_at(centers, ink))
+        assert mesh is None or not mesh.orientation.any()
 
 
 @pytest.mark.parametrize("tilt_deg", [70.0, 78.0, 84.0])
@@ -246,8 +246,8 @@ def test_edges_shorter_than_the_blur(preset: str, pitch_px: float, blur_px: floa
 # -- places
 
 
-def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> Refined:
-    return Refined(
+def refined_at(xy_px: NDArray[np.float64], cov_px2: NDArray[np.float64]) -> RefinedMarkers:
+    return RefinedMarkers(
         xy_px,
         cov_px2,
         np.ones(len(xy_px), np.bool_),
@@ -278,13 +278,13 @@ def test_single_precision_costs_nothing(preset: str, monkeypatch: pytest.MonkeyP
     seen = render(scene(), size=SIZE)
     single = extractor(preset=preset).extract(seen.image)
     double = Extractor(extractor().layout, preset)  # type: ignore[arg-type]
-    kept: dict[tuple[int, ...], Board] = {}
+    kept: dict[tuple[int, ...], DrawingBuffers] = {}
 
-    def board(self: Draughtsman, shape: tuple[int, ...]) -> Board:
-        single = room_for(shape, self._mesh)
-        return kept.setdefault(shape, single._replace(picture=np.zeros(shape)))  # type: ignore[arg-type]
+    def board(self: SynthesisSolver, shape: tuple[int, ...]) -> DrawingBuffers:
+        single = allocate_drawing_buffers(shape, self._mesh)
+        return kept.setdefault(shape, single._replace(synthetic_image=np.zeros(shape)))  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Draughtsman, "board", board)
+    monkeypatch.setattr(SynthesisSolver, "buffers", board)
     markers = double.extract(seen.image)
     away = np.linalg.norm(markers.xy_px - single.xy_px, axis=1)
     deviation = np.sqrt(np.einsum("mii->m", single.cov_px2))
@@ -306,10 +306,10 @@ def test_patterns_of_any_size_are_read_alike(pitch_mm: float) -> None:
     np.testing.assert_array_equal(repaired.status, extractor().extract(image).status)
 
 
-def places_at(xy_px: NDArray[np.float64]) -> Places:
+def places_at(xy_px: NDArray[np.float64]) -> InitialMarkers:
     """Markers as found before refinement, with edges of 20 px; their triangles agree nowhere."""
     nowhere = np.zeros(len(xy_px), np.bool_)
-    return Places(xy_px, np.full(len(xy_px), 20.0), np.empty((0, 3), np.int32), nowhere, nowhere)
+    return InitialMarkers(xy_px, np.full(len(xy_px), 20.0), np.empty((0, 3), np.int32), nowhere, nowhere)
 
 
 @pytest.mark.parametrize("offset_px", [1e4, 1e6])
@@ -326,7 +326,7 @@ def test_places_far_from_the_origin_are_repaired_alike(offset_px: float) -> None
         cov[gone] = np.nan
         refined = refined_at(moved, cov)
         side = int(origin) + 400
-        results.append(repair(refined, places_at(moved), lattice, (side, side)))
+        results.append(repair_markers(refined, places_at(moved), lattice, (side, side)))
     near, far = results
     np.testing.assert_array_equal(near.status, far.status)
     assert (near.status[gone] != Status.LOST).any()
@@ -337,13 +337,13 @@ def test_places_far_from_the_origin_are_repaired_alike(offset_px: float) -> None
 @pytest.mark.parametrize("offset_px", [1e4, 1e6])
 def test_a_mesh_far_from_the_origin_is_the_same(offset_px: float) -> None:
     cells = extractor().extract(render(scene(), size=SIZE).image).stages["cells"]
-    near = build_mesh(cells)
+    near = build_cell_mesh(cells)
     moved = replace(cells, center_px=cells.center_px + offset_px, corner_px=cells.corner_px + offset_px)
-    far = build_mesh(moved)
+    far = build_cell_mesh(moved)
     assert near is not None and far is not None
 
     def faces(mesh: object) -> set[tuple[int, ...]]:
-        return {tuple(row) for row in mesh.faces[mesh.turn != 0].tolist()}  # type: ignore[attr-defined]
+        return {tuple(row) for row in mesh.faces[mesh.orientation != 0].tolist()}  # type: ignore[attr-defined]
 
     assert faces(near) == faces(far)
 
@@ -360,14 +360,14 @@ def test_singular_systems_are_solved_where_they_tell_something() -> None:
     assert np.isnan(covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak, every)).all()
     diagonal[:, [0, 2]] = weak
     right = np.zeros((count, 2))
-    assert not solve(diagonal, beside, mesh.edges, right).any()
+    assert not solve_shifts(diagonal, beside, mesh.edges, right).any()
     a, b = edges[0]
     for value in (1.0, 1e4, 1e8):
         diagonal[:, [0, 2]] = weak
         diagonal[[a, b], 0] += value  # along x only: of y nothing is known
         beside[0, 0] = -value
         right[a, 0], right[b, 0] = value, -value
-        shift = solve(diagonal, beside, mesh.edges, right)
+        shift = solve_shifts(diagonal, beside, mesh.edges, right)
         assert np.isfinite(shift).all() and shift[a, 0] - shift[b, 0] == pytest.approx(1.0, rel=0.02)
         assert not shift[:, 1].any()
         cov = covariances(diagonal, beside, mesh.edges, mesh.spokes, 4 * weak, every)
@@ -384,16 +384,16 @@ def test_quadratics_through_too_few_or_repeated_points_are_refused() -> None:
     for known in range(19):
         xy = np.full_like(mm, np.nan)
         xy[table[0, :known]] = 20.0 * mm[table[0, :known]]
-        place = predicted(xy, wanted, mm, table)[0][0]
+        place = predict_markers(xy, wanted, mm, table)[0][0]
         assert np.isnan(place).all() or np.abs(place - 20.0 * mm[0]).max() < 1e-6
         assert known >= 4 or np.isnan(place).all()
     line = np.abs(mm[table[0], 1]) < 1e-9
     xy = np.full_like(mm, np.nan)
     xy[table[0][line]] = mm[table[0][line]]
-    assert np.isnan(predicted(xy, wanted, mm, table)[0]).all()
+    assert np.isnan(predict_markers(xy, wanted, mm, table)[0]).all()
     repeated = np.repeat(table[:, :1], table.shape[1], axis=1)
-    assert np.isnan(predicted(20.0 * mm, wanted, mm, repeated)[0]).all()
-    assert np.isfinite(predicted(np.full_like(mm, 7.0), wanted, mm, table)[0][0]).all()
+    assert np.isnan(predict_markers(20.0 * mm, wanted, mm, repeated)[0]).all()
+    assert np.isfinite(predict_markers(np.full_like(mm, 7.0), wanted, mm, table)[0][0]).all()
 
 
 def test_a_layer_with_few_markers_left_is_not_invented() -> None:
@@ -407,7 +407,7 @@ def test_a_layer_with_few_markers_left_is_not_invented() -> None:
         some[lattice.layer == LAYERS - 1] = np.nan
         cov = np.where(np.isfinite(some)[:, :, None], 1e-4 * np.eye(2), np.nan)
         refined = refined_at(some, cov)
-        repaired = repair(refined, places_at(some), lattice, (400, 400))
+        repaired = repair_markers(refined, places_at(some), lattice, (400, 400))
         assert not (np.linalg.norm(repaired.xy_px - xy, axis=1) > 0.5).any()
         np.testing.assert_array_equal(repaired.status == Status.LOST, np.isnan(repaired.xy_px[:, 0]))
 

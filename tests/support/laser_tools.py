@@ -15,22 +15,22 @@ from cmpdesign.design.design import load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.laser.coupon.design import Coupon
-from cmpdesign.products.laser.job import Job, make_job
-from cmpdesign.products.laser.setup import complete
-from cmpdesign.scene.drawing.coverage import coverage
-from cmpdesign.scene.drawing.paths import Segments
-from cmpdesign.scene.parts.optics import point_spread
+from cmpdesign.products.laser.job import LaserJob, make_job
+from cmpdesign.products.laser.setup import complete_setup
+from cmpdesign.scene.drawing.coverage import draw_coverage
+from cmpdesign.scene.drawing.paths import PolygonSegments
+from cmpdesign.scene.parts.optics import make_point_spread
 
 Points = NDArray[np.float64]
 PIXEL_MM = 0.002
 
 
 @cache
-def made_job(name: str = "honeycomb", **options: str) -> Job:
+def made_job(name: str = "honeycomb", **options: str) -> LaserJob:
     """A small design's job; options with "__" for "." ("laser__corner")."""
     overrides = {"layers": "3", "pitch_mm": "1.5"} | {key.replace("__", "."): v for key, v in options.items()}
     design = load_design(name, overrides)
-    return make_job(design.name, built(name, tuple(overrides.items())), complete(design.laser))
+    return make_job(design.name, built(name, tuple(overrides.items())), complete_setup(design.laser))
 
 
 @cache
@@ -198,9 +198,9 @@ def coupon_photo(
         points = to_image(outline)
         segments.append(np.hstack([points, np.roll(points, -1, axis=0)]))
         owner.append(np.full(len(points), number))
-    paths = Segments(np.concatenate(segments), np.concatenate(owner))
+    paths = PolygonSegments(np.concatenate(segments), np.concatenate(owner))
     values = np.full((len(openings), 1), ground - sheet)
-    plane = sheet + coverage(paths, values, size, point_spread(blur_px))[0]
+    plane = sheet + draw_coverage(paths, values, size, make_point_spread(blur_px))[0]
     light = 1 + 0.08 * np.linspace(-1, 1, size[0])[None, :]
     noisy = plane * light + np.random.default_rng(3).normal(0, noise, plane.shape)
     return np.repeat(np.clip(np.rint(noisy), 0, 255).astype(np.uint8)[..., None], 3, axis=2)

@@ -22,7 +22,7 @@ NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Graph:
+class CornerGraph:
     """Stage 6: nodes (candidate markers) and the triangles around each.
 
     Attributes:
@@ -39,7 +39,7 @@ class Graph:
 
 
 @compiled
-def _candidates(corner_px, ink):  # type: ignore[no-untyped-def]
+def _candidate_pairs(corner_px, ink):  # type: ignore[no-untyped-def]
     """Pairs of corners of different inks that are near enough to be one marker, with distance / L."""
     count = corner_px.shape[0]
     flat = corner_px.reshape(-1, 2)
@@ -79,7 +79,7 @@ def _candidates(corner_px, ink):  # type: ignore[no-untyped-def]
                     if j > i and ink[i // 3] != ink[j // 3] and found < pairs.shape[0]:
                         limit = min(reach[i], reach[j])
                         distance = np.hypot(flat[i, 0] - flat[j, 0], flat[i, 1] - flat[j, 1])
-                        if distance <= limit and not _same_side(flat, center, i, j):
+                        if distance <= limit and not _is_same_side(flat, center, i, j):
                             pairs[found, 0] = i
                             pairs[found, 1] = j
                             ratio[found] = distance / limit
@@ -89,7 +89,7 @@ def _candidates(corner_px, ink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _same_side(flat, center, i, j):  # type: ignore[no-untyped-def]
+def _is_same_side(flat, center, i, j):  # type: ignore[no-untyped-def]
     """True when the triangles of two corners lie on the same side of where the corners meet."""
     x, y = 0.5 * (flat[i, 0] + flat[j, 0]), 0.5 * (flat[i, 1] + flat[j, 1])
     ax, ay = center[i // 3, 0] - x, center[i // 3, 1] - y
@@ -98,7 +98,7 @@ def _same_side(flat, center, i, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _merge(pairs, order, ink):  # type: ignore[no-untyped-def]
+def _merge_corners(pairs, order, ink):  # type: ignore[no-untyped-def]
     """Join corners, nearest pairs first, so that no node holds two corners of one ink; corner -> node."""
     corners = 3 * ink.shape[0]
     parent = np.arange(corners).astype(np.int32)
@@ -128,20 +128,22 @@ def _merge(pairs, order, ink):  # type: ignore[no-untyped-def]
     return node, count
 
 
-def connect(triangles: Triangles) -> Graph:
+def connect_corners(triangles: Triangles) -> CornerGraph:
     """Stage 6: merge corners nearer than L (eq. 5), at most one red, one green and one blue each (eq. 4)."""
     count = len(triangles.ink)
     if count == 0:
         empty = np.empty((0, 3), np.int32)
-        return Graph(empty, empty, np.empty((0, 2)), False)
-    pairs, ratio = _candidates(triangles.corner_px, triangles.ink)
-    node, nodes = _merge(pairs, np.argsort(ratio, kind="stable"), triangles.ink)
+        return CornerGraph(empty, empty, np.empty((0, 2)), False)
+    pairs, ratio = _candidate_pairs(triangles.corner_px, triangles.ink)
+    node, nodes = _merge_corners(pairs, np.argsort(ratio, kind="stable"), triangles.ink)
     corner_of_node = np.full((nodes, 3), -1, np.int32)
     corner_of_node[node, np.repeat(triangles.ink - 1, 3)] = np.arange(3 * count, dtype=np.int32)
     flat = triangles.corner_px.reshape(-1, 2)
     members = np.bincount(node, minlength=nodes)
     xy = np.stack([np.bincount(node, weights=flat[:, a], minlength=nodes) / members for a in (0, 1)], axis=1)
-    return Graph(node.reshape(count, 3), corner_of_node, xy, _is_mirrored(triangles, corner_of_node, xy))
+    return CornerGraph(
+        node.reshape(count, 3), corner_of_node, xy, _is_mirrored(triangles, corner_of_node, xy)
+    )
 
 
 def _is_mirrored(triangles: Triangles, corner_of_node: NDArray[np.int32], xy: NDArray[np.float64]) -> bool:

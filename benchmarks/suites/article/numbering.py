@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.article.graph import Graph
+from benchmarks.suites.article.graph import CornerGraph
 from extractor.cells.triangle_fit import Triangles
-from extractor.layout.lattice import axial, layer_of, marker_id
+from extractor.layout.lattice import axial_coordinates, layer_of, marker_id
 from extractor.layout.reference import BLACK, WHITE, Reference
-from extractor.numeric.bilinear import sample_patch
+from extractor.numeric.bilinear import fill_patch_mean
 from extractor.numeric.compilation import compiled
 
 # The interior of the white cell against the inks of the cells beside it, both as sums over the channels.
 # Black stays below a quarter; the white of a dim print is still brighter than any ink.
-WHITE_RATIO = 0.75
+MIN_WHITE_RATIO = 0.75
 MAX_ROUNDS = 8
 MAX_WHITES = 8
 
@@ -27,7 +27,7 @@ GAP_AXIAL = np.array([[0, 1], [-1, 1], [0, 0]], np.int32)
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class LatticeTables:
     """What numbering needs of the layout.
 
     Attributes:
@@ -58,19 +58,19 @@ class Numbering:
     ambiguous: bool
 
 
-def lattice_of(reference: Reference) -> Lattice:
+def make_lattice_tables(reference: Reference) -> LatticeTables:
     """The tables of a triangular layout."""
-    q, r = axial(reference.layer, reference.index).T
+    q, r = axial_coordinates(reference.layer, reference.index).T
     cell_of = np.full(len(q), -1, np.int32)
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
     lower_left = np.argmin((q + r)[corners], axis=1)
     cell_of[corners[np.arange(len(inked)), lower_left]] = inked
-    return Lattice(layers=int(reference.layer.max()), cell_of=cell_of)
+    return LatticeTables(layers=int(reference.layer.max()), cell_of=cell_of)
 
 
 @compiled
-def _gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ignore[no-untyped-def]
+def _measure_gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ignore[no-untyped-def]
     """Brightness of the gap after each ink of each node, relative to the inks beside it, and its center.
 
     Clockwise from the triangle of one ink to that of the next, the gap's corners are the node, the first
@@ -92,11 +92,11 @@ def _gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ign
             x = (corner_px[ta, ka, 0] + corner_px[tb, kb, 0]) / 6 + (pa[0] + pb[0]) / 3
             y = (corner_px[ta, ka, 1] + corner_px[tb, kb, 1]) / 6 + (pa[1] + pb[1]) / 3
             radius = 0.2 * np.hypot(pa[0] - x, pa[1] - y)
-            inside = sample_patch(flat, height, width, x, y, radius, beyond)
-            inside &= sample_patch(
+            inside = fill_patch_mean(flat, height, width, x, y, radius, beyond)
+            inside &= fill_patch_mean(
                 flat, height, width, corner_px[ta, :, 0].mean(), corner_px[ta, :, 1].mean(), radius, one
             )
-            inside &= sample_patch(
+            inside &= fill_patch_mean(
                 flat, height, width, corner_px[tb, :, 0].mean(), corner_px[tb, :, 1].mean(), radius, other
             )
             if inside:
@@ -107,7 +107,7 @@ def _gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ign
 
 
 @compiled
-def _spin(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell_of, layers):  # type: ignore[no-untyped-def]
+def _spin_search(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell_of, layers):  # type: ignore[no-untyped-def]
     """Number triangles from one node outwards, the smallest id first; who contradicts whom.
 
     At a marker with the color phase (q - r) mod 3 the ink of a triangle says which of the three cells around it
@@ -175,7 +175,7 @@ def _spin(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell_of, la
     return marker, cell, bad, outside
 
 
-def _dissolve(graph: Graph, bad: NDArray[np.bool_]) -> Graph:
+def _split_nodes(graph: CornerGraph, bad: NDArray[np.bool_]) -> CornerGraph:
     """The graph with the bad nodes taken apart: each of their corners becomes a node of its own."""
     corner_of_node = graph.corner_of_node.copy()
     loose = corner_of_node[bad]
@@ -191,31 +191,33 @@ def _dissolve(graph: Graph, bad: NDArray[np.bool_]) -> Graph:
     hue[graph.corner_of_node[at, ink]] = ink
     alone[np.arange(len(loose)), hue[loose]] = loose
     xy = np.concatenate([graph.xy_px, np.full((len(loose), 2), np.nan)])
-    return Graph(node_of_corner, np.concatenate([corner_of_node, alone]).astype(np.int32), xy, graph.mirrored)
+    return CornerGraph(
+        node_of_corner, np.concatenate([corner_of_node, alone]).astype(np.int32), xy, graph.mirrored
+    )
 
 
 def _number_from(
-    graph: Graph, triangles: Triangles, lattice: Lattice, node: int, coordinate: NDArray[np.int32]
+    graph: CornerGraph, triangles: Triangles, lattice: LatticeTables, node: int, coordinate: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], int, int]:
     """Spin from one node; nodes that are contradicted are taken apart and the search is run again."""
     sense = -1 if graph.mirrored else 1
     conflicts = 0
     for _ in range(MAX_ROUNDS):
-        marker, cell, bad, outside = _spin(
+        marker, cell, bad, outside = _spin_search(
             node, int(coordinate[0]), int(coordinate[1]), sense, triangles.ink,
             graph.node_of_corner, graph.corner_of_node, lattice.cell_of, lattice.layers,
         )  # fmt: skip
         if not bad.any():
             return marker, cell, outside, conflicts
         conflicts += int(bad.sum())
-        graph = _dissolve(graph, bad)
+        graph = _split_nodes(graph, bad)
         if bad[node]:
             break
     return np.full_like(marker, -1), np.full_like(cell, -1), outside, conflicts
 
 
-def number(
-    image: NDArray[np.uint8], triangles: Triangles, graph: Graph, lattice: Lattice
+def number_triangles(
+    image: NDArray[np.uint8], triangles: Triangles, graph: CornerGraph, lattice: LatticeTables
 ) -> Numbering | None:
     """Stage 7: number every triangle that is connected with the white cell; None without a white cell.
 
@@ -223,8 +225,10 @@ def number(
     inside the layout's outline and the fewest outside is, unless two do so equally well.
     """
     sense = -1 if graph.mirrored else 1
-    ratio, center = _gaps(image, triangles.corner_px, graph.node_of_corner, graph.corner_of_node, sense)
-    bright = np.argwhere(ratio > WHITE_RATIO)
+    ratio, center = _measure_gaps(
+        image, triangles.corner_px, graph.node_of_corner, graph.corner_of_node, sense
+    )
+    bright = np.argwhere(ratio > MIN_WHITE_RATIO)
     bright = bright[np.argsort(-ratio[bright[:, 0], bright[:, 1]], kind="stable")][: 3 * MAX_WHITES]
     best: tuple[int, Numbering] | None = None
     tie = False

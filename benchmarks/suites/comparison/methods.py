@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.article.corners import plain_triangles
-from benchmarks.suites.article.graph import connect
-from benchmarks.suites.article.numbering import lattice_of, number
-from benchmarks.support.scenes import BOARD_LAYERS, Case, extractor_of, reference_of
+from benchmarks.suites.article.corners import fit_plain_triangles
+from benchmarks.suites.article.graph import connect_corners
+from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
+from benchmarks.support.scenes import BOARD_LAYERS, SceneCase, cached_extractor, cached_reference
 from extractor import Extractor
 from extractor.cells.region_growing import grow
 from extractor.cells.seeds import find_seeds
@@ -32,8 +32,8 @@ HALF_WINDOW_PX = (
     5  # of cornerSubPix: 11 px, the largest that holds one corner only at a pitch of 20 px, tilted
 )
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
-REFERENCE = "OpenCV findChessboardCornersSB"
-MEASURING = ("refine", "repair", "virtual")  # the stages after the 7th
+REFERENCE_METHOD = "OpenCV findChessboardCornersSB"
+MEASURING_STAGES = ("refine", "repair", "virtual")  # the stages after the 7th
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,85 +54,85 @@ class Method:
     name: str
     board: bool
     numbered: bool
-    read: Callable[[Case, Image], Reading]
+    read: Callable[[SceneCase, Image], Reading]
 
 
 @cache
-def extractor(case: Case, preset: Preset, points: bool = True) -> Extractor:
+def method_extractor(case: SceneCase, preset: Preset, points: bool = True) -> Extractor:
     if points:
-        return extractor_of(case, preset)
-    return Extractor(replace(reference_of(case.pattern, case.layers), virtual_per_edge=0), preset)
+        return cached_extractor(case, preset)
+    return Extractor(replace(cached_reference(case.pattern, case.layers), virtual_per_edge=0), preset)
 
 
-def ours(preset: Preset, points: bool = True) -> Method:
+def extractor_method(preset: Preset, points: bool = True) -> Method:
     """A preset; without the ``points`` between markers it measures what the other detectors do."""
 
-    def read(case: Case, image: Image) -> Reading:
-        reader = extractor(case, preset, points)
+    def read(case: SceneCase, image: Image) -> Reading:
+        reader = method_extractor(case, preset, points)
         started = time.process_time()
         found = reader.extract(image).xy_px
-        return Reading(found, _since(started))
+        return Reading(found, _elapsed_ms(started))
 
     return Method(f"cmpdesign, {preset}" + ("" if points else ", markers only"), False, True, read)
 
 
-def places(case: Case, image: Image) -> Reading:
+def read_numbered_corners(case: SceneCase, image: Image) -> Reading:
     """Stages 1 to 7: corners fitted to the edges of each triangle alone, and merged."""
-    reader = extractor(case, "fast")
+    reader = method_extractor(case, "fast")
     started = time.process_time()
     markers = reader.extract(image)
-    ms, stages_ms = _since(started), markers.timings_ms
-    measuring = sum(stages_ms[stage] for stage in MEASURING) / sum(stages_ms.values())
+    ms, stages_ms = _elapsed_ms(started), markers.timings_ms
+    measuring = sum(stages_ms[stage] for stage in MEASURING_STAGES) / sum(stages_ms.values())
     return Reading(markers.stages["place"].xy_px, ms * (1 - measuring))
 
 
-def subpix_by_id(case: Case, image: Image) -> Reading:
+def read_subpix_by_id(case: SceneCase, image: Image) -> Reading:
     """Stages 1 to 7, then OpenCV's cornerSubPix on the gray image."""
-    coarse = places(case, image)
+    coarse = read_numbered_corners(case, image)
     started = time.process_time()
     points = coarse.points.copy()
     found = np.flatnonzero(np.isfinite(points[:, 0]))
-    points[found] = _subpix(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), points[found])
-    return Reading(points, coarse.ms + _since(started))
+    points[found] = _refine_sub_pixel(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), points[found])
+    return Reading(points, coarse.ms + _elapsed_ms(started))
 
 
-def article(case: Case, image: Image) -> Reading:
+def read_by_article(case: SceneCase, image: Image) -> Reading:
     """The article's way: regions grown by AGA, triangles fitted to their contours, corners merged and averaged, SSA."""
-    layout = reference_of(case.pattern, case.layers)
-    lattice, hues_deg = lattice_of(layout), nominal_hues_deg(dict(layout.palette))
+    layout = cached_reference(case.pattern, case.layers)
+    lattice, hues_deg = make_lattice_tables(layout), nominal_hues_deg(dict(layout.palette))
     started = time.process_time()
     colors = to_colors(image)
     segmentation = segment(colors, find_target(colors), hues_deg)
     points = np.full((len(layout.layer), 2), np.nan)
     if segmentation is None:
-        return Reading(points, _since(started))
-    triangles = plain_triangles(grow(segmentation, find_seeds(segmentation)))
-    found = number(image, triangles, connect(triangles), lattice)
+        return Reading(points, _elapsed_ms(started))
+    triangles = fit_plain_triangles(grow(segmentation, find_seeds(segmentation)))
+    found = number_triangles(image, triangles, connect_corners(triangles), lattice)
     if found is not None:
         ids = found.marker_of_corner.reshape(-1)
         corner = triangles.corner_px.reshape(-1, 2)[ids >= 0]
         count = np.bincount(ids[ids >= 0], minlength=len(points))
         sums = [np.bincount(ids[ids >= 0], corner[:, axis], len(points)) for axis in (0, 1)]
         points[count > 0] = np.stack(sums, axis=1)[count > 0] / count[count > 0, None]
-    return Reading(points, _since(started))
+    return Reading(points, _elapsed_ms(started))
 
 
-def sb(case: Case, image: Image) -> Reading:
+def read_chessboard_sb(case: SceneCase, image: Image) -> Reading:
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     _, corners = cv2.findChessboardCornersSB(gray, INNER_CORNERS, None, SB_FLAGS)
-    return Reading(_points(corners), _since(started))
+    return Reading(_as_points(corners), _elapsed_ms(started))
 
 
-def plain_opencv(case: Case, image: Image) -> Reading:
+def read_chessboard(case: SceneCase, image: Image) -> Reading:
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     found, corners = cv2.findChessboardCorners(gray, INNER_CORNERS)
-    points = _subpix(gray, _points(corners)) if found else np.empty((0, 2))
-    return Reading(points, _since(started))
+    points = _refine_sub_pixel(gray, _as_points(corners)) if found else np.empty((0, 2))
+    return Reading(points, _elapsed_ms(started))
 
 
-def chess_corners(refiner: str) -> Callable[[Case, Image], Reading]:
+def chess_corners_reader(refiner: str) -> Callable[[SceneCase, Image], Reading]:
     """The package chess-corners, its ChESS detector with one of its refiners."""
 
     @cache
@@ -142,41 +142,41 @@ def chess_corners(refiner: str) -> Callable[[Case, Image], Reading]:
         chosen = getattr(package.ChessRefiner, refiner)()
         return package.Detector(package.DetectorConfig.chess().with_chess(refiner=chosen))
 
-    def read(case: Case, image: Image) -> Reading:
+    def read(case: SceneCase, image: Image) -> Reading:
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         started = time.process_time()
         points = detector().detect(gray).xy
-        return Reading(points.astype(np.float64), _since(started))
+        return Reading(points.astype(np.float64), _elapsed_ms(started))
 
     return read
 
 
-def _subpix(gray: Image, points: Points) -> Points:
+def _refine_sub_pixel(gray: Image, points: Points) -> Points:
     corners = points.astype(np.float32)[:, None].copy()
     half = (HALF_WINDOW_PX, HALF_WINDOW_PX)
-    return _points(cv2.cornerSubPix(gray, corners, half, (-1, -1), SUBPIX_STOP))
+    return _as_points(cv2.cornerSubPix(gray, corners, half, (-1, -1), SUBPIX_STOP))
 
 
-def _points(corners: Any) -> Points:
+def _as_points(corners: Any) -> Points:
     return np.empty((0, 2)) if corners is None else np.asarray(corners, np.float64).reshape(-1, 2)
 
 
-def _since(started: float) -> float:
+def _elapsed_ms(started: float) -> float:
     return 1e3 * (time.process_time() - started)
 
 
 METHODS = (
-    ours("fast", points=False),
-    ours("fast"),
-    ours("balanced", points=False),
-    ours("balanced"),
-    ours("accurate"),
-    Method("the article's AGA corners", False, True, article),
-    Method("our stages 1 to 7 alone", False, True, places),
-    Method("cornerSubPix on our ids", False, True, subpix_by_id),
-    Method("chess-corners, saddle point, on ours", False, False, chess_corners("saddle_point")),
-    Method(REFERENCE, True, False, sb),
-    Method("OpenCV findChessboardCorners + cornerSubPix", True, False, plain_opencv),
-    Method("chess-corners, its default", True, False, chess_corners("center_of_mass")),
-    Method("chess-corners, saddle point", True, False, chess_corners("saddle_point")),
+    extractor_method("fast", points=False),
+    extractor_method("fast"),
+    extractor_method("balanced", points=False),
+    extractor_method("balanced"),
+    extractor_method("accurate"),
+    Method("the article's AGA corners", False, True, read_by_article),
+    Method("our stages 1 to 7 alone", False, True, read_numbered_corners),
+    Method("cornerSubPix on our ids", False, True, read_subpix_by_id),
+    Method("chess-corners, saddle point, on ours", False, False, chess_corners_reader("saddle_point")),
+    Method(REFERENCE_METHOD, True, False, read_chessboard_sb),
+    Method("OpenCV findChessboardCorners + cornerSubPix", True, False, read_chessboard),
+    Method("chess-corners, its default", True, False, chess_corners_reader("center_of_mass")),
+    Method("chess-corners, saddle point", True, False, chess_corners_reader("saddle_point")),
 )

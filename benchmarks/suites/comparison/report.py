@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from benchmarks.suites.comparison.measure import Result
+from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.methods import METHODS
 
 COLUMNS = (
@@ -41,7 +41,7 @@ COLORS = {
 MIN_FOUND = 0.5  # of the markers; what finds less is not drawn
 
 
-def scene_table(scene: str, results: Sequence[Result], caption: str = "") -> Table:
+def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") -> Table:
     """One scene's results, for the terminal."""
     table = Table(
         title=scene, box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
@@ -58,7 +58,7 @@ def scene_table(scene: str, results: Sequence[Result], caption: str = "") -> Tab
     return table
 
 
-def markdown(results: Sequence[Result]) -> str:
+def comparison_markdown(results: Sequence[MethodResult]) -> str:
     """One row a method: the standard scene, and the worst of all scenes."""
     lines = [
         "| method | reads | found | wrong | RMS px | of the bound | worst scene | ms | of SB's time |",
@@ -77,7 +77,7 @@ def markdown(results: Sequence[Result]) -> str:
     return "\n".join(lines)
 
 
-def picture(results: Sequence[Result]) -> bytes:
+def comparison_picture(results: Sequence[MethodResult]) -> bytes:
     """PNG: time against error, both logarithmic; a color a method, a mark a scene, the bounds as lines."""
     import matplotlib
 

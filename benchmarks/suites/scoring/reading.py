@@ -11,10 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.scoring.score import NOTHING, Score, score, shortest_edges, sure_markers, wrong_markers
+from benchmarks.suites.scoring.score import (
+    EMPTY_SCORE,
+    MarkerScore,
+    promised_markers,
+    score_markers,
+    shortest_edges,
+    wrong_markers,
+)
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
-from benchmarks.suites.stress.frames import Shot, layout_of, plain
-from benchmarks.suites.stress.kinds import Case, frame_of
+from benchmarks.suites.stress.frames import CaseImage, cached_layout, plain_frame
+from benchmarks.suites.stress.kinds import StressCase, make_frame
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import STANDARD_SIZE, Truth
 from extractor import Extractor, Markers, Status, parse_layout
@@ -24,7 +31,7 @@ Image = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Result:
+class CaseResult:
     """One image read.
 
     Attributes:
@@ -32,8 +39,8 @@ class Result:
         reason: the extractor's; an exception's text where it raised one.
     """
 
-    case: Case
-    score: Score
+    case: StressCase
+    score: MarkerScore
     ms: float
     ratio: float
     reason: str
@@ -41,28 +48,30 @@ class Result:
 
 
 @cache
-def extractor_of(pattern: str, layers: int) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(layout_of(pattern, layers))))
+def cached_extractor(pattern: str, layers: int) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))))
 
 
 @cache
-def plain_image(pattern: str) -> Image:
-    return plain(pattern, 0).shoot().image
+def render_plain_image(pattern: str) -> Image:
+    return plain_frame(pattern, 0).shoot().image
 
 
-def timed(extractor: Extractor, image: Image) -> tuple[Markers, float]:
+def time_extraction(extractor: Extractor, image: Image) -> tuple[Markers, float]:
     """The markers, and ms of processor time."""
     started = time.process_time()
     markers = extractor.extract(image)
     return markers, 1e3 * (time.process_time() - started)
 
 
-def layers_of(shot: Shot) -> int:
+def layout_layers(shot: CaseImage) -> int:
     """Of the layout to look for: the scene's; the standard one's in images without a pattern."""
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
 
 
-def read(case: Case, runs: int, *, timing: bool = True) -> tuple[Result, Shot, Markers | None]:
+def read_case(
+    case: StressCase, runs: int, *, timing: bool = True
+) -> tuple[CaseResult, CaseImage, Markers | None]:
     """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on.
 
     Args:
@@ -70,24 +79,26 @@ def read(case: Case, runs: int, *, timing: bool = True) -> tuple[Result, Shot, M
         timing: also read the plain frame, right before each run, to state the ratio.
     """
     kind = BY_NAME[case.kind]
-    shot = frame_of(case, kind).shoot()
+    shot = make_frame(case, kind).shoot()
     pixels = shot.image.shape[0] * shot.image.shape[1]
     comparable = timing and shot.image.shape[:2] == STANDARD_SIZE[::-1]
     taken, ratios = [], []
     try:
-        extractor = extractor_of(case.pattern, layers_of(shot))
+        extractor = cached_extractor(case.pattern, layout_layers(shot))
         for _ in range(1 if pixels > LARGE_PX else runs):
             beside = math.nan
             if comparable:
-                beside = timed(extractor_of(case.pattern, 11), plain_image(case.pattern))[1]
-            markers, ms = timed(extractor, shot.image)
+                beside = time_extraction(
+                    cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
+                )[1]
+            markers, ms = time_extraction(extractor, shot.image)
             taken.append(ms)
             ratios.append(ms / beside)
     except Exception as error:
-        return Result(case, NOTHING, math.nan, math.nan, repr(error), True), shot, None
-    figures = score(markers, shot, promised=kind.promised)
+        return CaseResult(case, EMPTY_SCORE, math.nan, math.nan, repr(error), True), shot, None
+    figures = score_markers(markers, shot, promised=kind.promised)
     reason = str(markers.reason) if markers.reason else ""
-    return Result(case, figures, min(taken), float(np.median(ratios)), reason, False), shot, markers
+    return CaseResult(case, figures, min(taken), float(np.median(ratios)), reason, False), shot, markers
 
 
 def warm_up() -> None:
@@ -95,16 +106,16 @@ def warm_up() -> None:
     import cv2
 
     cv2.setNumThreads(1)
-    extractor_of("honeycomb", 11).extract(plain_image("honeycomb"))
+    cached_extractor("honeycomb", 11).extract(render_plain_image("honeycomb"))
 
 
-def notable_lines(shot: Shot, markers: Markers | None) -> list[str]:
+def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
     """Every wrong marker with its place and error, and the first of those that should not be lost."""
     if markers is None or shot.scene is None:
         return []
-    wrong, truth = wrong_in(shot, markers)
+    wrong, truth = find_wrong_markers(shot, markers)
     edge_px = shortest_edges(shot.scene.layout, truth)
-    lost = sure_markers(shot.scene.layout, truth, shot.image.shape) & (markers.status == Status.LOST)
+    lost = promised_markers(shot.scene.layout, truth, shot.image.shape) & (markers.status == Status.LOST)
     lines = []
     for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MOST_LOST_LINES]]:
         x, y = truth.marker_xy_px[marker]
@@ -118,7 +129,7 @@ def notable_lines(shot: Shot, markers: Markers | None) -> list[str]:
     return lines
 
 
-def wrong_in(shot: Shot, markers: Markers) -> tuple[NDArray[np.bool_], Truth]:
+def find_wrong_markers(shot: CaseImage, markers: Markers) -> tuple[NDArray[np.bool_], Truth]:
     """(M,) bool, and the truth of the pattern in the image that fits best."""
     assert shot.scene is not None
     layout = shot.scene.layout
@@ -126,17 +137,17 @@ def wrong_in(shot: Shot, markers: Markers) -> tuple[NDArray[np.bool_], Truth]:
     return min(both, key=lambda one: int(one[0].sum()))
 
 
-def overlay(shot: Shot, case: Case, markers: Markers) -> NDArray[np.uint8]:
+def draw_overlay(shot: CaseImage, case: StressCase, markers: Markers) -> NDArray[np.uint8]:
     """The extractor's own overlay, with a red line from every wrong marker to its true place."""
     import cv2
 
     from extractor.draw import draw_markers
 
-    extractor = extractor_of(case.pattern, layers_of(shot))
+    extractor = cached_extractor(case.pattern, layout_layers(shot))
     canvas = draw_markers(shot.image, extractor.layout, markers)
     if shot.scene is not None:
         scale = canvas.shape[0] / shot.image.shape[0]
-        wrong, truth = wrong_in(shot, markers)
+        wrong, truth = find_wrong_markers(shot, markers)
         for marker in np.flatnonzero(wrong):
             ends = ((np.stack([markers.xy_px[marker], truth.marker_xy_px[marker]]) + 0.5) * scale).astype(int)
             cv2.line(canvas, tuple(ends[0].tolist()), tuple(ends[1].tolist()), (0, 0, 255), 2, cv2.LINE_AA)

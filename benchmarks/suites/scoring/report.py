@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.suites.scoring.reading import Result
-from benchmarks.suites.stress.kinds import Kind
+from benchmarks.suites.scoring.reading import CaseResult
+from benchmarks.suites.stress.kinds import ConditionKind
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
@@ -26,7 +26,7 @@ COLORS = {
 
 
 @dataclass(frozen=True)
-class Row:
+class ConditionRow:
     """All images of one condition. Counts are of markers, see ``Score``; times are medians.
 
     Attributes:
@@ -69,7 +69,7 @@ class Row:
         return float(getattr(self, name)) / whole if whole else 0.0
 
 
-def rows_of(results: Iterable[Result], kinds: Sequence[Kind]) -> list[Row]:
+def condition_rows(results: Iterable[CaseResult], kinds: Sequence[ConditionKind]) -> list[ConditionRow]:
     """In the order of the conditions."""
     results = list(results)
     rows = []
@@ -77,15 +77,15 @@ def rows_of(results: Iterable[Result], kinds: Sequence[Kind]) -> list[Row]:
         for step in kind.steps:
             own = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
             if own:
-                rows.append(_row(kind, sorted(own, key=lambda r: r.case.name)))
+                rows.append(_condition_row(kind, sorted(own, key=lambda r: r.case.name)))
     return rows
 
 
-def _row(kind: Kind, own: list[Result]) -> Row:
+def _condition_row(kind: ConditionKind, own: list[CaseResult]) -> ConditionRow:
     promised = [r for r in own if r.score.promised]
     counted = ("visible", "measured", "repaired", "fitted", "lost", "reported", "wrong", "outside", "hidden")
     reasons = sorted({r.reason for r in own if r.reason})
-    return Row(
+    return ConditionRow(
         condition=own[0].case.condition,
         group=kind.group,
         images=len(own),
@@ -95,26 +95,26 @@ def _row(kind: Kind, own: list[Result]) -> Row:
         promised=f"{len(promised)}/{len(own)}"
         if 0 < len(promised) < len(own)
         else ("yes" if promised else "no"),
-        rms_px=_together([(r.score.rms_px, r.score.measured) for r in own]),
-        repaired_rms_px=_together(
+        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in own]),
+        repaired_rms_px=_pooled_rms(
             [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in own]
         ),
         ms=_median([r.ms for r in own]),
         ratio=_median([r.ratio for r in own]),
         raised=sum(r.raised for r in own),
         reasons=", ".join(reasons),
-        worst=max(own, key=_badness).case.name,
+        worst=max(own, key=_severity).case.name,
         slowest=max(own, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
     )
 
 
-def _badness(result: Result) -> tuple[bool, int, float]:
+def _severity(result: CaseResult) -> tuple[bool, int, float]:
     figures = result.score
     lost = 1 - figures.kept / figures.sure if figures.promised else 0.0
     return result.raised, figures.wrong, lost
 
 
-def _together(parts: list[tuple[float, int]]) -> float:
+def _pooled_rms(parts: list[tuple[float, int]]) -> float:
     """The RMS of several RMS with their counts."""
     known = [(value, count) for value, count in parts if count and math.isfinite(value)]
     total = sum(count for _, count in known)
@@ -126,7 +126,7 @@ def _median(values: list[float]) -> float:
     return float(np.median(known)) if known else math.nan
 
 
-def failures(rows: list[Row]) -> list[str]:
+def failure_lines(rows: list[ConditionRow]) -> list[str]:
     """A line each, the severest first: raised, wrong, outside the image, promise broken, slow."""
     found: list[tuple[int, float, str]] = []
     for row in rows:
@@ -152,17 +152,17 @@ HEAD = (
 )
 
 
-def table(rows: list[Row]) -> str:
+def results_table(rows: list[ConditionRow]) -> str:
     lines, group = [HEAD], ""
     for row in rows:
         if row.group != group:
             group = row.group
             lines.append(f"-- {group}")
-        lines.append(_line(row))
+        lines.append(_row_line(row))
     return "\n".join(lines)
 
 
-def _line(row: Row) -> str:
+def _row_line(row: ConditionRow) -> str:
     shares = "".join(
         f"{100 * row.share(name):>{width}.2f}"
         for name, width in (("measured", 8), ("repaired", 7), ("fitted", 7), ("lost", 7))
@@ -178,7 +178,7 @@ def _or_dash(value: float, width: int, digits: int) -> str:
     return f"{value:>{width}.{digits}f}" if math.isfinite(value) else f"{'-':>{width}}"
 
 
-def one_line(result: Result) -> str:
+def result_line(result: CaseResult) -> str:
     """One image."""
     figures = result.score
     return (
@@ -189,7 +189,7 @@ def one_line(result: Result) -> str:
     )
 
 
-def summary(rows: list[Row]) -> str:
+def summary_text(rows: list[ConditionRow]) -> str:
     """One line of totals and one of promises."""
     total = {
         name: sum(getattr(row, name) for row in rows)
@@ -209,7 +209,7 @@ def summary(rows: list[Row]) -> str:
     )
 
 
-def write_json(rows: list[Row], path: Path) -> None:
+def write_json(rows: list[ConditionRow], path: Path) -> None:
     """Every row as an object; NaN as null."""
     columns = [{k: None if v != v else v for k, v in asdict(row).items()} for row in rows]
     beside = path.with_name(path.name + ".part")
@@ -217,21 +217,21 @@ def write_json(rows: list[Row], path: Path) -> None:
     beside.replace(path)
 
 
-def plot(rows: list[Row], kinds: Sequence[Kind], path: Path) -> None:
+def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], path: Path) -> None:
     """A small panel a kind, a bar a step: shares of the visible markers; wrong ones in red, with their count."""
     import matplotlib
 
-    matplotlib.use("Agg")
+    matplotlib.weight("Agg")
     from matplotlib import pyplot
 
-    shown = [kind for kind in kinds if any(_of(row, kind) for row in rows)]
+    shown = [kind for kind in kinds if any(_is_of_kind(row, kind) for row in rows)]
     across = 9
     down = math.ceil(len(shown) / across)
     figure, axes = pyplot.subplots(down, across, figsize=(2.1 * across, 1.75 * down), squeeze=False)
     for panel in axes.ravel()[len(shown) :]:
         panel.set_visible(False)
     for kind, panel in zip(shown, axes.ravel(), strict=False):
-        _panel(panel, kind, [row for row in rows if _of(row, kind)])
+        _draw_panel(panel, kind, [row for row in rows if _is_of_kind(row, kind)])
     handles = [matplotlib.patches.Patch(color=color, label=name) for name, color in COLORS.items()]
     figure.legend(handles=handles, loc="upper center", ncols=len(handles), frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.98))
@@ -246,11 +246,11 @@ def plot(rows: list[Row], kinds: Sequence[Kind], path: Path) -> None:
     beside.replace(path)
 
 
-def _of(row: Row, kind: Kind) -> bool:
+def _is_of_kind(row: ConditionRow, kind: ConditionKind) -> bool:
     return row.condition.rpartition("=")[0] == kind.name
 
 
-def _panel(panel: Any, kind: Kind, rows: list[Row]) -> None:
+def _draw_panel(panel: Any, kind: ConditionKind, rows: list[ConditionRow]) -> None:
     bottom = np.zeros(len(rows))
     for name in ("measured", "repaired", "fitted", "lost"):
         share = np.array([row.share(name) for row in rows])

@@ -7,22 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.stress.frames import Shot
+from benchmarks.suites.stress.frames import CaseImage
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
 from cmpdesign.scene import Scene, Truth
-from cmpdesign.scene.parts.light import gain
+from cmpdesign.scene.parts.light import light_gain
 from extractor.result import Markers, Status
 
 WRONG_SHARE = 0.3  # of the shortest edge at a marker: farther off, it carries another's id or none's
 PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10
-RIM_PX = 2.0  # nearer to the image's rim a corner is not seen from all sides
-ROUNDING = 1e-6  # so that a pitch of 8 px is one
+MIN_RIM_DISTANCE_PX = 2.0  # nearer to the image's rim a corner is not seen from all sides
+PITCH_ROUNDING = 1e-6  # so that a pitch of 8 px is one
 Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Score:
+class MarkerScore:
     """Counts of markers.
 
     Attributes:
@@ -30,7 +30,7 @@ class Score:
         reported: visible or not.
         wrong: reported and farther from its true place than 0.3 of the shortest edge there.
         outside: reported, its true place outside the image. hidden: inside, but not visible.
-        sure: see ``sure_markers``; kept: measured or repaired of these.
+        sure: see ``promised_markers``; kept: measured or repaired of these.
         promised: at least 99 % of the sure ones must be kept.
         rms_px, repaired_rms_px: per axis, of the measured / repaired and fitted ones that are not wrong.
     """
@@ -51,15 +51,15 @@ class Score:
     repaired_rms_px: float
 
 
-def score(markers: Markers, shot: Shot, *, promised: bool) -> Score:
+def score_markers(markers: Markers, shot: CaseImage, *, promised: bool) -> MarkerScore:
     """The best score over the patterns in the image; without a pattern every reported marker is wrong."""
     if shot.scene is None:
         reported = int((markers.status != Status.LOST).sum())
         nan = float("nan")
-        return Score(0, 0, 0, 0, 0, reported, reported, 0, 0, 0, 0, False, nan, nan)
+        return MarkerScore(0, 0, 0, 0, 0, reported, reported, 0, 0, 0, 0, False, nan, nan)
     scene = shot.scene
     one = promised and len(shot.truths) == 1
-    scores = [_against(markers, truth, scene, shot.image.shape, promised=one) for truth in shot.truths]
+    scores = [_score_pattern(markers, truth, scene, shot.image.shape, promised=one) for truth in shot.truths]
     return min(scores, key=lambda result: (result.wrong, -result.reported))
 
 
@@ -80,25 +80,25 @@ def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
     return shortest
 
 
-def sure_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
+def promised_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
     """(M,) bool: visible, off the image's rim, and a corner of a colored or white cell that is visible itself."""
     touching = np.zeros(len(truth.visible), dtype=np.bool_)
     touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
     from_rim = np.minimum(truth.marker_xy_px, np.array(shape[1::-1]) - 1 - truth.marker_xy_px).min(axis=1)
-    return np.asarray(touching & truth.visible & (from_rim >= RIM_PX))
+    return np.asarray(touching & truth.visible & (from_rim >= MIN_RIM_DISTANCE_PX))
 
 
-def _against(
+def _score_pattern(
     markers: Markers, truth: Truth, scene: Scene, shape: tuple[int, ...], *, promised: bool
-) -> Score:
+) -> MarkerScore:
     status, layout, visible = markers.status, scene.layout, truth.visible
     wrong = wrong_markers(markers, layout, truth)
     reported = status != Status.LOST
     true_px = truth.marker_xy_px
     inside = np.all((true_px >= -0.5) & (true_px < np.array(shape[1::-1]) - 0.5), axis=1)
-    sure = sure_markers(layout, truth, shape)
+    sure = promised_markers(layout, truth, shape)
     seen = {name: int((status[visible] == name).sum()) for name in Status}
-    return Score(
+    return MarkerScore(
         visible=int(visible.sum()),
         measured=seen[Status.MEASURED],
         repaired=seen[Status.REPAIRED],
@@ -110,7 +110,7 @@ def _against(
         hidden=int((reported & inside & ~visible).sum()),
         sure=int(sure.sum()),
         kept=int((sure & ~wrong & np.isin(status, (Status.MEASURED, Status.REPAIRED))).sum()),
-        promised=promised and bool(sure.any()) and _keeps_conditions(scene, truth, sure, shape),
+        promised=promised and bool(sure.any()) and _is_promised(scene, truth, sure, shape),
         rms_px=_rms(markers, truth, (status == Status.MEASURED) & ~wrong),
         repaired_rms_px=_rms(markers, truth, (status > Status.MEASURED) & ~wrong),
     )
@@ -121,9 +121,9 @@ def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
     return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
-def _keeps_conditions(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]) -> bool:
+def _is_promised(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]) -> bool:
     """The white cell in view, edges of 8 px, blur to a fifth of the edge, noise to a tenth of the contrast."""
-    edge_px = float(shortest_edges(scene.layout, truth)[sure].min()) * (1 + ROUNDING)
+    edge_px = float(shortest_edges(scene.layout, truth)[sure].min()) * (1 + PITCH_ROUNDING)
     noise = scene.sensor.noise if scene.sensor else 0.0
     return (
         bool(truth.cell_visible[scene.layout.reference_cell])
@@ -145,9 +145,9 @@ def smallest_contrast(scene: Scene, truth: Truth, size: tuple[int, int]) -> floa
     if scene.light:
         centre = truth.marker_xy_px[layout.cell_corners[cells]].mean(axis=1)
         x, y = np.clip(np.rint(centre), 0, np.asarray(size) - 1).astype(int).T
-        light = gain(scene.light, size)[:, y, x].T.astype(np.float64)
+        light = light_gain(scene.light, size)[:, y, x].T.astype(np.float64)
     step = np.minimum(light * ink, 255) - np.minimum(light * black, 255)
     return float(step.max(axis=1).min())
 
 
-NOTHING = Score(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))
+EMPTY_SCORE = MarkerScore(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))

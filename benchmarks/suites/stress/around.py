@@ -7,33 +7,33 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.suites.stress.frames import PATTERNS, Frame, plain
-from benchmarks.suites.stress.kinds import Kind, grouped
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
+from benchmarks.suites.stress.kinds import ConditionKind, group_kinds
 from cmpdesign.scene import Busy, Gradient, Paper, Picture, Plain, Press, Twist, colored_leds, render
 
 
-def pattern_behind(frame: Frame, pitch_px: float) -> Frame:
+def pattern_behind(frame: PatternFrame, pitch_px: float) -> PatternFrame:
     """Before a larger pattern without a white cell."""
-    behind = plain("honeycomb", frame.scene.seed + 1, 24).seen(pitch_px=pitch_px)
+    behind = plain_frame("honeycomb", frame.scene.seed + 1, 24).seen(pitch_px=pitch_px)
     image = render(behind.inked(white=behind.scene.inks["black"]).scene, size=frame.size).image
     return frame.having(background=Picture(np.asarray(image, dtype=np.uint8)))
 
 
-def beside(frame: Frame, pattern: str, pitch_px: float, **camera: Any) -> Frame:
+def second_pattern_beside(frame: PatternFrame, pattern: str, pitch_px: float, **camera: Any) -> PatternFrame:
     """A second pattern to the right of the first."""
-    other = plain(pattern, frame.scene.seed + 1).seen(pitch_px=pitch_px, **camera)
+    other = plain_frame(pattern, frame.scene.seed + 1).seen(pitch_px=pitch_px, **camera)
     return replace(frame.seen(pitch_px=pitch_px), beside=other.scene)
 
 
-def another(frame: Frame) -> str:
+def other_pattern_name(frame: PatternFrame) -> str:
     return PATTERNS[PATTERNS.index(frame.layout.pattern) - 1]
 
 
-def busy(frame: Frame, shapes: float, *, triangles: bool = False) -> Frame:
+def busy_background(frame: PatternFrame, shapes: float, *, triangles: bool = False) -> PatternFrame:
     return frame.seen(pitch_px=14).having(background=Busy(int(shapes), triangles))
 
 
-def mixed(frame: Frame, step: float) -> Frame:
+def mixed_conditions(frame: PatternFrame, step: float) -> PatternFrame:
     """Everything a little: blur, noise, tilt, twist, colored light; and its step times."""
     frame = frame.blurred(1 + 0.5 * step).taken(noise=2 + 2 * step, jpeg_quality=round(98 - 8 * step))
     frame = frame.formed(Press(4, 0.4 * step), Twist(5, 6 * step, (1.0, -1.0)))
@@ -41,21 +41,41 @@ def mixed(frame: Frame, step: float) -> Frame:
     return frame.having(light=light, background=Busy()).seen(tilt_deg=10 * step, tilt_axis_deg=40)
 
 
-AROUND = grouped(
+AROUND_KINDS = group_kinds(
     "around",
-    Kind("plain background", "/255", (0, 90, 170, 255), lambda f, s: f.having(background=Plain((s, s, s)))),
-    Kind(
+    ConditionKind(
+        "plain background", "/255", (0, 90, 170, 255), lambda f, s: f.having(background=Plain((s, s, s)))
+    ),
+    ConditionKind(
         "red background", "/255", (100, 150, 200), lambda f, s: f.having(background=Plain((s, s / 4, s / 4)))
     ),
-    Kind("shaded background", "deg", (30, 200), lambda f, s: f.having(background=Gradient(angle_deg=s))),
-    Kind("paper background", "grain", (4, 12), lambda f, s: f.having(background=Paper(grain=s))),
-    Kind("busy", "shapes", (50, 150, 400), busy),
-    Kind("triangles around", "shapes", (50, 150, 400), lambda f, s: busy(f, s, triangles=True)),
-    Kind("pattern behind", "px", (10, 14, 20, 30), lambda f, s: pattern_behind(f.seen(pitch_px=12), s)),
-    Kind("two alike", "px", (12, 20), lambda f, s: beside(f, f.layout.pattern, s), False),
-    Kind(
-        "two, one mirrored", "px", (12, 20), lambda f, s: beside(f, f.layout.pattern, s, mirrored=True), False
+    ConditionKind(
+        "shaded background", "deg", (30, 200), lambda f, s: f.having(background=Gradient(angle_deg=s))
     ),
-    Kind("two, another pattern", "px", (12, 20), lambda f, s: beside(f, another(f), s), False),
-    Kind("everything a little", "x", (0.5, 1, 1.5), mixed),
+    ConditionKind("paper background", "grain", (4, 12), lambda f, s: f.having(background=Paper(grain=s))),
+    ConditionKind("busy", "shapes", (50, 150, 400), busy_background),
+    ConditionKind(
+        "triangles around", "shapes", (50, 150, 400), lambda f, s: busy_background(f, s, triangles=True)
+    ),
+    ConditionKind(
+        "pattern behind", "px", (10, 14, 20, 30), lambda f, s: pattern_behind(f.seen(pitch_px=12), s)
+    ),
+    ConditionKind(
+        "two alike", "px", (12, 20), lambda f, s: second_pattern_beside(f, f.layout.pattern, s), False
+    ),
+    ConditionKind(
+        "two, one mirrored",
+        "px",
+        (12, 20),
+        lambda f, s: second_pattern_beside(f, f.layout.pattern, s, mirrored=True),
+        False,
+    ),
+    ConditionKind(
+        "two, another pattern",
+        "px",
+        (12, 20),
+        lambda f, s: second_pattern_beside(f, other_pattern_name(f), s),
+        False,
+    ),
+    ConditionKind("everything a little", "x", (0.5, 1, 1.5), mixed_conditions),
 )

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from benchmarks.suites.stress.around import AROUND
-from benchmarks.suites.stress.damage import DIRTY, MISSING, NO_WHITE
-from benchmarks.suites.stress.drawn import DRAWN
-from benchmarks.suites.stress.empty import EMPTY
-from benchmarks.suites.stress.frames import PATTERNS, Frame
-from benchmarks.suites.stress.imaging import IMAGING, LIGHT
-from benchmarks.suites.stress.kinds import Case, Kind, frame_of
-from benchmarks.suites.stress.view import SURFACE, VIEW
+from benchmarks.suites.stress.around import AROUND_KINDS
+from benchmarks.suites.stress.damage import DIRT_KINDS, MISSING_KINDS, NO_WHITE_KINDS
+from benchmarks.suites.stress.drawn import RANDOM_KINDS
+from benchmarks.suites.stress.empty import EMPTY_KINDS
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
+from benchmarks.suites.stress.imaging import IMAGING_KINDS, LIGHT_KINDS
+from benchmarks.suites.stress.kinds import ConditionKind, StressCase, make_frame
+from benchmarks.suites.stress.view import SURFACE_KINDS, VIEW_KINDS
 
-KINDS = (*IMAGING, *LIGHT, *VIEW, *SURFACE, *MISSING, *DIRTY, *NO_WHITE, *DRAWN, *AROUND, *EMPTY)
-BY_NAME: dict[str, Kind] = {kind.name: kind for kind in KINDS}
+KINDS = (
+    *IMAGING_KINDS,
+    *LIGHT_KINDS,
+    *VIEW_KINDS,
+    *SURFACE_KINDS,
+    *MISSING_KINDS,
+    *DIRT_KINDS,
+    *NO_WHITE_KINDS,
+    *RANDOM_KINDS,
+    *AROUND_KINDS,
+    *EMPTY_KINDS,
+)
+BY_NAME: dict[str, ConditionKind] = {kind.name: kind for kind in KINDS}
 LARGE_PX = 3_000_000
 
 
-def cases(*, quick: bool) -> list[Case]:
+def make_cases(*, quick: bool) -> list[StressCase]:
     """All patterns and seeds; in a quick run the patterns take turns, and large images are left out."""
     chosen, turn = [], 0
     for kind in KINDS:
@@ -26,23 +37,23 @@ def cases(*, quick: bool) -> list[Case]:
                 if quick and number != turn % len(PATTERNS):
                     continue
                 for repeat in range(1 if quick else kind.repeats):
-                    case = Case(kind.name, step, pattern, 100 * number + repeat)
-                    if not (quick and kind.group == "view" and pixels(case) > LARGE_PX):
+                    case = StressCase(kind.name, step, pattern, 100 * number + repeat)
+                    if not (quick and kind.group == "view" and case_pixels(case) > LARGE_PX):
                         chosen.append(case)
     return chosen
 
 
-def pixels(case: Case) -> int:
+def case_pixels(case: StressCase) -> int:
     """Of the case's image."""
-    frame = frame_of(case, BY_NAME[case.kind])
+    frame = make_frame(case, BY_NAME[case.kind])
     width, height = frame.size
-    return width * height * (2 if isinstance(frame, Frame) and frame.beside else 1)
+    return width * height * (2 if isinstance(frame, PatternFrame) and frame.beside else 1)
 
 
-def matching(text: str) -> list[Case]:
+def matching_cases(text: str) -> list[StressCase]:
     """The full run's cases of a kind (``blur``), a condition (``blur=3``), a case (``blur=3/round/100``)."""
     return [
         case
-        for case in cases(quick=False)
+        for case in make_cases(quick=False)
         if text == case.kind or f"{case.name}/".startswith(text.rstrip("/") + "/")
     ]

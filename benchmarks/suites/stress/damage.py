@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.stress.frames import RGB, Frame
-from benchmarks.suites.stress.kinds import Kind, grouped
+from benchmarks.suites.stress.frames import RGB, PatternFrame
+from benchmarks.suites.stress.kinds import ConditionKind, group_kinds
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, RED
 from cmpdesign.scene import Blob, Glare, Press, Scratch
@@ -17,29 +17,29 @@ CLUSTER = 6  # cells that fall out together
 DIRT = (90.0, 80.0, 70.0)
 
 
-def without(frame: Frame, cells: Cells) -> Frame:
+def without_cells(frame: PatternFrame, cells: Cells) -> PatternFrame:
     return frame.damaged(missing_cells=tuple(int(cell) for cell in cells))
 
 
-def droppable(layout: Layout) -> Cells:
+def droppable_cells(layout: Layout) -> Cells:
     """Colored cells but the reference."""
     colored = layout.cell_color != BLACK
     colored[layout.reference_cell] = False
     return np.flatnonzero(colored)
 
 
-def centres(layout: Layout) -> NDArray[np.float64]:
+def cell_centres_mm(layout: Layout) -> NDArray[np.float64]:
     return np.asarray(layout.marker_xy_mm[layout.cell_corners].mean(axis=1))
 
 
-def rings(layout: Layout) -> NDArray[np.int32]:
+def cell_rings(layout: Layout) -> NDArray[np.int32]:
     """(C,) the layer on each cell's outer side, from 1."""
     return np.asarray(layout.marker_layer[layout.cell_corners].max(axis=1))
 
 
-def clusters(frame: Frame, share: float) -> Frame:
+def missing_cell_clusters(frame: PatternFrame, share: float) -> PatternFrame:
     """Groups of neighbours fall out until the share is reached."""
-    free, centre = droppable(frame.layout), centres(frame.layout)
+    free, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
     gone: set[int] = set()
     order, turn = frame.rng.permuted(free), 0
     while len(gone) < share * len(free):
@@ -47,66 +47,66 @@ def clusters(frame: Frame, share: float) -> Frame:
         distance = np.linalg.norm(centre[free] - middle, axis=1)
         gone.update(int(cell) for cell in free[np.argsort(distance)[:CLUSTER]])
         turn = max(turn + 1, len(gone))  # a group may have been gone before
-    return without(frame, np.array(sorted(gone)))
+    return without_cells(frame, np.array(sorted(gone)))
 
 
-def one_hole(frame: Frame, share: float) -> Frame:
+def missing_hole(frame: PatternFrame, share: float) -> PatternFrame:
     """A share of the cells falls out around one place."""
-    free, centre = droppable(frame.layout), centres(frame.layout)
+    free, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
     middle = frame.rng.uniform(-4, 4, 2)
     distance = np.linalg.norm(centre[free] - middle, axis=1)
-    return without(frame, free[np.argsort(distance)[: round(share * len(free))]])
+    return without_cells(frame, free[np.argsort(distance)[: round(share * len(free))]])
 
 
-def layer_missing(frame: Frame, layer: float) -> Frame:
-    free = droppable(frame.layout)
-    return without(frame, free[rings(frame.layout)[free] == layer])
+def layer_missing(frame: PatternFrame, layer: float) -> PatternFrame:
+    free = droppable_cells(frame.layout)
+    return without_cells(frame, free[cell_rings(frame.layout)[free] == layer])
 
 
-def outer_missing(frame: Frame, count: float) -> Frame:
-    free = droppable(frame.layout)
-    ring = rings(frame.layout)[free]
-    return without(frame, free[ring > ring.max() - count])
+def outer_layers_missing(frame: PatternFrame, count: float) -> PatternFrame:
+    free = droppable_cells(frame.layout)
+    ring = cell_rings(frame.layout)[free]
+    return without_cells(frame, free[ring > ring.max() - count])
 
 
-def sector_missing(frame: Frame, degrees: float) -> Frame:
+def sector_missing(frame: PatternFrame, degrees: float) -> PatternFrame:
     """A wedge from the centre to the rim."""
-    free = droppable(frame.layout)
-    x, y = centres(frame.layout)[free].T
+    free = droppable_cells(frame.layout)
+    x, y = cell_centres_mm(frame.layout)[free].T
     away = (np.degrees(np.arctan2(y, x)) - frame.rng.uniform(0, 360)) % 360
-    return without(frame, free[(away < degrees) & (np.hypot(x, y) > 1.2)])
+    return without_cells(frame, free[(away < degrees) & (np.hypot(x, y) > 1.2)])
 
 
-def around_white(frame: Frame, count: float) -> Frame:
+def white_neighbours_missing(frame: PatternFrame, count: float) -> PatternFrame:
     """Of the colored cells around the white one, some are missing."""
     corners = frame.layout.cell_corners
     white = corners[frame.layout.reference_cell]
-    free = droppable(frame.layout)
+    free = droppable_cells(frame.layout)
     touching = free[np.isin(corners[free], white).any(axis=1)]
-    return without(frame, frame.rng.permuted(touching)[: int(count)])
+    return without_cells(frame, frame.rng.permuted(touching)[: int(count)])
 
 
-def one_ink_missing(frame: Frame, share: float) -> Frame:
+def one_ink_missing(frame: PatternFrame, share: float) -> PatternFrame:
     """A share of the red cells fell out, nothing else."""
     red = np.flatnonzero(frame.layout.cell_color == RED)
-    return without(frame, frame.rng.permuted(red)[: round(share * len(red))])
+    return without_cells(frame, frame.rng.permuted(red)[: round(share * len(red))])
 
 
-def places(frame: Frame, count: int, least_mm: float = 2.0) -> NDArray[np.float64]:
+def sample_places(frame: PatternFrame, count: int, least_mm: float = 2.0) -> NDArray[np.float64]:
     """(count, 2) mm over the pattern, off the white cell."""
     rng, reach = frame.rng, 0.42 * min(frame.layout.size_mm)
     angle, radius = rng.uniform(0, 2 * np.pi, count), rng.uniform(least_mm, reach, count)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def blobs(frame: Frame, count: int, radius_mm: float, rgb: RGB = DIRT) -> Frame:
-    spots = tuple(Blob((x, y), radius_mm, rgb) for x, y in places(frame, count, 1.5 + radius_mm))
+def with_blobs(frame: PatternFrame, count: int, radius_mm: float, rgb: RGB = DIRT) -> PatternFrame:
+    spots = tuple(Blob((x, y), radius_mm, rgb) for x, y in sample_places(frame, count, 1.5 + radius_mm))
     return frame.damaged(blobs=spots)
 
 
-def scratches(
-    frame: Frame, count: int, width_mm: float, rgb: RGB = (150.0, 150.0, 150.0), aside: float = 2.5
-) -> Frame:
+def with_scratches(
+    frame: PatternFrame, count: int, width_mm: float, rgb: RGB = (150.0, 150.0, 150.0), aside: float = 2.5
+) -> PatternFrame:
     """Bands across the whole pattern, ``aside`` mm or more from the centre."""
     reach, rng = max(frame.layout.size_mm), frame.rng
     bands = []
@@ -118,7 +118,7 @@ def scratches(
     return frame.damaged(scratches=tuple(bands))
 
 
-def glare(frame: Frame, count: int, sigma_px: float, least_px: float) -> Frame:
+def with_glare(frame: PatternFrame, count: int, sigma_px: float, least_px: float) -> PatternFrame:
     """Reflections beside the image's centre."""
     rng = frame.rng
     angle, radius = rng.uniform(0, 2 * np.pi, count), rng.uniform(least_px, least_px + 80, count)
@@ -127,79 +127,94 @@ def glare(frame: Frame, count: int, sigma_px: float, least_px: float) -> Frame:
     return frame.damaged(glare=spots)
 
 
-def white_covered(frame: Frame, rgb: RGB, radius_mm: float) -> Frame:
-    x, y = centres(frame.layout)[frame.layout.reference_cell]
+def white_covered(frame: PatternFrame, rgb: RGB, radius_mm: float) -> PatternFrame:
+    x, y = cell_centres_mm(frame.layout)[frame.layout.reference_cell]
     return frame.damaged(blobs=(Blob((x, y), radius_mm, rgb),))
 
 
-def white_as(frame: Frame, ink: str) -> Frame:
+def white_in_ink(frame: PatternFrame, ink: str) -> PatternFrame:
     """The white cell was printed in another ink."""
     return frame.having(inks={**INKS, "white": INKS[ink]})
 
 
-def white_missing(frame: Frame) -> Frame:
-    return without(frame, np.array([frame.layout.reference_cell]))
+def white_missing(frame: PatternFrame) -> PatternFrame:
+    return without_cells(frame, np.array([frame.layout.reference_cell]))
 
 
-def white_elsewhere(frame: Frame, radius_mm: float) -> Frame:
+def white_elsewhere(frame: PatternFrame, radius_mm: float) -> PatternFrame:
     """The white cell is missing, and a white drop lies on another black cell: a wrong reference is offered."""
-    black = np.flatnonzero((frame.layout.cell_color == BLACK) & (rings(frame.layout) <= 4))
-    x, y = centres(frame.layout)[frame.rng.choice(black)]
+    black = np.flatnonzero((frame.layout.cell_color == BLACK) & (cell_rings(frame.layout) <= 4))
+    x, y = cell_centres_mm(frame.layout)[frame.rng.choice(black)]
     drop = Blob((x, y), radius_mm, INKS["white"])
     return frame.damaged(missing_cells=(frame.layout.reference_cell,), blobs=(drop,))
 
 
-def bulged(frame: Frame) -> Frame:
+def with_bulge(frame: PatternFrame) -> PatternFrame:
     return frame.formed(Press(4, 1.2))
 
 
-def white_glared(frame: Frame, sigma_px: float) -> Frame:
+def white_glared(frame: PatternFrame, sigma_px: float) -> PatternFrame:
     """A reflection on the white cell, which lies near the image's centre."""
     return frame.damaged(glare=(Glare((319.5, 239.5), sigma_px),))
 
 
 PRINTED = ("red", "green", "blue")
 
-MISSING = grouped(
+MISSING_KINDS = group_kinds(
     "missing",
-    Kind("cells missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), lambda f, s: f.damaged(missing_share=s)),
-    Kind("clusters missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), clusters),
-    Kind("one hole", "1", (0.05, 0.1, 0.2, 0.3), one_hole),
-    Kind("a layer missing", "layer", (2, 3, 5, 8, 11), layer_missing),
-    Kind("outer layers missing", "layers", (1, 2, 4), outer_missing),
-    Kind("a sector missing", "deg", (20, 45, 90, 180), sector_missing),
-    Kind("cells around the white one missing", "cells", (1, 2, 3, 6), around_white),
-    Kind("one ink missing", "1", (0.1, 0.25, 0.5), one_ink_missing),
-    Kind("missing, bulged", "1", (0.02, 0.05, 0.1), lambda f, s: bulged(f.damaged(missing_share=s))),
-    Kind(
+    ConditionKind(
+        "cells missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), lambda f, s: f.damaged(missing_share=s)
+    ),
+    ConditionKind("clusters missing", "1", (0.01, 0.02, 0.05, 0.1, 0.2), missing_cell_clusters),
+    ConditionKind("one hole", "1", (0.05, 0.1, 0.2, 0.3), missing_hole),
+    ConditionKind("a layer missing", "layer", (2, 3, 5, 8, 11), layer_missing),
+    ConditionKind("outer layers missing", "layers", (1, 2, 4), outer_layers_missing),
+    ConditionKind("a sector missing", "deg", (20, 45, 90, 180), sector_missing),
+    ConditionKind("cells around the white one missing", "cells", (1, 2, 3, 6), white_neighbours_missing),
+    ConditionKind("one ink missing", "1", (0.1, 0.25, 0.5), one_ink_missing),
+    ConditionKind(
+        "missing, bulged", "1", (0.02, 0.05, 0.1), lambda f, s: with_bulge(f.damaged(missing_share=s))
+    ),
+    ConditionKind(
         "missing, tilted", "1", (0.02, 0.05, 0.1), lambda f, s: f.damaged(missing_share=s).seen(tilt_deg=40)
     ),
 )
 
-DIRTY = grouped(
+DIRT_KINDS = group_kinds(
     "dirt",
-    Kind("one blob", "pitch", (0.5, 1, 2, 3), lambda f, s: blobs(f, 1, s)),
-    Kind("many blobs", "", (4, 8, 16), lambda f, s: blobs(f, int(s), 0.6)),
-    Kind("red blobs", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.7, INKS["red"])),
-    Kind("white blobs", "", (1, 3, 8), lambda f, s: blobs(f, int(s), 0.45, INKS["white"])),
-    Kind("black blobs", "", (2, 4, 8), lambda f, s: blobs(f, int(s), 0.8, INKS["black"])),
-    Kind("a scratch", "pitch", (0.1, 0.3, 0.6, 1, 1.5), lambda f, s: scratches(f, 1, s)),
-    Kind("a black scratch", "pitch", (0.3, 0.6, 1), lambda f, s: scratches(f, 1, s, INKS["black"])),
-    Kind("a white scratch", "pitch", (0.1, 0.3, 0.6), lambda f, s: scratches(f, 1, s, INKS["white"])),
-    Kind("scratches", "", (2, 3, 5), lambda f, s: scratches(f, int(s), 0.3)),
-    Kind(
-        "a scratch beside the white cell", "pitch", (0.2, 0.5, 1), lambda f, s: scratches(f, 1, s, aside=0.9)
+    ConditionKind("one blob", "pitch", (0.5, 1, 2, 3), lambda f, s: with_blobs(f, 1, s)),
+    ConditionKind("many blobs", "", (4, 8, 16), lambda f, s: with_blobs(f, int(s), 0.6)),
+    ConditionKind("red blobs", "", (2, 4, 8), lambda f, s: with_blobs(f, int(s), 0.7, INKS["red"])),
+    ConditionKind("white blobs", "", (1, 3, 8), lambda f, s: with_blobs(f, int(s), 0.45, INKS["white"])),
+    ConditionKind("black blobs", "", (2, 4, 8), lambda f, s: with_blobs(f, int(s), 0.8, INKS["black"])),
+    ConditionKind("a scratch", "pitch", (0.1, 0.3, 0.6, 1, 1.5), lambda f, s: with_scratches(f, 1, s)),
+    ConditionKind(
+        "a black scratch", "pitch", (0.3, 0.6, 1), lambda f, s: with_scratches(f, 1, s, INKS["black"])
     ),
-    Kind("glare", "px", (10, 20, 40, 60), lambda f, s: glare(f, 1, s, 1.6 * s + 30)),
-    Kind("many glares", "", (2, 4, 8), lambda f, s: glare(f, int(s), 12, 60)),
-    Kind("bleeding inks", "pitch", (0.02, 0.05, 0.1), lambda f, s: f.damaged(bleed_mm=s)),
+    ConditionKind(
+        "a white scratch", "pitch", (0.1, 0.3, 0.6), lambda f, s: with_scratches(f, 1, s, INKS["white"])
+    ),
+    ConditionKind("scratches", "", (2, 3, 5), lambda f, s: with_scratches(f, int(s), 0.3)),
+    ConditionKind(
+        "a scratch beside the white cell",
+        "pitch",
+        (0.2, 0.5, 1),
+        lambda f, s: with_scratches(f, 1, s, aside=0.9),
+    ),
+    ConditionKind("glare", "px", (10, 20, 40, 60), lambda f, s: with_glare(f, 1, s, 1.6 * s + 30)),
+    ConditionKind("many glares", "", (2, 4, 8), lambda f, s: with_glare(f, int(s), 12, 60)),
+    ConditionKind("bleeding inks", "pitch", (0.02, 0.05, 0.1), lambda f, s: f.damaged(bleed_mm=s)),
 )
 
-NO_WHITE = grouped(
+NO_WHITE_KINDS = group_kinds(
     "no white",
-    Kind("white cell missing", "", (0,), lambda f, s: white_missing(f), False, 3),
-    Kind("white cell in another ink", "", (0, 1, 2), lambda f, s: white_as(f, PRINTED[int(s)]), False),
-    Kind("white cell under dirt", "pitch", (0.3, 0.6, 1.2), lambda f, s: white_covered(f, DIRT, s), False),
-    Kind("white cell in glare", "px", (8, 16, 32), white_glared, False),
-    Kind("white cell missing, white blob", "pitch", (0.3, 0.45, 0.6), white_elsewhere, False, 3),
+    ConditionKind("white cell missing", "", (0,), lambda f, s: white_missing(f), False, 3),
+    ConditionKind(
+        "white cell in another ink", "", (0, 1, 2), lambda f, s: white_in_ink(f, PRINTED[int(s)]), False
+    ),
+    ConditionKind(
+        "white cell under dirt", "pitch", (0.3, 0.6, 1.2), lambda f, s: white_covered(f, DIRT, s), False
+    ),
+    ConditionKind("white cell in glare", "px", (8, 16, 32), white_glared, False),
+    ConditionKind("white cell missing, white blob", "pitch", (0.3, 0.45, 0.6), white_elsewhere, False, 3),
 )

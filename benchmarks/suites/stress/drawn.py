@@ -7,59 +7,69 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.suites.stress.damage import clusters, places
-from benchmarks.suites.stress.frames import RGB, Frame
-from benchmarks.suites.stress.kinds import Change, Kind, grouped
+from benchmarks.suites.stress.damage import missing_cell_clusters, sample_places
+from benchmarks.suites.stress.frames import RGB, PatternFrame
+from benchmarks.suites.stress.kinds import ConditionKind, FrameChange, group_kinds
 from cmpdesign.scene import Blob, Glare, Light, Press, Scratch, Shear, Twist, colored_leds
 from cmpdesign.scene.parts.surface import Deformation
 
 Rng = np.random.Generator
-Parts = dict[str, Any]  # fields of a Damage
-Draw = Callable[[Frame, Rng], Parts]
+DamageFields = dict[str, Any]  # fields of a Damage
+DamageSampler = Callable[[PatternFrame, Rng], DamageFields]
 
 
-def color(rng: Rng) -> RGB:
+def sample_color(rng: Rng) -> RGB:
     red, green, blue = rng.uniform(0, 230, 3).tolist()
     return red, green, blue
 
 
-def long_scratches(frame: Frame, rng: Rng) -> Parts:
+def sample_long_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Bands across the whole pattern, each of its own width, some over the white cell."""
     reach, bands = max(frame.layout.size_mm), []
     for turn in rng.uniform(0, 2 * np.pi, rng.integers(1, 7)):
         along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
         middle = normal * rng.uniform(0.5, 7)
-        bands.append(_band(middle - reach * along, middle + reach * along, rng.uniform(0.1, 1.4), color(rng)))
+        bands.append(
+            _make_scratch(
+                middle - reach * along, middle + reach * along, rng.uniform(0.1, 1.4), sample_color(rng)
+            )
+        )
     return {"scratches": tuple(bands)}
 
 
-def short_scratches(frame: Frame, rng: Rng) -> Parts:
+def sample_short_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Many thin ones of all lengths, which leave fragments of cells."""
-    common, bands = color(rng), []
+    common, bands = sample_color(rng), []
     own_colors = rng.random() < 0.5
-    for start in places(frame, int(rng.integers(5, 40)), 0.5):
+    for start in sample_places(frame, int(rng.integers(5, 40)), 0.5):
         turn, length = rng.uniform(0, 2 * np.pi), rng.uniform(1, 8)
         end = start + length * np.array([np.cos(turn), np.sin(turn)])
-        bands.append(_band(start, end, rng.uniform(0.1, 0.6), color(rng) if own_colors else common))
+        bands.append(
+            _make_scratch(start, end, rng.uniform(0.1, 0.6), sample_color(rng) if own_colors else common)
+        )
     return {"scratches": tuple(bands)}
 
 
-def _band(start: Any, end: Any, width_mm: float, rgb: RGB) -> Scratch:
+def _make_scratch(start: Any, end: Any, width_mm: float, rgb: RGB) -> Scratch:
     return Scratch((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), float(width_mm), rgb)
 
 
-def spots(frame: Frame, rng: Rng) -> Parts:
+def sample_blobs(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Drops of one color or of many."""
-    common, own_colors, largest = color(rng), rng.random() < 0.5, rng.uniform(0.3, 1.6)
+    common, own_colors, largest = sample_color(rng), rng.random() < 0.5, rng.uniform(0.3, 1.6)
     return {
         "blobs": tuple(
-            Blob((float(x), float(y)), float(rng.uniform(0.2, largest)), color(rng) if own_colors else common)
-            for x, y in places(frame, int(rng.integers(2, 25)), 0.8)
+            Blob(
+                (float(x), float(y)),
+                float(rng.uniform(0.2, largest)),
+                sample_color(rng) if own_colors else common,
+            )
+            for x, y in sample_places(frame, int(rng.integers(2, 25)), 0.8)
         )
     }
 
 
-def reflections(frame: Frame, rng: Rng) -> Parts:
+def sample_glare(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Anywhere on the pattern, small and sharp or wide and faint."""
     width, height = frame.size
     return {
@@ -72,51 +82,51 @@ def reflections(frame: Frame, rng: Rng) -> Parts:
     }
 
 
-def missing(frame: Frame, rng: Rng) -> Parts:
+def sample_missing_cells(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Cells here and there."""
     return {"missing_share": float(rng.uniform(0.05, 0.4))}
 
 
-def missing_clusters(frame: Frame, rng: Rng) -> Parts:
+def sample_missing_clusters(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Groups of neighbours."""
-    damage = clusters(frame, float(rng.uniform(0.05, 0.4))).scene.damage
+    damage = missing_cell_clusters(frame, float(rng.uniform(0.05, 0.4))).scene.damage
     assert damage is not None
     return {"missing_cells": damage.missing_cells}
 
 
-def bleeding(frame: Frame, rng: Rng) -> Parts:
+def sample_bleeding(frame: PatternFrame, rng: Rng) -> DamageFields:
     return {"bleed_mm": float(rng.uniform(0.02, 0.12))}
 
 
-def several(frame: Frame, rng: Rng) -> Parts:
+def sample_combined(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Two or three of the others."""
-    chosen = rng.choice(len(SINGLE), rng.integers(2, 4), replace=False)
-    parts: Parts = {}
+    chosen = rng.choice(len(SINGLE_SAMPLERS), rng.integers(2, 4), replace=False)
+    parts: DamageFields = {}
     for number in chosen:
-        for name, value in SINGLE[number](frame, rng).items():
+        for name, value in SINGLE_SAMPLERS[number](frame, rng).items():
             parts[name] = parts[name] + value if isinstance(parts.get(name), tuple) else value
     return parts
 
 
-SINGLE: tuple[Draw, ...] = (
-    long_scratches,
-    short_scratches,
-    spots,
-    reflections,
-    missing,
-    missing_clusters,
-    bleeding,
+SINGLE_SAMPLERS: tuple[DamageSampler, ...] = (
+    sample_long_scratches,
+    sample_short_scratches,
+    sample_blobs,
+    sample_glare,
+    sample_missing_cells,
+    sample_missing_clusters,
+    sample_bleeding,
 )
 
 
-def formed(frame: Frame, rng: Rng) -> Frame:
+def sample_deformed(frame: PatternFrame, rng: Rng) -> PatternFrame:
     """None, one or two of press, twist and shear; tilted or not."""
     if rng.random() < 0.35:
         frame = frame.seen(tilt_deg=float(rng.uniform(5, 55)), tilt_axis_deg=float(rng.uniform(0, 180)))
-    return frame.formed(*_deformations(rng))
+    return frame.formed(*_sample_deformations(rng))
 
 
-def _deformations(rng: Rng) -> Iterator[Deformation]:
+def _sample_deformations(rng: Rng) -> Iterator[Deformation]:
     def centre(reach_mm: float) -> tuple[float, float]:
         x, y = rng.uniform(-reach_mm, reach_mm, 2).tolist()
         return x, y
@@ -134,7 +144,7 @@ def _deformations(rng: Rng) -> Iterator[Deformation]:
         yield Shear(4.0, (float(size * np.cos(turn)), float(size * np.sin(turn))), centre(2))
 
 
-def lit(frame: Frame, rng: Rng) -> Frame:
+def sample_light(frame: PatternFrame, rng: Rng) -> PatternFrame:
     """As it is, by colored LEDs, from aside, darker at the rim, or in another color."""
     choice = rng.integers(6)
     if choice == 0:
@@ -147,27 +157,27 @@ def lit(frame: Frame, rng: Rng) -> Frame:
     return frame
 
 
-def _change(draw: Draw) -> Change:
-    def change(frame: Frame, _: float) -> Frame:
+def _make_change(draw: DamageSampler) -> FrameChange:
+    def change(frame: PatternFrame, _: float) -> PatternFrame:
         rng = np.random.default_rng([frame.scene.seed, 91])
-        return lit(formed(frame, rng), rng).damaged(**draw(frame, rng))
+        return sample_light(sample_deformed(frame, rng), rng).damaged(**draw(frame, rng))
 
     return change
 
 
 # What may be hidden here is the white cell, too: no share is promised.
-DRAWN = grouped(
+RANDOM_KINDS = group_kinds(
     "drawn at random",
     *(
-        Kind(f"random {name}", "", (0,), _change(draw), promised=False)
+        ConditionKind(f"random {name}", "", (0,), _make_change(draw), promised=False)
         for name, draw in (
-            ("scratches", long_scratches),
-            ("fragments", short_scratches),
-            ("blobs", spots),
-            ("glare", reflections),
-            ("cells missing", missing),
-            ("clusters missing", missing_clusters),
-            ("damage", several),
+            ("scratches", sample_long_scratches),
+            ("fragments", sample_short_scratches),
+            ("blobs", sample_blobs),
+            ("glare", sample_glare),
+            ("cells missing", sample_missing_cells),
+            ("clusters missing", sample_missing_clusters),
+            ("damage", sample_combined),
         )
     ),
 )

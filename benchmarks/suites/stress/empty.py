@@ -10,17 +10,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.stress.frames import Empty, Frame, Size, layout_of
-from benchmarks.suites.stress.kinds import Kind, grouped
+from benchmarks.suites.stress.frames import EmptyFrame, PatternFrame, Size, cached_layout
+from benchmarks.suites.stress.kinds import ConditionKind, group_kinds
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
 from cmpdesign.scene import Busy, Plain, Sensor, render, standard_scene
 
 Pixels = NDArray[np.float32]
-Draw = Callable[[np.random.Generator, Size], Pixels]
+ImageSampler = Callable[[np.random.Generator, Size], Pixels]
 
 
-def noise(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:
+def noise_image(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:
     """Colored noise of a grain."""
     grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
     if sigma_px:
@@ -28,52 +28,52 @@ def noise(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:
     return np.asarray(127 + 70 * grain / grain.std(), dtype=np.float32)
 
 
-def one_color(rng: np.random.Generator, size: Size, sigma: float) -> Pixels:
+def uniform_image(rng: np.random.Generator, size: Size, sigma: float) -> Pixels:
     """One color, with the sensor's noise."""
     grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
     return np.asarray(rng.uniform(0, 255, 3) + sigma * grain, dtype=np.float32)
 
 
-def clutter(rng: np.random.Generator, size: Size, shapes: float, *, triangles: bool) -> Pixels:
+def clutter_image(rng: np.random.Generator, size: Size, shapes: float, *, triangles: bool) -> Pixels:
     planes = Busy(int(shapes), triangles).planes(size, rng)
     return np.asarray(cv2.GaussianBlur(planes.transpose(1, 2, 0), (0, 0), 0.8), dtype=np.float32)
 
 
-def photo_like(rng: np.random.Generator, size: Size, steps: float) -> Pixels:
+def photo_like_image(rng: np.random.Generator, size: Size, steps: float) -> Pixels:
     """Smooth areas with sharp rims, as in a photograph: quantised noise of two grains."""
-    coarse, fine = noise(rng, size, 30), noise(rng, size, 2)
+    coarse, fine = noise_image(rng, size, 30), noise_image(rng, size, 2)
     return np.asarray(np.round(coarse / (255 / steps)) * (255 / steps) + 0.2 * (fine - 127), dtype=np.float32)
 
 
-def checkerboard(rng: np.random.Generator, size: Size, pitch_px: float) -> Pixels:
+def checkerboard_image(rng: np.random.Generator, size: Size, pitch_px: float) -> Pixels:
     """Squares in red, green, blue, white and black, turned."""
     turn = rng.uniform(0, np.pi)
     y, x = np.mgrid[: size[1], : size[0]]
     u = np.floor((np.cos(turn) * x - np.sin(turn) * y) / pitch_px).astype(int)
     v = np.floor((np.sin(turn) * x + np.cos(turn) * y) / pitch_px).astype(int)
     color = rng.integers(0, 4, (512, 512))[u % 512, v % 512] + 1
-    palette = np.array(_inks(), dtype=np.float32)
+    palette = np.array(_ink_colors(), dtype=np.float32)
     image = palette[np.where((u + v) % 2 == 0, color, 0)]
     return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8), dtype=np.float32)
 
 
-def _inks() -> list[tuple[float, float, float]]:
-    inks = standard_scene(layout_of("honeycomb", 2)).inks
+def _ink_colors() -> list[tuple[float, float, float]]:
+    inks = standard_scene(cached_layout("honeycomb", 2)).inks
     return [inks[name][::-1] for name in ("black", "red", "green", "blue", "white")]
 
 
-def recolored(
+def recolored_pattern_image(
     rng: np.random.Generator, size: Size, pitch_px: float, recolor: Callable[..., Layout]
 ) -> Pixels:
     """A lattice of triangles as ours, in colors that are not."""
-    layout = recolor(layout_of("honeycomb", 11), rng)
+    layout = recolor(cached_layout("honeycomb", 11), rng)
     scene = standard_scene(layout, seed=int(rng.integers(1 << 30)))
     camera = replace(scene.camera, pitch_px=pitch_px, rotation_deg=float(rng.uniform(0, 360)))
     scene = replace(scene, camera=camera, sensor=Sensor(2), background=Plain(tuple(rng.uniform(0, 255, 3))))
     return np.asarray(render(scene, size=size).image, dtype=np.float32)
 
 
-def shuffled(layout: Layout, rng: np.random.Generator) -> Layout:
+def shuffle_colors(layout: Layout, rng: np.random.Generator) -> Layout:
     """The colored cells and the white one in random order."""
     color = layout.cell_color.copy()
     up = color != BLACK
@@ -81,25 +81,27 @@ def shuffled(layout: Layout, rng: np.random.Generator) -> Layout:
     return replace(layout, cell_color=color)
 
 
-def one_inked(layout: Layout, rng: np.random.Generator) -> Layout:
+def recolor_to_one_ink(layout: Layout, rng: np.random.Generator) -> Layout:
     """All colored cells alike, with the white one."""
     color = layout.cell_color.copy()
     color[(color != BLACK) & (color != WHITE)] = rng.integers(3)
     return replace(layout, cell_color=color)
 
 
-def _empty(draw: Callable[..., Pixels], **fixed: object) -> Callable[[Frame, float], Empty]:
+def _empty_change(
+    draw: Callable[..., Pixels], **fixed: object
+) -> Callable[[PatternFrame, float], EmptyFrame]:
     """A kind's change: the image is drawn from the frame's seed, small and standard in turn."""
 
-    def change(frame: Frame, step: float) -> Empty:
+    def change(frame: PatternFrame, step: float) -> EmptyFrame:
         seed = frame.scene.seed
         size = (320, 240) if seed % 2 else (640, 480)
-        return Empty(partial(_drawn, draw, step, fixed), size, seed)
+        return EmptyFrame(partial(_draw_image, draw, step, fixed), size, seed)
 
     return change
 
 
-def _drawn(
+def _draw_image(
     draw: Callable[..., Pixels], step: float, fixed: dict[str, object], rng: np.random.Generator, size: Size
 ) -> Pixels:
     return draw(rng, size, step, **fixed)
@@ -107,14 +109,46 @@ def _drawn(
 
 REPEATS = 12  # for each of the three patterns; 28 steps: more than 1,000 images
 
-EMPTY = grouped(
+EMPTY_KINDS = group_kinds(
     "nothing",
-    Kind("nothing: noise", "grain px", (0, 1, 3, 8), _empty(noise), False, REPEATS),
-    Kind("nothing: one color", "noise", (0, 2, 10), _empty(one_color), False, REPEATS),
-    Kind("nothing: clutter", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=False), False, REPEATS),
-    Kind("nothing: triangles", "shapes", (10, 50, 150, 400), _empty(clutter, triangles=True), False, REPEATS),
-    Kind("nothing: smooth areas", "levels", (2, 3, 4, 6), _empty(photo_like), False, REPEATS),
-    Kind("nothing: colored squares", "px", (8, 14, 24), _empty(checkerboard), False, REPEATS),
-    Kind("nothing: shuffled colors", "px", (10, 16, 24), _empty(recolored, recolor=shuffled), False, REPEATS),
-    Kind("nothing: one ink", "px", (10, 16, 24), _empty(recolored, recolor=one_inked), False, REPEATS),
+    ConditionKind("nothing: noise", "grain px", (0, 1, 3, 8), _empty_change(noise_image), False, REPEATS),
+    ConditionKind("nothing: one color", "noise", (0, 2, 10), _empty_change(uniform_image), False, REPEATS),
+    ConditionKind(
+        "nothing: clutter",
+        "shapes",
+        (10, 50, 150, 400),
+        _empty_change(clutter_image, triangles=False),
+        False,
+        REPEATS,
+    ),
+    ConditionKind(
+        "nothing: triangles",
+        "shapes",
+        (10, 50, 150, 400),
+        _empty_change(clutter_image, triangles=True),
+        False,
+        REPEATS,
+    ),
+    ConditionKind(
+        "nothing: smooth areas", "levels", (2, 3, 4, 6), _empty_change(photo_like_image), False, REPEATS
+    ),
+    ConditionKind(
+        "nothing: colored squares", "px", (8, 14, 24), _empty_change(checkerboard_image), False, REPEATS
+    ),
+    ConditionKind(
+        "nothing: shuffled colors",
+        "px",
+        (10, 16, 24),
+        _empty_change(recolored_pattern_image, recolor=shuffle_colors),
+        False,
+        REPEATS,
+    ),
+    ConditionKind(
+        "nothing: one ink",
+        "px",
+        (10, 16, 24),
+        _empty_change(recolored_pattern_image, recolor=recolor_to_one_ink),
+        False,
+        REPEATS,
+    ),
 )

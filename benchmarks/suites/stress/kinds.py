@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from benchmarks.suites.stress.frames import Empty, Frame, plain
+from benchmarks.suites.stress.frames import EmptyFrame, PatternFrame, plain_frame
 
-Change = Callable[[Frame, float], "Frame | Empty"]
+FrameChange = Callable[[PatternFrame, float], "PatternFrame | EmptyFrame"]
 
 
 @dataclass(frozen=True)
-class Kind:
+class ConditionKind:
     """One way to make reading harder, in graded steps.
 
     Attributes:
@@ -21,24 +21,24 @@ class Kind:
         change: from the plain frame and a step to the condition's frame.
         promised: False where a share of read markers can not be asked for (ambiguous, or no white cell).
         repeats: seeds for each pattern in a full run.
-        group: set by ``grouped``.
+        group: set by ``group_kinds``.
     """
 
     name: str
     unit: str
     steps: tuple[float, ...]
-    change: Change
+    change: FrameChange
     promised: bool = True
     repeats: int = 1
     group: str = ""
 
 
-def grouped(group: str, *kinds: Kind) -> tuple[Kind, ...]:
+def group_kinds(group: str, *kinds: ConditionKind) -> tuple[ConditionKind, ...]:
     return tuple(replace(kind, group=group) for kind in kinds)
 
 
 @dataclass(frozen=True)
-class Case:
+class StressCase:
     """One image of the suite: ``kind=step/pattern/seed``."""
 
     kind: str
@@ -55,5 +55,5 @@ class Case:
         return f"{self.condition}/{self.pattern}/{self.seed}"
 
 
-def frame_of(case: Case, kind: Kind) -> Frame | Empty:
-    return kind.change(plain(case.pattern, case.seed), case.step)
+def make_frame(case: StressCase, kind: ConditionKind) -> PatternFrame | EmptyFrame:
+    return kind.change(plain_frame(case.pattern, case.seed), case.step)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.products.registry import PRODUCTS, USUAL, chosen_products, make_products, product_folders
+from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products, make_products, product_folders
 
 if TYPE_CHECKING:
-    from cmpdesign.layout.report import Report
+    from cmpdesign.layout.report import DesignReport
 
 DesignArgument = Annotated[str, typer.Argument(metavar="DESIGN", help="A template's name or a TOML file.")]
 SetOption = Annotated[
@@ -31,7 +31,7 @@ def build(
     override: SetOption = None,
     only: Annotated[
         str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
-    ] = USUAL,
+    ] = USUAL_NAMES,
 ) -> None:
     """Write a design's files: SVG, layout file, preview and report, or what --only names.
 
@@ -40,29 +40,29 @@ def build(
     """
     from cmpdesign.design.design import load_design
     from cmpdesign.files.atomic import write_folder
-    from cmpdesign.files.earlier_files import LIST_NAME, remove, stale_files, with_lists
+    from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.layout.report import report
+    from cmpdesign.layout.report import design_report
 
     names = chosen_products(only)
-    parameters = load_design(design, overrides(override))
+    parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
-    figures = report(parameters, layout)
+    figures = design_report(parameters, layout)
     files, findings = make_products(names, parameters, layout, figures)
-    listed = with_lists(files, product_folders())
-    stale = stale_files(output, listed)
+    listed = files_with_lists(files, product_folders())
+    stale = find_stale_files(output, listed)
     for path in write_folder(output, listed):
         if path.name != LIST_NAME:
-            console().print(f"wrote {printable(path)}")
-    for path in remove(stale):
-        console().print(f"removed {printable(path)}, of an earlier build")
-    print_figures(figures)
+            console().print(f"wrote {printable_path(path)}")
+    for path in remove_files(stale):
+        console().print(f"removed {printable_path(path)}, of an earlier build")
+    print_report(figures)
     for finding in (*figures.findings, *findings):
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
 
 
-def overrides(texts: list[str] | None) -> dict[str, str]:
+def parse_overrides(texts: list[str] | None) -> dict[str, str]:
     """``--set`` as name -> text; raises ``CmpDesignError`` where a text has no name or no "="."""
     found: dict[str, str] = {}
     for text in texts or []:
@@ -73,7 +73,7 @@ def overrides(texts: list[str] | None) -> dict[str, str]:
     return found
 
 
-def print_figures(figures: Report) -> None:
+def print_report(figures: DesignReport) -> None:
     from rich.table import Table
 
     cells = ", ".join(f"{count} {color}" for color, count in figures.cells.items() if count)

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cmpdesign.cli.commands.build import DesignArgument, SetOption, overrides
+from cmpdesign.cli.commands.build import DesignArgument, SetOption, parse_overrides
 from cmpdesign.cli.terminal import console
 from cmpdesign.errors import CmpDesignError
 
-NOT_PASSED = 1
+EXIT_NOT_PASSED = 1
 
 
 def check(
@@ -27,7 +27,7 @@ def check(
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.checks import check_design
 
-    findings = check_design(load_design(design, overrides(override)), camera_px=_pixels(camera))
+    findings = check_design(load_design(design, parse_overrides(override)), camera_px=_parse_pixels(camera))
     if not findings:
         console().print("nothing to report: it can be made and read")
         return
@@ -39,10 +39,10 @@ def check(
         table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
     console().print(table, soft_wrap=False)
     if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(NOT_PASSED)
+        raise typer.Exit(EXIT_NOT_PASSED)
 
 
-def _pixels(text: str) -> tuple[int, int]:
+def _parse_pixels(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"([1-9]\d{1,4})x([1-9]\d{1,4})", text)
     if not match:
         raise CmpDesignError(f"--camera {text}: expected WIDTHxHEIGHT in pixels, as in 640x480")

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from cmpdesign.evaluate.designs import Entry
+    from cmpdesign.evaluate.designs import DesignEntry
 
-INTERRUPTED = 130
+EXIT_INTERRUPTED = 130
 PRESETS = ("fast", "balanced", "accurate")
 
 app = typer.Typer(
@@ -48,11 +48,12 @@ def precision(
     preset: Preset = "balanced",
 ) -> None:
     """Five pressed objects against the truth, and the edge fitting error of a cube."""
-    document = _run("precision", output, trials, seed, workers, sensor, preset)
+    document = _run_experiment("precision", output, trials, seed, workers, sensor, preset)
     for mode, one in document["edge_fit_error_mm"].items():
         console().print(
-            f"edge fitting error, {mode}: square {_text(one['square'])} mm, multicolor {_text(one['multicolor'])} mm "
-            f"({_percent(one['change_percent'])}; the article {_percent(one['article_change_percent'])})"
+            f"edge fitting error, {mode}: square {_format_number(one['square'])} mm, multicolor "
+            f"{_format_number(one['multicolor'])} mm "
+            f"({_format_percent(one['change_percent'])}; the article {_format_percent(one['article_change_percent'])})"
         )
 
 
@@ -66,11 +67,11 @@ def response(
     preset: Preset = "balanced",
 ) -> None:
     """How much of a shear the markers under a cube show."""
-    document = _run("response", output, trials, seed, workers, sensor, preset)
+    document = _run_experiment("response", output, trials, seed, workers, sensor, preset)
     for case, one in document["response"].items():
         console().print(
-            f"response, {case}: square {_text(one['square'])}, multicolor {_text(one['multicolor'])} "
-            f"({_percent(one['change_percent'])}; the article {_percent(one['article_change_percent'])})"
+            f"response, {case}: square {_format_number(one['square'])}, multicolor {_format_number(one['multicolor'])} "
+            f"({_format_percent(one['change_percent'])}; the article {_format_percent(one['article_change_percent'])})"
         )
 
 
@@ -84,7 +85,7 @@ def reliability(
     preset: Preset = "balanced",
 ) -> None:
     """How often both patterns are read under a ball that presses, then twists or shears."""
-    document = _run("reliability", output, trials, seed, workers, sensor, preset)
+    document = _run_experiment("reliability", output, trials, seed, workers, sensor, preset)
     for mode, methods in document["modes"].items():
         counts = ", ".join(f"{name} {one['successful']}" for name, one in methods.items())
         console().print(f"{mode}, of {trials}: {counts}")
@@ -93,12 +94,13 @@ def reliability(
 @app.command()
 def angles(output: Output, workers: Workers = None) -> None:
     """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
-    document = _run("angles", output, 1, 0, workers, "tac3d", "balanced")
+    document = _run_experiment("angles", output, 1, 0, workers, "tac3d", "balanced")
     for name, one in document["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
             console().print(
-                f"{name}, {what}: formula {limit['formula']:.1f}, first lost {_text(limit['measured'][largest], 1)} "
+                f"{name}, {what}: formula {limit['formula']:.1f}, first lost "
+                f"{_format_number(limit['measured'][largest], 1)} "
                 f"at {largest}"
             )
 
@@ -114,29 +116,31 @@ def designs(
     preset: Preset = "balanced",
 ) -> None:
     """Score any designs on one sensor: error, share measured, smallest feature, laser time."""
-    document = _run("designs", output, trials, seed, workers, sensor, preset, _entries(design))
+    document = _run_experiment(
+        "designs", output, trials, seed, workers, sensor, preset, _design_entries(design)
+    )
     for name, one in document["designs"].items():
         error = one["surface_rms_mm"]["mean"]
         shown = "nothing read" if error is None else f"surface {1000 * error:.1f} um RMS"
         console().print(
-            f"{printable(name)}: {shown}, {100 * one['measured']['mean']:.1f} % measured, "
-            f"smallest feature {one['smallest_feature_mm']:.3f} mm, laser {_text(one['laser_time_s'], 0)} s"
+            f"{printable_path(name)}: {shown}, {100 * one['measured']['mean']:.1f} % measured, "
+            f"smallest feature {one['smallest_feature_mm']:.3f} mm, laser {_format_number(one['laser_time_s'], 0)} s"
         )
 
 
-def _entries(designs: Sequence[str]) -> list[Entry]:
+def _design_entries(designs: Sequence[str]) -> list[DesignEntry]:
     """The designs by the names that tell them apart."""
     from cmpdesign.design.design import load_design
-    from cmpdesign.evaluate.designs import entries
+    from cmpdesign.evaluate.designs import design_entries
 
     names = [Path(name).stem for name in designs]
     for name in names:
         if names.count(name) > 1:
             raise CmpDesignError(f"two designs are called {name!r}; rename one of the files")
-    return entries({name: load_design(given) for name, given in zip(names, designs, strict=True)})
+    return design_entries({name: load_design(given) for name, given in zip(names, designs, strict=True)})
 
 
-def _run(
+def _run_experiment(
     name: str,
     output: Path,
     trials: int,
@@ -144,28 +148,28 @@ def _run(
     workers: int | None,
     sensor: str,
     preset: str,
-    designs: Sequence[Entry] = (),
+    designs: Sequence[DesignEntry] = (),
 ) -> Mapping[str, Any]:
-    from cmpdesign.evaluate.experiments import evaluate, experiment
-    from cmpdesign.evaluate.runner import Options
+    from cmpdesign.evaluate.experiments import find_experiment, run_experiment
+    from cmpdesign.evaluate.runner import RunOptions
     from cmpdesign.evaluate.simulated.sensor import load_sensor
 
     if preset not in PRESETS:
         raise CmpDesignError(f"--preset {preset}: unknown; there are {', '.join(PRESETS)}")
-    options = Options(trials, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
+    options = RunOptions(trials, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
     try:
-        document, files = evaluate(experiment(name, designs), options, output)
+        document, files = run_experiment(find_experiment(name, designs), options, output)
     except KeyboardInterrupt:
         print_warning("interrupted; the same command goes on where it stopped")
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     for path in files:
-        console().print(f"wrote {printable(path)}")
+        console().print(f"wrote {printable_path(path)}")
     return document
 
 
-def _text(value: float | None, digits: int = 3) -> str:
+def _format_number(value: float | None, digits: int = 3) -> str:
     return "none" if value is None else f"{value:.{digits}f}"
 
 
-def _percent(value: float | None) -> str:
+def _format_percent(value: float | None) -> str:
     return "none" if value is None else f"{value:+.1f} %"

@@ -11,7 +11,7 @@ import typer
 from cmpdesign.cli.terminal import console
 
 if TYPE_CHECKING:
-    from cmpdesign.products.laser.coupon.photo import PatchKerf, Reading
+    from cmpdesign.products.laser.coupon.photo import CouponReading, PatchKerf
 
 
 def kerf(
@@ -32,15 +32,15 @@ def kerf(
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
     if as_json:
-        print(json.dumps(_document(reading), indent=2))
+        print(json.dumps(_reading_to_json(reading), indent=2))
         return
-    _table(reading)
+    _print_kerf_table(reading)
     console().print(f"\nfor the file of {piece.material}, the settings of {piece.machine}:")
     for one in reading.patches:
-        console().print(_lines(one, photo.name))
+        console().print(_material_file_lines(one, photo.name))
 
 
-def _table(reading: Reading) -> None:
+def _print_kerf_table(reading: CouponReading) -> None:
     from rich.table import Table
 
     side = "back" if reading.from_back else "front"
@@ -58,7 +58,7 @@ def _table(reading: Reading) -> None:
     console().print(table)
 
 
-def _lines(one: PatchKerf, photo: str) -> str:
+def _material_file_lines(one: PatchKerf, photo: str) -> str:
     """The material file's lines of one patch."""
     patch = one.patch
     lines = [f"# {patch.name}: {patch.power_percent:g} %, {patch.speed_mm_s:g} mm/s, {patch.passes} times"]
@@ -68,7 +68,7 @@ def _lines(one: PatchKerf, photo: str) -> str:
     return "\n".join(lines)
 
 
-def _document(reading: Reading) -> dict[str, object]:
+def _reading_to_json(reading: CouponReading) -> dict[str, object]:
     return {
         "format": "cmp-kerf",
         "version": 1,

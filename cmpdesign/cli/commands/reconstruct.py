@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.running import finish, go, require_positive
-from cmpdesign.cli.terminal import console, printable
+from cmpdesign.cli.running import exit_with_status, require_positive, run_with_progress
+from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
-    from cmpdesign.tracking.run import Run
+    from cmpdesign.tracking.run import TrackingRun
 
 
 def reconstruct(
@@ -57,27 +57,27 @@ def reconstruct(
 ) -> None:
     """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
     if recover:
-        from cmpdesign.tracking.sinks import recover as recover_file
+        from cmpdesign.tracking.sinks import recover_table as recover_file
 
-        console().print(f"wrote {printable(output)}: {recover_file(output)} frames recovered")
+        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
         return
     require_positive("--fps", fps)
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
-    run = _prepared(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
+    run = _prepare_run(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
     run.limit = frames
     try:
-        go(run, "reconstructing")
+        run_with_progress(run, "reconstructing")
     except OutputError:  # what could be done is told all the same
         with suppress(OutputError):
-            _report(run, source, output)
+            _write_summary(run, source, output)
         raise
-    _report(run, source, output)
-    finish(run)
+    _write_summary(run, source, output)
+    exit_with_status(run)
 
 
-def _prepared(
+def _prepare_run(
     layout: Path,
     rig: Path,
     rest: str,
@@ -88,10 +88,10 @@ def _prepared(
     model_px: float | None,
     fps: float | None,
     cold: bool,
-) -> Run:
+) -> TrackingRun:
     """Everything that can be refused is refused here, before a file is made."""
-    from cmpdesign.tracking.run import Run
-    from cmpdesign.tracking.shape_summary import ShapeTally
+    from cmpdesign.tracking.run import TrackingRun
+    from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
     from cmpdesign.tracking.sinks import open_sink
     from cmpdesign.tracking.sources import open_sources
@@ -99,18 +99,18 @@ def _prepared(
 
     known = load_rig(rig)
     views = ViewExtractor(load_layout(layout), known.without_poses() if from_rest else known, "accurate")
-    at_rest = views.extract(_at_rest(rest, source, fps))
+    at_rest = views.extract(_read_rest_image(rest, source, fps))
     reconstructor = Reconstructor(
         views.layout, views.rig, at_rest, flatness_mm=(0.0, 0.0, flatness_mm), model_px=model_px
     )
     sink = open_sink(output, ShapeTable(reconstructor))
     tracker = ShapeTracker(reconstructor, warm=not cold)
-    return Run(open_sources(source, fps), tracker, sink, ShapeTally(reconstructor))
+    return TrackingRun(open_sources(source, fps), tracker, sink, ShapeStatistics(reconstructor))
 
 
-def _at_rest(rest: str, source: str, fps: float | None) -> Any:
+def _read_rest_image(rest: str, source: str, fps: float | None) -> Any:
     """The picture at rest; a list of one for each view where there are several sources."""
-    from cmpdesign.tracking.run import rest_image
+    from cmpdesign.tracking.run import read_rest_image
     from cmpdesign.tracking.sources import split_list
 
     sources, rests = split_list(source), split_list(rest)
@@ -118,11 +118,11 @@ def _at_rest(rest: str, source: str, fps: float | None) -> Any:
         rests = rests * len(sources)
     if len(rests) != len(sources):
         raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
-    pictures = [rest_image(name, of, fps) for name, of in zip(rests, sources, strict=True)]
+    pictures = [read_rest_image(name, of, fps) for name, of in zip(rests, sources, strict=True)]
     return pictures if len(pictures) > 1 else pictures[0]
 
 
-def _report(run: Run, source: str, output: Path) -> None:
+def _write_summary(run: TrackingRun, source: str, output: Path) -> None:
     """The summary beside the table, and on the terminal; also after a failure."""
     if not run.tally.frames:
         return

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
-from cmpdesign.cli.terminal import console, printable
+from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError
 
 # Options that a scene file has names for.
-IN_TABLES = {
+SCENE_FILE_KEYS = {
     "pitch": "[camera] pitch_px",
     "rotation": "[camera] rotation_deg",
     "tilt": "[camera] tilt_deg",
@@ -26,7 +26,7 @@ IN_TABLES = {
 }
 
 
-def finite(option: typer.CallbackParam, value: float | None) -> float | None:
+def require_finite(option: typer.CallbackParam, value: float | None) -> float | None:
     """A number that is one: the parser takes "nan" and "inf" for numbers, too."""
     if value is not None and not math.isfinite(value):
         raise CmpDesignError(f"{option.opts[0]} is {value}; expected a finite number")
@@ -53,36 +53,47 @@ def render(
         Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")
     ] = None,
     size: Annotated[str, typer.Option(metavar="WxH", help="Image size in pixels.")] = "640x480",
-    pitch: Annotated[float, typer.Option(callback=finite, help="Pixels from marker to marker.")] = 20.0,
+    pitch: Annotated[
+        float, typer.Option(callback=require_finite, help="Pixels from marker to marker.")
+    ] = 20.0,
     rotation: Annotated[
-        float, typer.Option(callback=finite, help="Counter-clockwise turn in the image, degrees.")
+        float, typer.Option(callback=require_finite, help="Counter-clockwise turn in the image, degrees.")
     ] = 0.0,
-    tilt: Annotated[float, typer.Option(callback=finite, help="Tilt out of the image plane, degrees.")] = 0.0,
+    tilt: Annotated[
+        float, typer.Option(callback=require_finite, help="Tilt out of the image plane, degrees.")
+    ] = 0.0,
     tilt_axis: Annotated[
-        float, typer.Option(callback=finite, help="Direction of the tilt's axis, degrees.")
+        float, typer.Option(callback=require_finite, help="Direction of the tilt's axis, degrees.")
     ] = 0.0,
     mirrored: Annotated[
         bool | None,
         typer.Option("--mirrored/--front", help="See the back or the front. [default: as designed]"),
     ] = None,
     press: Annotated[
-        float, typer.Option(callback=finite, help="How far a press at the centre moves the markers, mm.")
+        float,
+        typer.Option(callback=require_finite, help="How far a press at the centre moves the markers, mm."),
     ] = 0.0,
     press_radius: Annotated[
         float | None,
-        typer.Option(callback=finite, help="Radius of the press, mm. [default: a quarter of the pattern]"),
+        typer.Option(
+            callback=require_finite, help="Radius of the press, mm. [default: a quarter of the pattern]"
+        ),
     ] = None,
-    blur: Annotated[float, typer.Option(callback=finite, help="Gaussian blur, sigma in pixels.")] = 1.0,
-    noise: Annotated[float, typer.Option(callback=finite, help="Noise, standard deviation in 255ths.")] = 0.0,
+    blur: Annotated[
+        float, typer.Option(callback=require_finite, help="Gaussian blur, sigma in pixels.")
+    ] = 1.0,
+    noise: Annotated[
+        float, typer.Option(callback=require_finite, help="Noise, standard deviation in 255ths.")
+    ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
     """Render the pattern as a camera sees it: seeded, exact to a thousandth of a pixel."""
     if scene is not None:
-        from cmpdesign.cli.commands.render_scene import render_file
+        from cmpdesign.cli.commands.render_scene import render_scene_file
 
-        given = _given(ctx)
-        pixels = image_size(size) if "size" in given else None
-        render_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
+        given = _given_options(ctx)
+        pixels = parse_image_size(size) if "size" in given else None
+        render_scene_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
         return
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
@@ -90,7 +101,7 @@ def render(
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed, save_truth
     from cmpdesign.scene import render as render_scene
 
-    pixels = image_size(size)
+    pixels = parse_image_size(size)
     pattern = read_layout(layout)
     radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
     seen = Scene(
@@ -104,13 +115,15 @@ def render(
     rendered = render_scene(seen, size=pixels)
     if truth is not None:
         save_truth(rendered.truth, truth)
-        console().print(f"wrote {printable(truth)}")
+        console().print(f"wrote {printable_path(truth)}")
     write_file(output, to_png(rendered.image))
     visible = int(rendered.truth.visible.sum())
-    console().print(f"wrote {printable(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible")
+    console().print(
+        f"wrote {printable_path(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible"
+    )
 
 
-def _given(ctx: typer.Context) -> set[str]:
+def _given_options(ctx: typer.Context) -> set[str]:
     """The options that stand on the command line; beside a scene file only those that a file does not have.
 
     Raises:
@@ -118,13 +131,15 @@ def _given(ctx: typer.Context) -> set[str]:
     """
     sources = {name: ctx.get_parameter_source(name) for name in ctx.params}
     given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-    for name in sorted(given & IN_TABLES.keys()):
+    for name in sorted(given & SCENE_FILE_KEYS.keys()):
         option = "--front or --mirrored" if name == "mirrored" else f"--{name.replace('_', '-')}"
-        raise CmpDesignError(f"{option} has no place beside --scene; write {IN_TABLES[name]} into the file")
+        raise CmpDesignError(
+            f"{option} has no place beside --scene; write {SCENE_FILE_KEYS[name]} into the file"
+        )
     return given
 
 
-def image_size(text: str) -> tuple[int, int]:
+def parse_image_size(text: str) -> tuple[int, int]:
     """Width and height from "640x480"; raises ``CmpDesignError``."""
     match = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
     if not match:

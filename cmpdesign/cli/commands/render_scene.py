@@ -7,17 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from cmpdesign.scene.files.scene_file import SceneFile
     from cmpdesign.scene.truth import Truth
 
-PICTURE = ".png"
+IMAGE_SUFFIX = ".png"
 
 
-def render_file(
+def render_scene_file(
     layout: Path,
     scene: Path,
     output: Path,
@@ -36,37 +36,41 @@ def render_file(
 
     file = load_scene(find_scene(scene), read_layout(layout), size_px=size, seed=seed)
     if file.fps is None:
-        _draw_one(file, output, truth)
+        _render_image(file, output, truth)
     else:
-        _draw_all(file, output, truth)
+        _render_sequence(file, output, truth)
 
 
-def _draw_one(file: SceneFile, output: Path, truth: Path | None) -> None:
+def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.scene import render, save_truth
 
-    if output.suffix != PICTURE:
-        raise CmpDesignError(f"{output}: unknown ending; expected {PICTURE} (the scene has no [sequence])")
+    if output.suffix != IMAGE_SUFFIX:
+        raise CmpDesignError(
+            f"{output}: unknown ending; expected {IMAGE_SUFFIX} (the scene has no [sequence])"
+        )
     rendered = render(file.scene(), size=file.size_px)
     for warning in rendered.warnings:
         print_warning(warning)
     if truth is not None:
         save_truth(rendered.truth, truth)
-        console().print(f"wrote {printable(truth)}")
+        console().print(f"wrote {printable_path(truth)}")
     write_file(output, to_png(rendered.image))
-    console().print(f"wrote {printable(output)}: {_size(file)}, {_visible(rendered.truth)}")
+    console().print(
+        f"wrote {printable_path(output)}: {_format_size(file)}, {_format_visible_count(rendered.truth)}"
+    )
 
 
-def _draw_all(file: SceneFile, output: Path, truth: Path | None) -> None:
+def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.scene import render, save_truths
-    from cmpdesign.scene.files.film import open_film
+    from cmpdesign.scene.files.film import open_frame_writer
 
-    film = open_film(output, file.fps or 1.0, file.size_px, file.bits)
+    film = open_frame_writer(output, file.fps or 1.0, file.size_px, file.bits)
     truths: list[Truth] = []
     warnings: dict[str, int] = {}
     try:
-        with _progress(file.frames) as advance:
+        with _progress_bar(file.frames) as advance:
             for scene in file.scenes():
                 rendered = render(scene, size=file.size_px)
                 film.add(rendered.image)
@@ -76,16 +80,18 @@ def _draw_all(file: SceneFile, output: Path, truth: Path | None) -> None:
                 advance()
         if truth is not None:
             save_truths(truths, [file.time_s(frame) for frame in range(file.frames)], truth)
-            console().print(f"wrote {printable(truth)}")
+            console().print(f"wrote {printable_path(truth)}")
         film.close()
     except BaseException:
         film.discard()
         raise
-    _warn(warnings, file)
-    console().print(f"wrote {printable(output)}: {file.frames} frames of {_size(file)} at {file.fps:g} fps")
+    _print_scene_warnings(warnings, file)
+    console().print(
+        f"wrote {printable_path(output)}: {file.frames} frames of {_format_size(file)} at {file.fps:g} fps"
+    )
 
 
-def _warn(warnings: dict[str, int], file: SceneFile) -> None:
+def _print_scene_warnings(warnings: dict[str, int], file: SceneFile) -> None:
     """The first frame that has each kind of warning, told by its words without numbers."""
     kinds: dict[str, str] = {}
     for text, frame in warnings.items():
@@ -95,18 +101,18 @@ def _warn(warnings: dict[str, int], file: SceneFile) -> None:
         print_warning(text)
 
 
-def _size(file: SceneFile) -> str:
+def _format_size(file: SceneFile) -> str:
     return f"{file.size_px[0]} x {file.size_px[1]} px"
 
 
-def _visible(truth: Truth) -> str:
+def _format_visible_count(truth: Truth) -> str:
     if truth.visible.ndim == 1:
         return f"{truth.visible.sum()} markers visible"
     return f"{' + '.join(str(n) for n in truth.visible.sum(axis=1))} markers visible in {len(truth.visible)} views"
 
 
 @contextmanager
-def _progress(total: int) -> Iterator[Callable[[], None]]:
+def _progress_bar(total: int) -> Iterator[Callable[[], None]]:
     """A bar on stderr where a terminal shows it."""
     terminal = console(stderr=True)
     if not terminal.is_terminal:

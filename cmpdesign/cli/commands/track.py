@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.running import finish, go, require_positive
-from cmpdesign.cli.terminal import console, print_warning, printable
+from cmpdesign.cli.running import exit_with_status, require_positive, run_with_progress
+from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
-    from cmpdesign.tracking.run import Run
+    from cmpdesign.tracking.run import TrackingRun
     from extractor.layout.reference import Reference
 
 
@@ -55,9 +55,9 @@ def track(
 ) -> None:
     """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
     if recover:
-        from cmpdesign.tracking.sinks import recover as recover_file
+        from cmpdesign.tracking.sinks import recover_table as recover_file
 
-        console().print(f"wrote {printable(output)}: {recover_file(output)} frames recovered")
+        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
         return
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
@@ -65,19 +65,19 @@ def track(
     from extractor import load_layout
 
     reference = load_layout(layout)
-    run = _prepared(reference, source, output, rest, mm_per_px, fps, overlay, cold)
+    run = _prepare_run(reference, source, output, rest, mm_per_px, fps, overlay, cold)
     run.limit = frames
     try:
-        go(run, "tracking")
+        run_with_progress(run, "tracking")
     except OutputError:  # no reason to keep from the user what could be tracked
         with suppress(OutputError):
-            _report(run, reference, source, output, quiver)
+            _write_summary(run, reference, source, output, quiver)
         raise
-    _report(run, reference, source, output, quiver)
-    finish(run)
+    _write_summary(run, reference, source, output, quiver)
+    exit_with_status(run)
 
 
-def _prepared(
+def _prepare_run(
     reference: Reference,
     source: str,
     output: Path,
@@ -86,24 +86,28 @@ def _prepared(
     fps: float | None,
     overlay: Path | None,
     cold: bool,
-) -> Run:
+) -> TrackingRun:
     """Everything that can be refused is refused here, before a file is made."""
-    from cmpdesign.tracking.overlay import Overlay
-    from cmpdesign.tracking.run import Run, rest_markers
+    from cmpdesign.tracking.overlay import OverlayWriter
+    from cmpdesign.tracking.run import TrackingRun, read_rest_markers
     from cmpdesign.tracking.sinks import open_sink
     from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
-    from cmpdesign.tracking.summary import Tally
+    from cmpdesign.tracking.summary import TrackStatistics
     from cmpdesign.tracking.table import TrackTable
     from extractor.track.tracker import Tracker
 
-    at_rest = None if rest is None else rest_markers(rest, source, reference, fps)
+    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps)
     tracker = Tracker(reference, rest=at_rest, mm_per_px=mm_per_px, warm=not cold)
     frames = open_source(source, fps)
-    video = None if overlay is None else Overlay(overlay, reference, frames.fps or DEFAULT_FPS)
-    return Run(frames, tracker, open_sink(output, TrackTable(tracker)), Tally(reference), video)
+    video = None if overlay is None else OverlayWriter(overlay, reference, frames.fps or DEFAULT_FPS)
+    return TrackingRun(
+        frames, tracker, open_sink(output, TrackTable(tracker)), TrackStatistics(reference), video
+    )
 
 
-def _report(run: Run, reference: Reference, source: str, output: Path, quiver: Path | None) -> None:
+def _write_summary(
+    run: TrackingRun, reference: Reference, source: str, output: Path, quiver: Path | None
+) -> None:
     """The summary beside the table, the plot, and both on the terminal; also after a failure."""
     if not run.tally.frames:
         return
@@ -119,7 +123,7 @@ def _report(run: Run, reference: Reference, source: str, output: Path, quiver: P
     if quiver is not None and farthest is not None and rest is not None:
         contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
     elif quiver is not None:
-        print_warning(f"{printable(quiver)} is not drawn: no frame has a displacement")
+        print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
     for path, content in contents.items():
         write_file(path, content)
 

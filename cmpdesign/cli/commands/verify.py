@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.terminal import BAD_INPUT, console, one_line, print_error, printable
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, console, error_on_one_line, print_error, printable_path
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from extractor import Extractor
     from extractor.layout.reference import Reference
 
-NOT_VERIFIED = 1
+EXIT_NOT_VERIFIED = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Outcome:
     @property
     def exit_code(self) -> int:
         if self.verdict is None:
-            return BAD_INPUT
-        return 0 if self.verdict.verified else NOT_VERIFIED
+            return EXIT_BAD_INPUT
+        return 0 if self.verdict.verified else EXIT_NOT_VERIFIED
 
     def to_json(self) -> dict[str, Any]:
         if self.verdict is None:
@@ -69,23 +69,25 @@ def verify(
     from extractor import Extractor, load_layout
 
     reference = load_layout(layout)
-    judge = _Judge(reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug)
-    names = _distinct([path.stem for path in images])
+    judge = _ImageVerifier(
+        reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug
+    )
+    names = _unique_names([path.stem for path in images])
     outcomes = [
-        judge.outcome(path, name) for path, name in _with_progress(list(zip(images, names, strict=True)))
+        judge.verify_image(path, name) for path, name in _with_progress(list(zip(images, names, strict=True)))
     ]
-    report = _report(reference, outcomes, min_share)
+    report = _outcomes_to_json(reference, outcomes, min_share)
     if output is not None:
         from cmpdesign.files.atomic import write_file
 
         write_file(output / "verify.json", report)
     # After the bar: while it stands, it redirects whatever is printed to its own stream.
-    sys.stdout.write(report if as_json else _lines(outcomes))
+    sys.stdout.write(report if as_json else _format_outcomes(outcomes))
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
 @dataclass(frozen=True, eq=False)
-class _Judge:
+class _ImageVerifier:
     """What pictures are judged by; the extractor is made when the first picture needs it."""
 
     reference: Reference
@@ -95,7 +97,7 @@ class _Judge:
     output: Path | None
     debug: Path | None
 
-    def outcome(self, path: Path, name: str) -> Outcome:
+    def verify_image(self, path: Path, name: str) -> Outcome:
         """An image that cannot be read is reported and does not keep the others from being processed."""
         from cmpdesign.files.images import ImageFileError, read_image
         from cmpdesign.products.sheet.verdict import judge_sheet
@@ -105,13 +107,13 @@ class _Judge:
             image = read_image(path)
         except ImageFileError as error:
             print_error(error)
-            return Outcome(printable(path), None, one_line(error))
+            return Outcome(printable_path(path), None, error_on_one_line(error))
         sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
         if sheet.is_sheet or self.sheet_dpi is not None:
-            return Outcome(printable(path), sheet, None)
+            return Outcome(printable_path(path), sheet, None)
         verdict = verify_image(self.extractor(), self.reference, image, self.min_share)
         _write_pictures(image, self.reference, verdict, name, self.output, self.debug)
-        return Outcome(printable(path), verdict, None)
+        return Outcome(printable_path(path), verdict, None)
 
 
 def _write_pictures(
@@ -132,12 +134,14 @@ def _write_pictures(
             write_file(debug / f"{name}.{number}-{stage}.png", to_png(picture))
 
 
-def _lines(outcomes: list[Outcome]) -> str:
+def _format_outcomes(outcomes: list[Outcome]) -> str:
     """A line for every image that was read; what could not be read has been reported on stderr."""
-    return "".join(f"{item.name}: {_line(item.verdict)}\n" for item in outcomes if item.verdict is not None)
+    return "".join(
+        f"{item.name}: {_format_verdict(item.verdict)}\n" for item in outcomes if item.verdict is not None
+    )
 
 
-def _line(verdict: Verdict | SheetVerdict) -> str:
+def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
     from cmpdesign.reading.verify import Verdict
 
     if not isinstance(verdict, Verdict):
@@ -148,7 +152,7 @@ def _line(verdict: Verdict | SheetVerdict) -> str:
     return f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
 
 
-def _report(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
+def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
     document = {
         "format": "cmp-verification",
         "version": 1,
@@ -161,7 +165,7 @@ def _report(reference: Reference, outcomes: list[Outcome], min_share: float) -> 
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def _distinct(stems: list[str]) -> list[str]:
+def _unique_names(stems: list[str]) -> list[str]:
     """Names for the written files: stems, numbered where several images share one."""
     names: list[str] = []
     for stem in stems:
@@ -178,10 +182,10 @@ def _with_progress(items: list[tuple[Path, str]]) -> Iterable[tuple[Path, str]]:
     terminal = console(stderr=True)
     if len(items) < 2 or not terminal.is_terminal:
         return items
-    return _tracked(items)
+    return _items_with_bar(items)
 
 
-def _tracked(items: list[tuple[Path, str]]) -> Iterator[tuple[Path, str]]:
+def _items_with_bar(items: list[tuple[Path, str]]) -> Iterator[tuple[Path, str]]:
     from rich.progress import track
 
     yield from track(items, description="verifying", console=console(stderr=True), transient=True)

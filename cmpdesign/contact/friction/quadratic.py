@@ -20,41 +20,41 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.friction.allowed import Allowed, Face
-from cmpdesign.contact.layer.operator import Operator
+from cmpdesign.contact.friction.allowed import ActiveSet, AdmissibleTractions
+from cmpdesign.contact.layer.operator import ComplianceOperator
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-MOST_ITERATIONS = 2000
+MAX_ITERATIONS = 2000
 # How far the gap pulls tractions when guessing what slips and lets go, over the largest eigenvalue. Guesses that do not
 # lead to a smaller gap within some steps are made with less, and the limit then stays until its problem is solved.
-PULL, LEAST_PULL, STALLED = 4.0, 1.0, 8
+ACTIVE_SET_GAIN, MIN_ACTIVE_SET_GAIN, MAX_STALLED_STEPS = 4.0, 1.0, 8
 # A step ends when the gap of what is free has shrunk to this, or after so many conjugate gradients.
-SHRUNK, MOST_DIRECTIONS = 0.1, 3
+STEP_GAP_REDUCTION, MAX_DIRECTIONS = 0.1, 3
 
 
-class Minimum(NamedTuple):
+class TractionSolution(NamedTuple):
     """Tractions, what they were allowed at last, applications of C, and the gap that is left in mm (RMS).
 
     The gap is above the tolerance only if the iteration did not converge.
     """
 
     traction_mpa: Array
-    allowed: Allowed
-    applied: int
-    left_mm: float
+    allowed: AdmissibleTractions
+    operator_applications: int
+    residual_gap_mm: float
 
 
 def minimise(
-    operator: Operator,
+    operator: ComplianceOperator,
     b: Array,
-    allowed: Allowed,
+    allowed: AdmissibleTractions,
     t: Array,
     *,
     tolerance_mm: float,
     steady: float = 0.0,
     checked: bool = True,
-) -> Minimum:
+) -> TractionSolution:
     """Tractions that leave no more than ``tolerance_mm`` of gap, as a root mean square over the loaded cells.
 
     Args:
@@ -64,56 +64,58 @@ def minimise(
         steady: the change of the limit that is taken for none.
         checked: with double precision, before it is handed out.
     """
-    largest = operator.largest(len(t))
+    largest = operator.eigenvalue_bound(len(t))
     t = allowed.project(t)
     gap, applied, exact = operator(t.astype(np.float32)) - b, 1, False
-    pull, patient = PULL, False
+    pull, patient = ACTIVE_SET_GAIN, False
     left, least, stalled = np.inf, np.inf, 0
     while True:
         change = allowed.change(t)
         if not patient or left <= tolerance_mm:
-            allowed, least = allowed.renewed(t), np.inf if patient else least
+            allowed, least = allowed.with_updated_limit(t), np.inf if patient else least
         face = allowed.face(t, t - pull / largest * gap)
-        if (face.base_mpa != t).any():
-            gap, exact = gap + operator((face.base_mpa - t).astype(np.float32)), False
+        if (face.projected_mpa != t).any():
+            gap, exact = gap + operator((face.projected_mpa - t).astype(np.float32)), False
             applied += 1
-            t = face.base_mpa
-        left = _left(allowed, t, gap, largest)
+            t = face.projected_mpa
+        left = _residual_gap_mm(allowed, t, gap, largest)
         if checked and not exact and left <= tolerance_mm and change <= steady:
             gap, exact = operator(t) - b, True
             applied += 1
-            left = _left(allowed, t, gap, largest)
-        if applied >= MOST_ITERATIONS or (left <= tolerance_mm and change <= steady):
-            return Minimum(t, allowed, applied, left)
+            left = _residual_gap_mm(allowed, t, gap, largest)
+        if applied >= MAX_ITERATIONS or (left <= tolerance_mm and change <= steady):
+            return TractionSolution(t, allowed, applied, left)
         least, stalled = (left, 0) if left < 0.9 * least else (least, stalled + 1)
-        if stalled >= STALLED:
-            pull, patient, least, stalled = max(pull / 2, LEAST_PULL), True, np.inf, 0
-        step, answer, more = _step(operator, face, gap, tolerance_mm)
+        if stalled >= MAX_STALLED_STEPS:
+            pull, patient, least, stalled = max(pull / 2, MIN_ACTIVE_SET_GAIN), True, np.inf, 0
+        step, answer, more = _newton_step(operator, face, gap, tolerance_mm)
         # A step that moves nothing counts too, so that there is an end.
         t, gap, applied, exact = t + step, gap + answer, applied + max(more, 1), False
 
 
-def _left(allowed: Allowed, t: Array, gap: Array, largest: float) -> float:
+def _residual_gap_mm(allowed: AdmissibleTractions, t: Array, gap: Array, largest: float) -> float:
     """Root mean square in mm of the gap that allowed tractions could still close, over the free components."""
     to_go = (t - allowed.project(t - gap / largest)) * largest
     return float(np.sqrt(np.sum(to_go**2) / max(int(np.count_nonzero(allowed.free(t))), 1)))
 
 
-def _step(operator: Operator, face: Face, gap: Array, tolerance_mm: float) -> tuple[Single, Single, int]:
+def _newton_step(
+    operator: ComplianceOperator, face: ActiveSet, gap: Array, tolerance_mm: float
+) -> tuple[Single, Single, int]:
     """A change of the tractions that closes most of the gap of what is free, its answer, and applications of C."""
     step, answer = np.zeros_like(gap, dtype=np.float32), np.zeros_like(gap, dtype=np.float32)
-    turning = face.turning(gap)
+    turning = face.turning_resistance(gap)
     # What turns with effort is scaled down to what the layer's inverse is made for.
     soft = np.ones_like(step)
     soft[:-1] = np.sqrt(operator.stiffest / (operator.stiffest + turning))
-    rest = face.tangent(-gap.astype(np.float32))
-    free = float(np.count_nonzero(face.moves))
-    enough = max(SHRUNK**2 * float(np.vdot(rest, rest)), 0.1 * tolerance_mm**2 * free)
+    rest = face.project_on_free_directions(-gap.astype(np.float32))
+    free = float(np.count_nonzero(face.free_mask))
+    enough = max(STEP_GAP_REDUCTION**2 * float(np.vdot(rest, rest)), 0.1 * tolerance_mm**2 * free)
     ahead, before = np.zeros_like(step), np.inf
-    for applied in range(MOST_DIRECTIONS + 1):
-        if applied == MOST_DIRECTIONS or float(np.vdot(rest, rest)) <= enough:
+    for applied in range(MAX_DIRECTIONS + 1):
+        if applied == MAX_DIRECTIONS or float(np.vdot(rest, rest)) <= enough:
             break
-        undone = face.tangent(soft * operator.undo(soft * rest))
+        undone = face.project_on_free_directions(soft * operator.precondition(soft * rest))
         strength = float(np.vdot(rest, undone))
         ahead = undone + (strength / before) * ahead
         moved = operator(ahead)
@@ -122,6 +124,6 @@ def _step(operator: Operator, face: Face, gap: Array, tolerance_mm: float) -> tu
         way = strength / float(np.vdot(ahead, resisted))
         step += way * ahead
         answer += way * moved
-        rest -= way * face.tangent(resisted)
+        rest -= way * face.project_on_free_directions(resisted)
         before = strength
     return step, answer, applied

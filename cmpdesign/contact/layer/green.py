@@ -14,18 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact.elastomer import Elastomer
-from cmpdesign.contact.layer.kernels import compliances
+from cmpdesign.contact.layer.kernels import layer_compliances
 
 Array = NDArray[np.float64]
 # Thicknesses within which the kernels fade to 2e-4 of their value at one thickness: they go with exp(-0.739 r / h), as
 # cosh kh = +- i kh, where D = 0 for nu = 1/2, has its first root at 0.739 i.
-REACH = 12.0
+KERNEL_REACH_THICKNESSES = 12.0
 # Waves of a period that the next, four times larger one takes over: exp(-(k / kc)^4) with kc = CUT steps.
-CUT, WIDER, NOTHING = 12, 4, 2.25
+CUTOFF_WAVES, PERIOD_GROWTH, NEGLIGIBLE_CUTOFFS = 12, 4, 2.25
 
 
 @dataclass(frozen=True)
-class Green:
+class GreenKernels:
     """Displacement in mm at offsets (row, column) >= 0 cells for 1 MPa on one cell; the rest by symmetry.
 
     Attributes:
@@ -47,9 +47,9 @@ class Green:
 
 
 @lru_cache(maxsize=8)
-def green(elastomer: Elastomer, step_mm: float, cells: int) -> Green:
+def green_kernels(elastomer: Elastomer, step_mm: float, cells: int) -> GreenKernels:
     """The kernels for offsets up to ``cells`` - 1 in both directions."""
-    reach = int(np.ceil(REACH * elastomer.thickness_mm / step_mm))
+    reach = int(np.ceil(KERNEL_REACH_THICKNESSES * elastomer.thickness_mm / step_mm))
     offsets = np.asarray(step_mm * np.arange(cells), dtype=np.float64)
     half = (cells + min(cells, reach)) // 2 + 1
     period = (2 * half + 1) * step_mm
@@ -58,28 +58,28 @@ def green(elastomer: Elastomer, step_mm: float, cells: int) -> Green:
     while True:
         last = period - cells * step_mm >= reach * step_mm
         dk = 2 * np.pi / period
-        cut = None if last else CUT * dk
-        total += _waves(elastomer, offsets, dk, half, inherited, cut) * step_mm**2
+        cut = None if last else CUTOFF_WAVES * dk
+        total += _sum_waves(elastomer, offsets, dk, half, inherited, cut) * step_mm**2
         if cut is None:
             break
-        inherited, period = cut, WIDER * period
-        half = int(np.ceil(NOTHING * CUT * WIDER))
+        inherited, period = cut, PERIOD_GROWTH * period
+        half = int(np.ceil(NEGLIGIBLE_CUTOFFS * CUTOFF_WAVES * PERIOD_GROWTH))
     zz, xx, xy, xz = total
     for kernel in (zz, xx, xy, xz):
         kernel.setflags(write=False)
-    return Green(
+    return GreenKernels(
         elastomer=elastomer, zz=zz, xx=xx, yy=xx.T, xy=xy, xz=xz, yz=xz.T, step_mm=step_mm, reach=reach
     )
 
 
-def _waves(
+def _sum_waves(
     elastomer: Elastomer, offsets: Array, dk: float, half: int, inherited: float | None, cut: float | None
 ) -> Array:
     """zz, xx, xy, xz (4, n, n) from the waves (i, j) dk with \\|i\\|, \\|j\\| <= half, between two cut-offs."""
     k = dk * np.arange(half + 1)
     kx, ky = np.meshgrid(k, k)
     length = np.hypot(kx, ky)
-    c = compliances(length, elastomer)
+    c = layer_compliances(length, elastomer)
     weight = np.where(kx > 0, 2.0, 1.0) * np.where(ky > 0, 2.0, 1.0) * (dk / (2 * np.pi)) ** 2
     if cut is not None:
         weight = -weight * np.expm1(-((length / cut) ** 4))

@@ -8,14 +8,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.layer.green import Green
-from cmpdesign.contact.layer.kernels import compliances
+from cmpdesign.contact.layer.green import GreenKernels
+from cmpdesign.contact.layer.kernels import layer_compliances
 
 Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Inverse:
+class InversePreconditioner:
     """The layer's inverse without the coupling to z, as if the box repeated: a preconditioner, at a third of the cost.
 
     Attributes:
@@ -31,7 +31,7 @@ class Inverse:
     stiffest: float
 
     @classmethod
-    def of(cls, green: Green, box: tuple[int, int]) -> Self:
+    def of(cls, green: GreenKernels, box: tuple[int, int]) -> Self:
         """For a box of cells."""
         from scipy.fft import next_fast_len
 
@@ -42,7 +42,7 @@ class Inverse:
         even = k == 0
         # A thick layer gives way to even load without end; but the load ends at the box.
         k[even] = 0.5 * turn / max(rows, columns)
-        c = compliances(k, green.elastomer)
+        c = layer_compliances(k, green.elastomer)
         x, y = kx / k, ky / k
         # An incompressible layer hardly answers to even pressure: the longest waves count as no stiffer than this.
         softest = k.flat[np.argmax(c.zz)]
@@ -51,7 +51,7 @@ class Inverse:
         parts = (x**2 * along + y**2 * across, y**2 * along + x**2 * across, x * y * (along - across), zz)
         parts[0][even] = parts[1][even] = along[even]
         xx, yy, xy, inverse = (one.astype(np.float32) for one in parts)
-        shortest = compliances(np.array(np.pi / green.step_mm), green.elastomer)
+        shortest = layer_compliances(np.array(np.pi / green.step_mm), green.elastomer)
         return cls((rows, columns), xx, yy, xy, inverse, float(shortest.ll))
 
     def __call__(self, values: Single) -> Single:

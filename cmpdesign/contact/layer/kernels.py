@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from cmpdesign.contact.elastomer import Elastomer
 
 Array = NDArray[np.float64]
-SERIES_BELOW = 0.5
+SERIES_LIMIT = 0.5
 
 
-class Compliances(NamedTuple):
+class LayerCompliances(NamedTuple):
     """Displacement over traction in mm/MPa, each shaped as the wave numbers."""
 
     zz: Array
@@ -35,7 +35,7 @@ class Compliances(NamedTuple):
     sh: Array
 
 
-def compliances(k_per_mm: Array, elastomer: Elastomer) -> Compliances:
+def layer_compliances(k_per_mm: Array, elastomer: Elastomer) -> LayerCompliances:
     """The four compliances at wave numbers >= 0 in rad/mm, of any shape; k = 0 gives the limit."""
     h, nu = elastomer.thickness_mm, elastomer.poisson
     a = np.asarray(k_per_mm, dtype=np.float64) * h
@@ -46,13 +46,13 @@ def compliances(k_per_mm: Array, elastomer: Elastomer) -> Compliances:
     denominator = c * (1 + decay**2) + 2 * decay * (2 * a**2 + 5 - 12 * nu + 8 * nu**2)
     scale = h / (elastomer.shear_mpa * a * denominator)
     # c sinh x - x = c (sinh x - x) + (2 - 4 nu) x: two terms that are never negative, nothing cancels.
-    zz = (1 - nu) * scale * (c * _sinh_less_x(2 * a) + 2 * decay * (2 - 4 * nu) * 2 * a)
+    zz = (1 - nu) * scale * (c * _scaled_sinh_minus_x(2 * a) + 2 * decay * (2 - 4 * nu) * 2 * a)
     ll = (1 - nu) * scale * (-c * np.expm1(-4 * a) + 2 * decay * 2 * a)
     xz = scale * (2 * decay * a**2 - (1 - 2 * nu) * c * 0.5 * np.expm1(-2 * a) ** 2)
     sh = h * np.tanh(a) / (elastomer.shear_mpa * a)
     still = np.asarray(k_per_mm) == 0
     uniform = h / elastomer.shear_mpa
-    return Compliances(
+    return LayerCompliances(
         zz=np.where(still, uniform * (1 - 2 * nu) / (2 * (1 - nu)), zz),
         xz=np.where(still, 0.0, xz),
         ll=np.where(still, uniform, ll),
@@ -60,10 +60,10 @@ def compliances(k_per_mm: Array, elastomer: Elastomer) -> Compliances:
     )
 
 
-def _sinh_less_x(x: Array) -> Array:
+def _scaled_sinh_minus_x(x: Array) -> Array:
     """2 exp(-x) (sinh x - x), by its series where the difference would cancel."""
-    small = np.minimum(x, SERIES_BELOW)
+    small = np.minimum(x, SERIES_LIMIT)
     y = small * small
     tail = 1 + y / 20 * (1 + y / 42 * (1 + y / 72 * (1 + y / 110 * (1 + y / 156))))
     series = np.exp(-small) * small * y / 3 * tail
-    return np.where(x < SERIES_BELOW, series, -np.expm1(-2 * x) - 2 * x * np.exp(-x))
+    return np.where(x < SERIES_LIMIT, series, -np.expm1(-2 * x) - 2 * x * np.exp(-x))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True, fastmath=True)
-def answer_waves(
+def update_load_spectra(
     loads: NDArray[Any],
     xx: NDArray[Any],
     yy: NDArray[Any],

@@ -50,7 +50,7 @@ class Indenter(ABC):
         """The sharpest curve of the underside, which the grid has to resolve; 0 for sharp edges."""
 
 
-def bowl(distance_mm: Array, radius_mm: float) -> Array:
+def spherical_profile(distance_mm: Array, radius_mm: float) -> Array:
     """Height of a circle of this radius at a distance from its lowest point; inf beyond."""
     inside = np.abs(distance_mm) <= radius_mm
     # r - sqrt(r^2 - d^2) without cancellation.
@@ -59,14 +59,16 @@ def bowl(distance_mm: Array, radius_mm: float) -> Array:
     return np.where(inside, height, np.inf)
 
 
-def slab(x_mm: Array, y_mm: Array, size_mm: tuple[float, float], edge_radius_mm: float) -> Array:
+def rounded_rectangle_profile(
+    x_mm: Array, y_mm: Array, size_mm: tuple[float, float], edge_radius_mm: float
+) -> Array:
     """Height of a flat rectangle with its edges rounded; inf beside it."""
     past_x = np.maximum(np.abs(x_mm) - (size_mm[0] / 2 - edge_radius_mm), 0.0)
     past_y = np.maximum(np.abs(y_mm) - (size_mm[1] / 2 - edge_radius_mm), 0.0)
-    return bowl(np.hypot(past_x, past_y), edge_radius_mm)
+    return spherical_profile(np.hypot(past_x, past_y), edge_radius_mm)
 
 
-def _require_edge(edge_mm: float, largest_mm: float, name: str = "edge_radius_mm") -> None:
+def _require_edge_radius(edge_mm: float, largest_mm: float, name: str = "edge_radius_mm") -> None:
     require(0 <= edge_mm <= largest_mm, name, f"{edge_mm:g}", f"from 0 to {largest_mm:g} mm for this object")
 
 
@@ -78,7 +80,7 @@ class Ball(Indenter):
     positive: ClassVar[tuple[str, ...]] = ("radius_mm",)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        return bowl(np.hypot(x_mm, y_mm), self.radius_mm)
+        return spherical_profile(np.hypot(x_mm, y_mm), self.radius_mm)
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -97,7 +99,9 @@ class Cylinder(Indenter):
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
         c, s = np.cos(np.radians(self.axis_deg)), np.sin(np.radians(self.axis_deg))
         along, across = c * x_mm + s * y_mm, c * y_mm - s * x_mm
-        return np.where(np.abs(along) <= self.length_mm / 2, bowl(across, self.radius_mm), np.inf)
+        return np.where(
+            np.abs(along) <= self.length_mm / 2, spherical_profile(across, self.radius_mm), np.inf
+        )
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -114,11 +118,11 @@ class Punch(Indenter):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_edge(self.edge_radius_mm, self.radius_mm)
+        _require_edge_radius(self.edge_radius_mm, self.radius_mm)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
         past = np.maximum(np.hypot(x_mm, y_mm) - (self.radius_mm - self.edge_radius_mm), 0.0)
-        return bowl(past, self.edge_radius_mm)
+        return spherical_profile(past, self.edge_radius_mm)
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -135,10 +139,10 @@ class Ring(Indenter):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_edge(self.tube_mm, self.radius_mm, "tube_mm")
+        _require_edge_radius(self.tube_mm, self.radius_mm, "tube_mm")
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        return bowl(np.hypot(x_mm, y_mm) - self.radius_mm, self.tube_mm)
+        return spherical_profile(np.hypot(x_mm, y_mm) - self.radius_mm, self.tube_mm)
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -156,10 +160,10 @@ class Rib(Indenter):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_edge(self.edge_radius_mm, min(self.width_mm, self.length_mm) / 2)
+        _require_edge_radius(self.edge_radius_mm, min(self.width_mm, self.length_mm) / 2)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        return slab(x_mm, y_mm, (self.length_mm, self.width_mm), self.edge_radius_mm)
+        return rounded_rectangle_profile(x_mm, y_mm, (self.length_mm, self.width_mm), self.edge_radius_mm)
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -185,7 +189,9 @@ class Wedge(Indenter):
         slope, distance = 1 / np.tan(half), np.abs(y_mm)
         tangent = self.tip_radius_mm * np.cos(half)  # where the round tip meets the faces
         face = self.tip_radius_mm * (1 - np.sin(half)) + slope * (distance - tangent)
-        height = np.where(distance < tangent, bowl(np.minimum(distance, tangent), self.tip_radius_mm), face)
+        height = np.where(
+            distance < tangent, spherical_profile(np.minimum(distance, tangent), self.tip_radius_mm), face
+        )
         return np.where(np.abs(x_mm) <= self.length_mm / 2, height, np.inf)
 
     @property
@@ -203,10 +209,10 @@ class Cube(Indenter):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_edge(self.edge_radius_mm, self.side_mm / 2)
+        _require_edge_radius(self.edge_radius_mm, self.side_mm / 2)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        return slab(x_mm, y_mm, (self.side_mm, self.side_mm), self.edge_radius_mm)
+        return rounded_rectangle_profile(x_mm, y_mm, (self.side_mm, self.side_mm), self.edge_radius_mm)
 
     @property
     def smallest_radius_mm(self) -> float:

@@ -12,19 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
-FINER = 4  # each side of a pixel is divided by this when a cell is drawn
-CORNER_PX = 1.5  # a pixel on a straight side stands out by less
-AWAY_PX, AWAY = 3.0, 0.02  # blur takes so much off a sharp corner's tip; the same in cell sizes
-LEVEL = 127
+SUPERSAMPLING = 4  # each side of a pixel is divided by this when a cell is drawn
+MIN_CORNER_HEIGHT_PX = 1.5  # a pixel on a straight side stands out by less
+MAX_OUTLINE_DISTANCE_PX, MAX_OUTLINE_DISTANCE = (
+    3.0,
+    0.02,
+)  # blur takes so much off a sharp corner's tip; the same in cell sizes
+BINARY_THRESHOLD = 127
 
 
-def regular(sides: int, edge: float = 1.0) -> Points:
+def regular_cell(sides: int, edge: float = 1.0) -> Points:
     """(n, 2) the corners of a regular cell around the origin, the first one straight up (y down)."""
     angle = np.radians(-90 + 360 / sides * np.arange(sides))
     return np.asarray(0.5 * edge / np.sin(np.pi / sides) * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-def bent(corners: Points, change_deg: float) -> Points:
+def bend_corner(corners: Points, change_deg: float) -> Points:
     """The cell with its first corner moved along its bisector until its inner angle has grown by ``change_deg``.
 
     At an inner angle of 180 degrees it lies on the line between its neighbours, beyond it on the other side.
@@ -40,43 +43,49 @@ def bent(corners: Points, change_deg: float) -> Points:
     return moved
 
 
-def turned(corners: Points, angle_deg: float) -> Points:
+def turn_cell(corners: Points, angle_deg: float) -> Points:
     """The cell turned about the origin."""
     cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]))
 
 
-def drawn(corners_px: Points) -> tuple[NDArray[np.uint8], Points]:
+def draw_cell(corners_px: Points) -> tuple[NDArray[np.uint8], Points]:
     """A picture (H, W) of a light cell on black, blurred by 1 px, and (2,) where the origin lies in it."""
     import cv2
 
     low = np.floor(corners_px.min(axis=0)) - 8
     width, height = (np.ceil(corners_px.max(axis=0)) + 8 - low).astype(int)
-    fine = np.zeros((height * FINER, width * FINER), np.uint8)
+    fine = np.zeros((height * SUPERSAMPLING, width * SUPERSAMPLING), np.uint8)
     # Pixel centres are whole numbers at both scales.
-    at = (corners_px - low + 0.5) * FINER - 0.5
+    at = (corners_px - low + 0.5) * SUPERSAMPLING - 0.5
     cv2.fillPoly(fine, [np.rint(at * 16).astype(np.int32)], 255, cv2.LINE_8, 4)
     small = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.GaussianBlur(small, (0, 0), 1.0), np.uint8), -low
 
 
-def recognised(picture: NDArray[np.uint8], sides: int) -> Points | None:
+def find_cell_corners(picture: NDArray[np.uint8], sides: int) -> Points | None:
     """(n, 2) the corners of the cell in a picture; None when the rule does not hold."""
     import cv2
 
-    mask = (picture > LEVEL).astype(np.uint8)
+    mask = (picture > BINARY_THRESHOLD).astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if len(contours) != 1:
         return None
     contour = contours[0][:, 0].astype(np.float64)
-    corners, height_px = corners_of(contour, sides)
-    if len(corners) < sides or height_px < CORNER_PX or not cv2.isContourConvex(corners.astype(np.float32)):
+    corners, height_px = simplify_contour(contour, sides)
+    if (
+        len(corners) < sides
+        or height_px < MIN_CORNER_HEIGHT_PX
+        or not cv2.isContourConvex(corners.astype(np.float32))
+    ):
         return None
-    allowed_px = max(AWAY_PX, AWAY * float(np.linalg.norm(np.ptp(corners, axis=0))))
-    return corners if away_px(contour, corners) <= allowed_px else None
+    allowed_px = max(
+        MAX_OUTLINE_DISTANCE_PX, MAX_OUTLINE_DISTANCE * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    )
+    return corners if outline_distance_px(contour, corners) <= allowed_px else None
 
 
-def away_px(contour: Points, corners: Points) -> float:
+def outline_distance_px(contour: Points, corners: Points) -> float:
     """How far the farthest point of a contour (N, 2) lies from the outline of the corners (n, 2)."""
     along = np.roll(corners, -1, axis=0) - corners
     arm = contour[:, None] - corners
@@ -84,7 +93,7 @@ def away_px(contour: Points, corners: Points) -> float:
     return float(np.linalg.norm(arm - share[..., None] * along, axis=2).min(axis=1).max())
 
 
-def corners_of(contour: Points, count: int) -> tuple[Points, float]:
+def simplify_contour(contour: Points, count: int) -> tuple[Points, float]:
     """The ``count`` points of a closed contour that are left when those that stand out least are taken away.
 
     Returns:
@@ -103,32 +112,32 @@ def corners_of(contour: Points, count: int) -> tuple[Points, float]:
         points = np.delete(points, int(height.argmin()), axis=0)
 
 
-def tracked(found: Points, at_rest: Points) -> NDArray[np.int64]:
+def match_corners_by_direction(found: Points, at_rest: Points) -> NDArray[np.int64]:
     """(n,) for every corner found, which corner at rest has the nearest direction from the centre."""
     ways = [points - points.mean(axis=0) for points in (found, at_rest)]
     ways = [way / np.linalg.norm(way, axis=1, keepdims=True) for way in ways]
     return np.asarray((ways[0] @ ways[1].T).argmax(axis=1))
 
 
-def shape_holds(sides: int, edge_px: float, change_deg: float) -> bool:
+def is_shape_recognised(sides: int, edge_px: float, change_deg: float) -> bool:
     """Whether a cell is still recognised, with the moved corner in its place, after its shape has changed so far."""
-    truth = bent(regular(sides, edge_px), change_deg)
-    picture, origin = drawn(truth)
-    found = recognised(picture, sides)
+    truth = bend_corner(regular_cell(sides, edge_px), change_deg)
+    picture, origin = draw_cell(truth)
+    found = find_cell_corners(picture, sides)
     if found is None:
         return False
-    near_px = max(AWAY_PX, 0.1 * edge_px)
+    near_px = max(MAX_OUTLINE_DISTANCE_PX, 0.1 * edge_px)
     return bool(np.linalg.norm(found - origin - truth[0], axis=1).min() <= near_px)
 
 
-def number_holds(sides: int, edge_px: float, angle_deg: float) -> bool:
+def is_numbering_kept(sides: int, edge_px: float, angle_deg: float) -> bool:
     """Whether the corners of a cell turned so far are recognised and get their own numbers."""
-    at_rest = regular(sides, edge_px)
-    truth = turned(at_rest, angle_deg)
-    picture, origin = drawn(truth)
-    found = recognised(picture, sides)
+    at_rest = regular_cell(sides, edge_px)
+    truth = turn_cell(at_rest, angle_deg)
+    picture, origin = draw_cell(truth)
+    found = find_cell_corners(picture, sides)
     if found is None:
         return False
     found = found - origin
     nearest = np.linalg.norm(found[:, None] - truth[None], axis=2).argmin(axis=1)
-    return bool((tracked(found, at_rest) == nearest).all())
+    return bool((match_corners_by_direction(found, at_rest) == nearest).all())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
-SHARE = 0.5  # of the largest displacement: markers beyond it are in contact
+CONTACT_DISPLACEMENT_SHARE = 0.5  # of the largest displacement: markers beyond it are in contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ def edge_points(xyz_mm: Points, displacement_mm: Points, direction: tuple[float,
     known = np.isfinite(along)
     if not known.any() or np.nanmax(along) <= 0:
         return EdgePoints(np.empty((0, 2)), np.empty(0))
-    chosen = known & (np.where(known, along, -np.inf) > SHARE * np.nanmax(along))
+    chosen = known & (np.where(known, along, -np.inf) > CONTACT_DISPLACEMENT_SHARE * np.nanmax(along))
     return EdgePoints(xyz_mm[chosen, :2], along[chosen])
 
 
@@ -54,6 +54,6 @@ def mean_extent_mm(xy_mm: Points) -> float | None:
     return float(np.ptp(xy_mm, axis=0).mean()) if len(xy_mm) else None
 
 
-def response(points: EdgePoints, shear_mm: float) -> float | None:
+def shear_response(points: EdgePoints, shear_mm: float) -> float | None:
     """Mean displacement of the edge points along the shear, in units of the shear; None without points."""
     return float(points.moved_mm.mean()) / shear_mm if len(points.moved_mm) else None

@@ -7,21 +7,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.simulated.conditions import Drawn
-from cmpdesign.evaluate.simulated.contacts import Moved
+from cmpdesign.evaluate.simulated.conditions import ImagingConditions
+from cmpdesign.evaluate.simulated.contacts import PlacedSurface
 from cmpdesign.evaluate.simulated.instrument import Instrument
 from extractor.errors import PoseError
 
 Points = NDArray[np.float64]
-ERRORS = (
+ERROR_NAMES = (
     "surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "over_sigma", "over_sigma_median",
 )  # fmt: skip
-STEP_MM = 0.25  # of the grid on which surfaces are compared
+GRID_SPACING_MM = 0.25  # of the grid on which surfaces are compared
 CHI_SQUARE_MEDIAN_3 = 2.365973884375338  # of three degrees of freedom
-AREA = 0.1  # the area compared: where the surface has moved by at least this share of the largest movement
+CONTACT_DISPLACEMENT_SHARE = (
+    0.1  # the area compared: where the surface has moved by at least this share of the largest movement
+)
 
 
-def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[str, Any]:
+def measure_reconstruction(
+    one: Instrument, pressed: PlacedSurface, drawn: ImagingConditions, seed: int
+) -> dict[str, Any]:
     """Errors of one picture's reconstruction.
 
     Returns:
@@ -35,14 +39,14 @@ def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[s
     try:
         reconstructor = one.reconstructor
     except PoseError:
-        return {**dict.fromkeys(ERRORS), "covered": 0.0, "measured": 0.0}
+        return {**dict.fromkeys(ERROR_NAMES), "covered": 0.0, "measured": 0.0}
     picture = one.picture(drawn, seed, pressed)
     shape = reconstructor.reconstruct(one.read(picture.image))
     truth = picture.truth
-    grid = grid_mm(one)
+    grid = comparison_grid_mm(one)
     moved = pressed.displacement_mm(grid)
     length = np.linalg.norm(moved, axis=1)
-    area = length >= AREA * length.max()
+    area = length >= CONTACT_DISPLACEMENT_SHARE * length.max()
     found = reconstructor.field.at(shape.displacement_mm, grid[area])
     error = found - moved[area]
     known = np.isfinite(error[:, 0])
@@ -54,22 +58,22 @@ def compared(one: Instrument, pressed: Moved, drawn: Drawn, seed: int) -> dict[s
         "covered": float(known.mean()) if len(known) else 0.0,
         "marker_rms_mm": _rms(away[np.isfinite(away)]),
         "marker_median_mm": float(np.nanmedian(away)) if np.isfinite(away).any() else None,
-        **_over_sigma(shape.xyz_mm - truth.marker_xyz_mm, shape.cov_mm2),
+        **_normalised_errors(shape.xyz_mm - truth.marker_xyz_mm, shape.cov_mm2),
         "measured": float((visible & np.isfinite(away)).sum() / max(int(visible.sum()), 1)),
     }
 
 
-def grid_mm(one: Instrument) -> Points:
+def comparison_grid_mm(one: Instrument) -> Points:
     """(N, 2) a square grid over the pattern's cells, away from the rim by one edge, so that every pattern covers it."""
     corners = one.layout.marker_xy_mm[one.layout.present]
     low, high = corners.min(axis=0) + one.pitch_mm, corners.max(axis=0) - one.pitch_mm
-    x, y = (np.arange(low[k], high[k], STEP_MM) for k in (0, 1))
+    x, y = (np.arange(low[k], high[k], GRID_SPACING_MM) for k in (0, 1))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     triangle, _ = one.reconstructor.field.find(grid)
     return np.asarray(grid[triangle >= 0])
 
 
-def _over_sigma(error_mm: Points, cov_mm2: Points) -> dict[str, float | None]:
+def _normalised_errors(error_mm: Points, cov_mm2: Points) -> dict[str, float | None]:
     """Errors (M, 3) in units of covariances (M, 3, 3): RMS, and the median over a true normal's median."""
     known = np.isfinite(error_mm[:, 0])
     if not known.any():

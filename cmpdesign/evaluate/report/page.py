@@ -46,21 +46,21 @@ class Section:
     plots: Sequence[Plot] = field(default_factory=tuple)
 
 
-def page(title: str, sections: Sequence[Section]) -> str:
+def report_html(title: str, sections: Sequence[Section]) -> str:
     """The page's HTML; the same sections give the same bytes."""
-    body = "\n".join(_section(section) for section in sections)
+    body = "\n".join(_section_html(section) for section in sections)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f"<style>{STYLE}</style>\n</head>\n<body>\n<h1>{escape(title)}</h1>\n{body}\n</body>\n</html>\n"
     )
 
 
-def _section(section: Section) -> str:
+def _section_html(section: Section) -> str:
     parts = [f"<h2>{escape(section.title)}</h2>"]
     parts += [f"<p>{escape(text)}</p>" for text in section.paragraphs]
     if section.points:
         parts.append("<ul>" + "".join(f"<li>{escape(text)}</li>" for text in section.points) + "</ul>")
-    parts += [_table(table) for table in section.tables]
+    parts += [_table_html(table) for table in section.tables]
     parts += [
         f"<figure>{plot.svg}<figcaption>{escape(plot.caption)}</figcaption></figure>"
         for plot in section.plots
@@ -68,7 +68,7 @@ def _section(section: Section) -> str:
     return "\n".join(parts)
 
 
-def _table(table: Table) -> str:
+def _table_html(table: Table) -> str:
     head = "".join(f"<th>{escape(text)}</th>" for text in table.headings)
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows

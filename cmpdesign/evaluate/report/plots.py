@@ -26,7 +26,7 @@ STYLE |= {"axes.spines.right": False, "font.family": "sans-serif", "legend.frame
 
 
 @contextmanager
-def _figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[], str]]]:
+def _open_figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[], str]]]:
     """A figure's axes, and the function that draws it."""
     try:
         import matplotlib
@@ -38,10 +38,10 @@ def _figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[], str
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure.subplots(), lambda: _svg(figure)
+        yield figure.subplots(), lambda: _figure_svg(figure)
 
 
-def _svg(figure: Any) -> str:
+def _figure_svg(figure: Any) -> str:
     """The figure without what comes before the element: it stands in a page."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -49,9 +49,9 @@ def _svg(figure: Any) -> str:
     return text[text.index("<svg") :]
 
 
-def shares(groups: Mapping[str, Mapping[str, Mapping[str, Any]]], methods: Sequence[str]) -> str:
+def plot_success_rates(groups: Mapping[str, Mapping[str, Mapping[str, Any]]], methods: Sequence[str]) -> str:
     """Success rates with their 95 % intervals, one group of bars a mode, the article's as rings."""
-    with _figure(8.0, 3.2) as (axes, draw):
+    with _open_figure(8.0, 3.2) as (axes, draw):
         width = 0.8 / len(methods)
         for i, method in enumerate(methods):
             for g, mode in enumerate(groups.values()):
@@ -71,9 +71,9 @@ def shares(groups: Mapping[str, Mapping[str, Mapping[str, Any]]], methods: Seque
         return draw()
 
 
-def boxes(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str) -> str:
+def plot_values(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str) -> str:
     """Every value as a dot and the mean as a line, by group and method."""
-    with _figure(7.0, 3.0) as (axes, draw):
+    with _open_figure(7.0, 3.0) as (axes, draw):
         for g, methods in enumerate(groups.values()):
             for i, (method, values) in enumerate(methods.items()):
                 x = g + 0.3 * (i - (len(methods) - 1) / 2)
@@ -90,9 +90,9 @@ def boxes(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str) -> str
         return draw()
 
 
-def bars(groups: Mapping[str, Mapping[str, float | None]], unit: str) -> str:
+def plot_bars(groups: Mapping[str, Mapping[str, float | None]], unit: str) -> str:
     """One bar a method in every group."""
-    with _figure(7.0, 3.0) as (axes, draw):
+    with _open_figure(7.0, 3.0) as (axes, draw):
         for g, methods in enumerate(groups.values()):
             width = 0.8 / len(methods)
             for i, (method, value) in enumerate(methods.items()):
@@ -105,10 +105,10 @@ def bars(groups: Mapping[str, Mapping[str, float | None]], unit: str) -> str:
         return draw()
 
 
-def thresholds(measured: Mapping[int, Mapping[int, float | None]], formula: Mapping[int, float]) -> str:
+def plot_lost_angles(measured: Mapping[int, Mapping[int, float | None]], formula: Mapping[int, float]) -> str:
     """The first angle lost over the cell's size, one line a shape, its formula's limit dashed."""
     shades = ("#2f6fb7", "#59636b", "#b2182b")
-    with _figure(6.0, 3.0) as (axes, draw):
+    with _open_figure(6.0, 3.0) as (axes, draw):
         for shade, (sides, found) in zip(shades, measured.items(), strict=True):
             points = [(size, angle) for size, angle in found.items() if angle is not None]
             axes.plot(*zip(*points, strict=True), "o-", color=shade, ms=4, label=f"n = {sides}")
@@ -124,9 +124,9 @@ def thresholds(measured: Mapping[int, Mapping[int, float | None]], formula: Mapp
         return draw()
 
 
-def error_over_density(points: Mapping[str, tuple[float, float]]) -> str:
+def plot_error_over_density(points: Mapping[str, tuple[float, float]]) -> str:
     """Designs by markers per cm2 and error in micrometres."""
-    with _figure(6.0, 3.4) as (axes, draw):
+    with _open_figure(6.0, 3.4) as (axes, draw):
         for name, (density, error) in points.items():
             axes.plot(density, error, "o", color=COLORS["multicolor"], ms=6)
             axes.annotate(name, (density, error), xytext=(6, 4), textcoords="offset points")

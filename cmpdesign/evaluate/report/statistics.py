@@ -13,7 +13,7 @@ Z_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
-class Share:
+class SuccessShare:
     """``successful`` of ``trials``, with Wilson's 95 % interval."""
 
     trials: int
@@ -29,7 +29,7 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        return wilson(self.successful, self.trials)
+        return wilson_interval(self.successful, self.trials)
 
     def to_json(self) -> dict[str, object]:
         low, high = self.interval
@@ -41,7 +41,7 @@ class Share:
         }
 
 
-def wilson(successful: int, trials: int, z: float = Z_95) -> tuple[float, float]:
+def wilson_interval(successful: int, trials: int, z: float = Z_95) -> tuple[float, float]:
     """Wilson's score interval of a binomial share; (0, 1) where nothing was tried.
 
     Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference, JASA 22 (1927).
@@ -57,7 +57,7 @@ def wilson(successful: int, trials: int, z: float = Z_95) -> tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Spread:
+class SampleStatistics:
     """What a sample of finite values looks like; all NaN where it is empty."""
 
     count: int
@@ -69,20 +69,20 @@ class Spread:
 
     def to_json(self) -> dict[str, object]:
         figures = {name: getattr(self, name) for name in ("mean", "deviation", "low", "median", "high")}
-        return {"count": self.count, **{name: number(value) for name, value in figures.items()}}
+        return {"count": self.count, **{name: round_for_json(value) for name, value in figures.items()}}
 
 
-def spread(values: Sequence[float]) -> Spread:
+def sample_statistics(values: Sequence[float]) -> SampleStatistics:
     """Count, mean, standard deviation (n - 1), smallest, median and largest of the finite values."""
     found = np.asarray([value for value in values if value is not None], dtype=np.float64)
     found = found[np.isfinite(found)]
     if not len(found):
-        return Spread(0, *[float("nan")] * 5)
+        return SampleStatistics(0, *[float("nan")] * 5)
     deviation = float(found.std(ddof=1)) if len(found) > 1 else 0.0
     low, median, high = (float(np.quantile(found, share)) for share in (0, 0.5, 1))
-    return Spread(len(found), float(found.mean()), deviation, low, median, high)
+    return SampleStatistics(len(found), float(found.mean()), deviation, low, median, high)
 
 
-def number(value: float, digits: int = 6) -> float | None:
+def round_for_json(value: float, digits: int = 6) -> float | None:
     """A figure as JSON can hold it: rounded, None where there is none."""
     return round(float(value), digits) if np.isfinite(value) else None

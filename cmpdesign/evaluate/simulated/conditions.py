@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmpdesign.evaluate.simulated.sensor import Conditions
+from cmpdesign.evaluate.simulated.sensor import ConditionRanges
 from cmpdesign.scene import Blob, Damage, Led, Light
 
 # What a bubble or a grain of dirt looks like: a gray of any level between the inks.
@@ -14,7 +14,7 @@ SPECK_LEVEL = (40.0, 200.0)
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ImagingConditions:
     """The conditions of one picture."""
 
     light: Light
@@ -23,13 +23,15 @@ class Drawn:
     damage: Damage | None
 
 
-def draw(ranges: Conditions, rng: np.random.Generator, half_window_mm: float) -> Drawn:
+def sample_conditions(
+    ranges: ConditionRanges, rng: np.random.Generator, half_window_mm: float
+) -> ImagingConditions:
     """Conditions drawn evenly from the ranges; specks lie anywhere within the half window around the middle."""
     level = rng.uniform(*ranges.level)
     rgb = level * (1 + rng.uniform(-ranges.tint, ranges.tint, 3))
     gradient = rng.uniform(-ranges.gradient, ranges.gradient, 2)
     vignetting = rng.uniform(*ranges.vignetting)
-    lamps = [_lamp(ranges, rng) for _ in range(rng.integers(ranges.lamps[0], ranges.lamps[1] + 1))]
+    lamps = [_sample_lamp(ranges, rng) for _ in range(rng.integers(ranges.lamps[0], ranges.lamps[1] + 1))]
     light = Light(
         rgb=(float(rgb[0]), float(rgb[1]), float(rgb[2])),
         gradient=(float(gradient[0]), float(gradient[1])),
@@ -38,23 +40,23 @@ def draw(ranges: Conditions, rng: np.random.Generator, half_window_mm: float) ->
     )
     blur_px, noise = float(rng.uniform(*ranges.blur_px)), float(rng.uniform(*ranges.noise))
     count = int(rng.integers(ranges.specks[0], ranges.specks[1] + 1))
-    specks = tuple(_speck(ranges, rng, half_window_mm) for _ in range(count))
-    return Drawn(light, blur_px, noise, Damage(blobs=specks) if specks else None)
+    specks = tuple(_sample_speck(ranges, rng, half_window_mm) for _ in range(count))
+    return ImagingConditions(light, blur_px, noise, Damage(blobs=specks) if specks else None)
 
 
-def middle(ranges: Conditions) -> Drawn:
+def mean_conditions(ranges: ConditionRanges) -> ImagingConditions:
     """The ranges' middle: even light, no lamps, no specks."""
     level = float(np.mean(ranges.level))
     light = Light(rgb=(level, level, level), vignetting=float(np.mean(ranges.vignetting)))
-    return Drawn(light, float(np.mean(ranges.blur_px)), float(np.mean(ranges.noise)), None)
+    return ImagingConditions(light, float(np.mean(ranges.blur_px)), float(np.mean(ranges.noise)), None)
 
 
-def _lamp(ranges: Conditions, rng: np.random.Generator) -> Led:
+def _sample_lamp(ranges: ConditionRanges, rng: np.random.Generator) -> Led:
     level = float(rng.uniform(0, ranges.lamp_level))
     return Led(float(rng.uniform(0, 360)), (level, level, level))
 
 
-def _speck(ranges: Conditions, rng: np.random.Generator, half_window_mm: float) -> Blob:
+def _sample_speck(ranges: ConditionRanges, rng: np.random.Generator, half_window_mm: float) -> Blob:
     x, y = rng.uniform(-half_window_mm, half_window_mm, 2)
     gray = float(rng.uniform(*SPECK_LEVEL))
     return Blob((float(x), float(y)), float(rng.uniform(*ranges.speck_radius_mm)), (gray, gray, gray))

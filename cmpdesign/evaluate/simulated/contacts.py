@@ -20,11 +20,11 @@ REST = "rest"  # no object at all
 
 
 @dataclass(frozen=True)
-class Load:
+class ContactLoad:
     """An object and what it does.
 
     Attributes:
-        object: a name that ``indenter`` knows, or ``REST``.
+        object: a name that ``make_indenter`` knows, or ``REST``.
         press_mm, shear_mm, twist_deg: as ``contact.Motion``; a positive twist is counter-clockwise from the front.
     """
 
@@ -34,7 +34,7 @@ class Load:
     twist_deg: float = 0.0
 
 
-def indenter(name: str) -> Indenter:
+def make_indenter(name: str) -> Indenter:
     """An object of the experiments. Sizes: the article where it gives one (cube 15 mm, ball 20 mm); else assumed."""
     from cmpdesign.contact import Ball, Cube, Cylinder, Rib, Ring, Wedge
 
@@ -50,14 +50,14 @@ def indenter(name: str) -> Indenter:
     return made[name]()
 
 
-def motion(load: Load) -> Motion:
+def load_motion(load: ContactLoad) -> Motion:
     from cmpdesign.contact import Motion
 
     return Motion(load.press_mm, load.shear_mm, load.twist_deg)
 
 
 @lru_cache(maxsize=16)
-def solved(sensor_text: str, load: Load) -> Contact:
+def solve_contact(sensor_text: str, load: ContactLoad) -> Contact:
     """The contact at the middle of the sensor's layer."""
     from cmpdesign.contact import solve
 
@@ -65,8 +65,8 @@ def solved(sensor_text: str, load: Load) -> Contact:
     table = sensor.table.contact
     return solve(
         sensor.elastomer,
-        indenter(load.object),
-        motion(load),
+        make_indenter(load.object),
+        load_motion(load),
         friction=table.friction,
         size_mm=table.size_mm,
         grid=table.grid,
@@ -75,15 +75,15 @@ def solved(sensor_text: str, load: Load) -> Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Moved:
+class PlacedSurface:
     """A surface whose contact has its centre at ``centre_mm``: (N, 2) mm to (N, 3) mm."""
 
-    relief: Callable[[Points], Points]
+    surface_at_origin: Callable[[Points], Points]
     centre_mm: tuple[float, float]
 
     def __call__(self, xy_mm: Points, /) -> Points:
         offset = np.asarray(self.centre_mm)
-        found = self.relief(np.asarray(xy_mm) - offset)
+        found = self.surface_at_origin(np.asarray(xy_mm) - offset)
         found[:, :2] += offset
         return found
 
@@ -94,15 +94,15 @@ class Moved:
         return moved
 
 
-def _flat(xy_mm: Points) -> Points:
+def _flat_surface(xy_mm: Points) -> Points:
     return np.column_stack([xy_mm, np.zeros(len(xy_mm))])
 
 
 @lru_cache(maxsize=16)
-def _relief(sensor_text: str, load: Load) -> Callable[[Points], Points]:
-    return solved(sensor_text, load).surface() if load.object != REST else _flat
+def _contact_relief(sensor_text: str, load: ContactLoad) -> Callable[[Points], Points]:
+    return solve_contact(sensor_text, load).surface() if load.object != REST else _flat_surface
 
 
-def surface(sensor_text: str, load: Load, centre_mm: tuple[float, float]) -> Moved:
+def place_surface(sensor_text: str, load: ContactLoad, centre_mm: tuple[float, float]) -> PlacedSurface:
     """The surface under a load at a place."""
-    return Moved(_relief(sensor_text, load), centre_mm)
+    return PlacedSurface(_contact_relief(sensor_text, load), centre_mm)

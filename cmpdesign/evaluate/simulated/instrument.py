@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.design.design import Design
-from cmpdesign.evaluate.simulated.conditions import Drawn, middle
+from cmpdesign.evaluate.simulated.conditions import ImagingConditions, mean_conditions
 from cmpdesign.evaluate.simulated.sensor import SimulatedSensor, parse_sensor
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
@@ -58,7 +58,7 @@ class Instrument:
     @cached_property
     def layout_as_designed(self) -> Layout:
         """With marker 0 at the origin."""
-        return _moved(self.layout, -self.layout.marker_xy_mm[0])
+        return _shift_layout(self.layout, -self.layout.marker_xy_mm[0])
 
     @property
     def half_window_mm(self) -> float:
@@ -76,7 +76,9 @@ class Instrument:
         ends = [view.project(flat)[self.layout.edges] for view in self.sensor.rig.views]
         return float(np.median([np.linalg.norm(end[:, 1] - end[:, 0], axis=1) for end in ends]))
 
-    def picture(self, drawn: Drawn, seed: int, surface: Callable[[Points], Points] | None = None) -> Rendered:
+    def picture(
+        self, drawn: ImagingConditions, seed: int, surface: Callable[[Points], Points] | None = None
+    ) -> Rendered:
         """What the camera sees, with the truth."""
         from cmpdesign.scene import Optics, Scene, Sensor, render
 
@@ -94,13 +96,15 @@ class Instrument:
 
     def read(self, image: NDArray[Any]) -> tuple[Markers, ...]:
         """The markers view by view, in the frame of the whole image."""
-        from extractor.space.reconstruction import shifted
-        from extractor.space.views import cut
+        from extractor.space.reconstruction import translate_markers
+        from extractor.space.views import crop_to_view
 
         found = []
         for view, read in zip(self.sensor.rig.views, self._readers, strict=True):
             origin = view.area_px[:2] if view.area_px else (0, 0)
-            found.append(shifted(read(cut(image, view)), (float(origin[0]), float(origin[1]))))
+            found.append(
+                translate_markers(read(crop_to_view(image, view)), (float(origin[0]), float(origin[1])))
+            )
         return tuple(found)
 
     @cached_property
@@ -109,7 +113,7 @@ class Instrument:
         from extractor.space.reconstruction import Reconstructor
         from extractor.space.rig import Rig
 
-        rest = self.read(self.picture(middle(self.sensor.table.conditions), REST_SEED).image)
+        rest = self.read(self.picture(mean_conditions(self.sensor.table.conditions), REST_SEED).image)
         views = [
             replace(view, R_camera_from_layout=None, t_camera_from_layout_mm=None)
             for view in self.sensor.rig.views
@@ -123,10 +127,10 @@ class Instrument:
 
             extract = Extractor(self.reference, self.preset).extract
             return [extract] * len(self.sensor.rig.views)
-        return [_square_reader(self, view) for view in self.sensor.rig.views]
+        return [_make_square_reader(self, view) for view in self.sensor.rig.views]
 
 
-def _square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
+def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
     """A square pattern's reader for one view: which way its rows run there is known from rest."""
     from cmpdesign.evaluate.square.contours import SquareReader
     from cmpdesign.evaluate.square.saddles import SaddleReader
@@ -138,10 +142,10 @@ def _square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     kind = SaddleReader if instrument.reader == "saddles" else SquareReader
     reader = kind(instrument.layout, instrument.edge_px, axes)
-    return lambda image: as_markers(reader.read(image), instrument.layout)
+    return lambda image: markers_from_places(reader.read(image), instrument.layout)
 
 
-def as_markers(xy_px: Points, layout: Layout) -> Markers:
+def markers_from_places(xy_px: Points, layout: Layout) -> Markers:
     """Places (M, 2), NaN where lost, as the extractor would hand them out."""
     from extractor.result import Markers, Reason, VirtualStatus
 
@@ -166,13 +170,13 @@ def as_markers(xy_px: Points, layout: Layout) -> Markers:
     )
 
 
-def centred(layout: Layout) -> Layout:
+def centre_layout(layout: Layout) -> Layout:
     """The layout moved so that the middle of its outline lies at the origin."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    return _moved(layout, -0.5 * (low + high))
+    return _shift_layout(layout, -0.5 * (low + high))
 
 
-def _moved(layout: Layout, by_mm: Points) -> Layout:
+def _shift_layout(layout: Layout, by_mm: Points) -> Layout:
     return replace(
         layout,
         marker_xy_mm=np.round(layout.marker_xy_mm + by_mm, 9) + 0.0,
@@ -181,19 +185,19 @@ def _moved(layout: Layout, by_mm: Points) -> Layout:
 
 
 @lru_cache(maxsize=8)
-def instrument(sensor_text: str, method: str, preset: Preset = "balanced") -> Instrument:
+def instrument_for_method(sensor_text: str, method: str, preset: Preset = "balanced") -> Instrument:
     """The instrument of a method: "square", "square_saddles" or "multicolor", with the sensor's own patterns."""
     sensor = parse_sensor(sensor_text)
     pattern = sensor.pattern("multicolor" if method.startswith("multicolor") else "square")
     design = Design.model_validate(dict(pattern))
-    return instrument_of(sensor, design, preset, saddles=method == "square_saddles")
+    return instrument_for_design(sensor, design, preset, saddles=method == "square_saddles")
 
 
-def instrument_of(
+def instrument_for_design(
     sensor: SimulatedSensor, design: Design, preset: Preset = "balanced", *, saddles: bool = False
 ) -> Instrument:
     """A design on a sensor, with the reader that its cells ask for."""
-    layout = centred(build_layout(design))
+    layout = centre_layout(build_layout(design))
     if layout.cell_corners.shape[1] == 3:
         return Instrument(sensor, layout, "colors", preset)
     return Instrument(sensor, layout, "saddles" if saddles else "contours", preset)

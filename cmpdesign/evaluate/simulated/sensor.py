@@ -30,11 +30,11 @@ class SensorError(CmpDesignError, ValueError):
     """A sensor file that cannot be used."""
 
 
-class _Table(BaseModel):
+class _StrictTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class ElastomerTable(_Table):
+class ElastomerTable(_StrictTable):
     """The soft layer, bonded to the sensor's window."""
 
     thickness_mm: Positive
@@ -42,7 +42,7 @@ class ElastomerTable(_Table):
     poisson: float = Field(0.5, ge=0, le=0.5)
 
 
-class ContactTable(_Table):
+class ContactTable(_StrictTable):
     """How contacts are solved."""
 
     friction: float = Field(ge=0)
@@ -51,7 +51,7 @@ class ContactTable(_Table):
     steps: int = Field(8, ge=1, le=1000)
 
 
-class LoadTable(_Table):
+class LoadTable(_StrictTable):
     """One contact of the set that designs are compared with; a positive twist is counter-clockwise from the front."""
 
     object: str
@@ -67,7 +67,7 @@ class LoadTable(_Table):
         return value
 
 
-class Conditions(_Table):
+class ConditionRanges(_StrictTable):
     """What differs from trial to trial; ranges are drawn from evenly."""
 
     level: tuple[Positive, Positive] = (1.0, 1.0)
@@ -82,7 +82,7 @@ class Conditions(_Table):
     speck_radius_mm: tuple[Positive, Positive] = (0.1, 0.1)
 
     @model_validator(mode="after")
-    def _in_order(self) -> Conditions:
+    def _in_order(self) -> ConditionRanges:
         for name in ("level", "vignetting", "lamps", "blur_px", "noise", "specks", "speck_radius_mm"):
             low, high = getattr(self, name)
             if low > high:
@@ -90,7 +90,7 @@ class Conditions(_Table):
         return self
 
 
-class SensorTable(_Table):
+class SensorTable(_StrictTable):
     """The file but for its [[view]] tables, which the extractor's own reader checks."""
 
     name: str = ""
@@ -101,7 +101,7 @@ class SensorTable(_Table):
     elastomer: ElastomerTable
     contact: ContactTable
     load: tuple[LoadTable, ...] = ()
-    conditions: Conditions = Conditions()
+    conditions: ConditionRanges = ConditionRanges()
 
 
 @dataclass(frozen=True, eq=False)

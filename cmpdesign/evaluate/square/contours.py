@@ -17,8 +17,11 @@ from cmpdesign.evaluate.square.quads import Quads, find_quads
 from cmpdesign.layout.layout import Layout
 
 Points = NDArray[np.float64]
-JOIN = 0.4  # corners of different quads closer than this, in edges of the smaller quad, are one
-MIN_WINDOW_PX, WINDOW = 2, 0.2  # half the window of the sub-pixel search, and the same in edges
+CORNER_JOIN_EDGES = 0.4  # corners of different quads closer than this, in edges of the smaller quad, are one
+MIN_SEARCH_WINDOW_PX, SEARCH_WINDOW_EDGES = (
+    2,
+    0.2,
+)  # half the window of the sub-pixel search, and the same in edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +49,15 @@ def read_square(bgr: NDArray[np.uint8], layout: Layout, edge_px: float, axes_px:
     quads = find_quads(bgr, edge_px)
     if quads.reference is None:
         return xy_px
-    nodes, places = joined(quads.corners_px)
-    numbers = number(quads, nodes, layout, axes_px)
+    nodes, places = join_corners(quads.corners_px)
+    numbers = number_nodes(quads, nodes, layout, axes_px)
     found = np.array(sorted(numbers), dtype=np.int64)
     ids = np.array([numbers[node] for node in found], dtype=np.int64)
-    xy_px[ids] = refined(bgr, places[found], edge_px)
+    xy_px[ids] = refine_corners(bgr, places[found], edge_px)
     return xy_px
 
 
-def joined(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
+def join_corners(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
     """Nodes where corners of quads meet: (Q, 4) the node of every corner, and (N, 2) the nodes' places.
 
     A corner joins every corner of another quad that is close by; their node lies in their middle.
@@ -65,7 +68,7 @@ def joined(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
 
     points = corners_px.reshape(-1, 2)
     sides = np.linalg.norm(np.roll(corners_px, -1, axis=1) - corners_px, axis=2).min(axis=1)
-    reach = np.repeat(JOIN * sides, 4)
+    reach = np.repeat(CORNER_JOIN_EDGES * sides, 4)
     pairs = cKDTree(points).query_pairs(float(reach.max()), output_type="ndarray")
     apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     close = apart < np.minimum(reach[pairs[:, 0]], reach[pairs[:, 1]])
@@ -77,14 +80,14 @@ def joined(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
     return node.reshape(-1, 4).astype(np.int64), places
 
 
-def number(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Points) -> dict[int, int]:
+def number_nodes(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Points) -> dict[int, int]:
     """Node -> marker id, outward from the reference cell through shared corners, breadth first.
 
     A quad of the same shade touches in one corner, one of the other shade in two. A quad that contradicts what is
     numbered already is left out.
     """
     side = int(layout.marker_index.max()) + 1
-    turn = _clockwise(axes_px)
+    turn = _turn_sign(axes_px)
     around: dict[int, list[int]] = {}
     for quad, corner_nodes in enumerate(nodes.tolist()):
         for node in corner_nodes:
@@ -93,7 +96,7 @@ def number(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Poin
     assert quads.reference is not None
     first = int(layout.reference_marker)
     # ids[quad] are its corners' ids, in the order of its corners in the image.
-    start = reference_ids(quads.corners_px[quads.reference], axes_px, first, side)
+    start = reference_cell_ids(quads.corners_px[quads.reference], axes_px, first, side)
     numbers = dict(zip(nodes[quads.reference].tolist(), start, strict=True))
     ids, queue = {quads.reference: start}, deque([quads.reference])
     while queue:
@@ -101,8 +104,8 @@ def number(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Poin
         for quad in sorted({quad for node in nodes[known].tolist() for quad in around[node]}):
             if quad in ids:
                 continue
-            found = _cell(quad, known, quads, nodes, numbers, side, turn)
-            if found is None or not _agrees(nodes[quad].tolist(), found, numbers):
+            found = _neighbour_cell_ids(quad, known, quads, nodes, numbers, side, turn)
+            if found is None or not _is_consistent(nodes[quad].tolist(), found, numbers):
                 continue
             ids[quad] = found
             numbers |= dict(zip(nodes[quad].tolist(), found, strict=True))
@@ -110,38 +113,38 @@ def number(quads: Quads, nodes: NDArray[np.int64], layout: Layout, axes_px: Poin
     return numbers
 
 
-def _clockwise(axes_px: Points) -> int:
+def _turn_sign(axes_px: Points) -> int:
     """1 where top left, top right, bottom right, bottom left is clockwise in the image, -1 where it is not."""
     columns, rows = axes_px
     return 1 if columns[0] * rows[1] - columns[1] * rows[0] > 0 else -1
 
 
 # Row and column of a cell's corners, in the order top left, top right, bottom right, bottom left.
-_ROLE_STEPS = ((0, 0), (0, 1), (1, 1), (1, 0))
+_CORNER_OFFSETS = ((0, 0), (0, 1), (1, 1), (1, 0))
 
 
-def _ids(row: int, column: int, role: int, turn: int, side: int) -> list[int] | None:
+def _cell_corner_ids(row: int, column: int, role: int, turn: int, side: int) -> list[int] | None:
     """The ids of a cell's corners in image order, when its first corner plays ``role``; None outside."""
     if not (0 <= row < side - 1 and 0 <= column < side - 1):
         return None
-    steps = [_ROLE_STEPS[(role + turn * i) % 4] for i in range(4)]
+    steps = [_CORNER_OFFSETS[(role + turn * i) % 4] for i in range(4)]
     return [(row + down) * side + column + right for down, right in steps]
 
 
-def reference_ids(corners_px: Points, axes_px: Points, first: int, side: int) -> list[int]:
+def reference_cell_ids(corners_px: Points, axes_px: Points, first: int, side: int) -> list[int]:
     """The reference cell's ids: its corners are told by the directions known from rest."""
     expected = np.array([-axes_px[0] - axes_px[1], axes_px[0] - axes_px[1], axes_px.sum(axis=0)])
     expected = np.vstack([expected, axes_px[1] - axes_px[0]])
     arms = corners_px - corners_px.mean(axis=0)
-    turn = _clockwise(axes_px)
+    turn = _turn_sign(axes_px)
     fit = [sum(arms[i] @ expected[(role + turn * i) % 4] for i in range(4)) for role in range(4)]
     row, column = divmod(first, side)
-    ids = _ids(row, column, int(np.argmax(fit)), turn, side)
+    ids = _cell_corner_ids(row, column, int(np.argmax(fit)), turn, side)
     assert ids is not None
     return ids
 
 
-def _cell(
+def _neighbour_cell_ids(
     quad: int,
     known: int,
     quads: Quads,
@@ -172,16 +175,16 @@ def _cell(
             cell = (top, column if column > left else column - 1)
         else:
             return None
-    role = _ROLE_STEPS.index((row - cell[0], column - cell[1]))
-    return _ids(*cell, (role - turn * corner) % 4, turn, side)
+    role = _CORNER_OFFSETS.index((row - cell[0], column - cell[1]))
+    return _cell_corner_ids(*cell, (role - turn * corner) % 4, turn, side)
 
 
-def _agrees(corner_nodes: list[int], ids: list[int], numbers: dict[int, int]) -> bool:
+def _is_consistent(corner_nodes: list[int], ids: list[int], numbers: dict[int, int]) -> bool:
     """No corner has another number already, and no number another corner."""
     return all(numbers.get(node, marker) == marker for node, marker in zip(corner_nodes, ids, strict=True))
 
 
-def refined(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
+def refine_corners(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
     """(N, 2) the places where gradients meet (cv2.cornerSubPix); as they were where it runs away.
 
     NaN outside the image.
@@ -190,14 +193,14 @@ def refined(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
     inside = ((places >= 0) & (places <= np.array(bgr.shape[1::-1]) - 1)).all(axis=1)
     found = np.full(places.shape, np.nan)
     if inside.any():
-        found[inside] = _sub_pixel(bgr, places[inside], edge_px)
+        found[inside] = _refine_sub_pixel(bgr, places[inside], edge_px)
     return found
 
 
-def _sub_pixel(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
+def _refine_sub_pixel(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
     import cv2
 
-    window = max(round(WINDOW * edge_px), MIN_WINDOW_PX)
+    window = max(round(SEARCH_WINDOW_EDGES * edge_px), MIN_SEARCH_WINDOW_PX)
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
     start = places.astype(np.float32)[:, None]

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-EROSIONS = (1, 2, 3, 4)
-CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+EROSION_STEPS_PX = (1, 2, 3, 4)
+EROSION_KERNEL = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 # A quad's area and its corners' distance from its outline, in units of the square at rest.
-AREA = (0.1, 3.0)
-STRAIGHT = 0.12
+QUAD_AREA_RANGE = (0.1, 3.0)
+OUTLINE_TOLERANCE = 0.12
 RED_SHARE = 0.5
 
 
@@ -49,40 +49,42 @@ def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
     mask = np.asarray(
         cv2.adaptiveThreshold(value, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, block, 0), np.uint8
     )
-    light = _best(mask, edge_px)
-    dark = _best(~mask, edge_px)
+    light = _find_most_quads(mask, edge_px)
+    dark = _find_most_quads(~mask, edge_px)
     corners = np.concatenate([light, dark])
     shade = np.arange(len(corners)) < len(light)
-    return Quads(corners, shade, _reference(bgr, light))
+    return Quads(corners, shade, _find_reference_cell(bgr, light))
 
 
-def _best(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
+def _find_most_quads(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
     """(Q, 4, 2) from the erosion that leaves the most quads; the weakest of equals."""
-    return max((_quads(mask, times, edge_px) for times in EROSIONS), key=len)
+    return max((_quads_from_mask(mask, times, edge_px) for times in EROSION_STEPS_PX), key=len)
 
 
-def _quads(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[np.float64]:
+def _quads_from_mask(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) -> NDArray[np.float64]:
     import cv2
 
     contours, _ = cv2.findContours(
-        cv2.erode(mask, CROSS, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
+        cv2.erode(mask, EROSION_KERNEL, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
-    shortest = 2 * np.sqrt(np.pi * AREA[0]) * edge_px / np.sqrt(2)  # pixels around a disc of the least area
+    shortest = (
+        2 * np.sqrt(np.pi * QUAD_AREA_RANGE[0]) * edge_px / np.sqrt(2)
+    )  # pixels around a disc of the least area
     long = (contour for contour in contours if len(contour) >= shortest)
-    kept = [quad for contour in long if (quad := _quad(contour, edge_px)) is not None]
+    kept = [quad for contour in long if (quad := _fit_quad(contour, edge_px)) is not None]
     if not kept:
         return np.empty((0, 4, 2))
-    return _grown(np.stack(kept), float(eroded_px))
+    return _offset_quads(np.stack(kept), float(eroded_px))
 
 
-def _quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
+def _fit_quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
     """(4, 2) corners of a contour that is a convex quadrilateral of about the right size; None for any other."""
     import cv2
 
     area = cv2.contourArea(contour)
-    if not AREA[0] * edge_px**2 < area < AREA[1] * edge_px**2:
+    if not QUAD_AREA_RANGE[0] * edge_px**2 < area < QUAD_AREA_RANGE[1] * edge_px**2:
         return None
-    outline = cv2.approxPolyDP(contour, STRAIGHT * np.sqrt(area), True)
+    outline = cv2.approxPolyDP(contour, OUTLINE_TOLERANCE * np.sqrt(area), True)
     if len(outline) != 4 or not cv2.isContourConvex(outline):
         return None
     corners = outline[:, 0].astype(np.float64)
@@ -90,7 +92,7 @@ def _quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
     return corners if cv2.contourArea(outline, True) > 0 else corners[::-1]
 
 
-def _grown(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
+def _offset_quads(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
     """Quads (Q, 4, 2), clockwise with y down, with every side moved outward."""
     along = np.roll(quads, -1, axis=1) - quads
     along /= np.linalg.norm(along, axis=2, keepdims=True)
@@ -101,7 +103,7 @@ def _grown(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
     return np.asarray(quads + by_px * (normal + before) / np.maximum(1 + cosine, 0.3))
 
 
-def _reference(bgr: NDArray[np.uint8], light: NDArray[np.float64]) -> int | None:
+def _find_reference_cell(bgr: NDArray[np.uint8], light: NDArray[np.float64]) -> int | None:
     """The light quad that is decidedly red; None when none is, or more than one."""
     centres = light.mean(axis=1)
     shares = [_redness(bgr, centre) for centre in centres]

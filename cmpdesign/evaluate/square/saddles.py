@@ -13,14 +13,14 @@ from heapq import heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.square.contours import SquareReader, refined
+from cmpdesign.evaluate.square.contours import SquareReader, refine_corners
 
 Points = NDArray[np.float64]
-Place = tuple[int, int]  # row, column
-SMOOTH = 0.08  # sigma of the Gaussian before the second derivatives, in edges
-WEAK = 0.02  # share of the strong saddles' response below which a maximum is noise
-REACH = 0.3  # how far from where it is expected a corner may lie, in edges
-STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+LatticePlace = tuple[int, int]  # row, column
+SMOOTHING_EDGES = 0.08  # sigma of the Gaussian before the second derivatives, in edges
+MIN_RESPONSE_SHARE = 0.02  # share of the strong saddles' response below which a maximum is noise
+SEARCH_REACH_EDGES = 0.3  # how far from where it is expected a corner may lie, in edges
+NEIGHBOUR_OFFSETS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,43 +35,46 @@ class SaddleReader(SquareReader):
             return xy_px
         side = int(self.layout.marker_index.max()) + 1
         start = {divmod(marker, side): xy_px[marker] for marker in known}
-        placed = grow(find_saddles(bgr, self.edge_px), start, side, self.edge_px * self.axes_px)
+        placed = grow_lattice(find_saddles(bgr, self.edge_px), start, side, self.edge_px * self.axes_px)
         more = sorted(placed.keys() - start.keys())
         if more:
             ids = [row * side + column for row, column in more]
-            xy_px[ids] = refined(bgr, np.array([placed[place] for place in more]), self.edge_px)
+            xy_px[ids] = refine_corners(bgr, np.array([placed[place] for place in more]), self.edge_px)
         return xy_px
 
 
 @dataclass(frozen=True, eq=False)
-class Saddles:
+class SaddlePoints:
     """Saddle points: (N, 2) their places in px, and (N, 2, 2) the second derivatives there."""
 
     xy_px: Points
     bend: Points
 
 
-def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> Saddles:
+def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> SaddlePoints:
     """The strong local maxima of the negative Hessian determinant of the smoothed brightness."""
     import cv2
 
     gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)
-    smooth = cv2.GaussianBlur(gray, (0, 0), max(SMOOTH * edge_px, 1.0))
+    smooth = cv2.GaussianBlur(gray, (0, 0), max(SMOOTHING_EDGES * edge_px, 1.0))
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
     response = xy * xy - xx * yy
     reach = max(round(0.2 * edge_px), 2)
     highest = cv2.dilate(response, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     peaks = response[(response == highest) & (response > 0)]
     strong = float(np.quantile(peaks, 0.9)) if len(peaks) else 1.0
-    rows, columns = np.nonzero((response == highest) & (response > WEAK * strong))
+    rows, columns = np.nonzero((response == highest) & (response > MIN_RESPONSE_SHARE * strong))
     bend = np.stack([xx, xy, xy, yy], axis=-1)[rows, columns].reshape(-1, 2, 2).astype(np.float64)
-    return Saddles(np.stack([columns, rows], axis=1).astype(np.float64), bend)
+    return SaddlePoints(np.stack([columns, rows], axis=1).astype(np.float64), bend)
 
 
-def grow(saddles: Saddles, start: dict[Place, Points], side: int, cell: Points) -> dict[Place, Points]:
+def grow_lattice(
+    saddles: SaddlePoints, start: dict[LatticePlace, Points], side: int, cell: Points
+) -> dict[LatticePlace, Points]:
     """(row, column) -> place: ``start``, and what is found outward from it.
 
-    The nearest saddle within ``REACH`` of where a neighbour is expected is taken, the best fitting first, each once.
+    The nearest saddle within ``SEARCH_REACH_EDGES`` of where a neighbour is expected is taken, the best fitting
+    first, each once.
     It must bend as its place says: light and dark cells alternate, and top left of the pattern is a light one.
     ``cell`` (2, 2) holds the steps from column to column and from row to row where no neighbour tells them.
     """
@@ -82,17 +85,17 @@ def grow(saddles: Saddles, start: dict[Place, Points], side: int, cell: Points) 
     tree = cKDTree(saddles.xy_px)
     placed = dict(start)
     used: set[int] = set()
-    queue: list[tuple[float, Place, int]] = []
+    queue: list[tuple[float, LatticePlace, int]] = []
 
-    def offer_neighbours(known: Place) -> None:
-        right_px, down_px = (_step(known, way, placed, cell) for way in ((0, 1), (1, 0)))
+    def offer_neighbours(known: LatticePlace) -> None:
+        right_px, down_px = (_predict_offset(known, way, placed, cell) for way in ((0, 1), (1, 0)))
         edge_px = float(min(np.linalg.norm(right_px), np.linalg.norm(down_px)))
-        for way in STEPS:
+        for way in NEIGHBOUR_OFFSETS:
             near = known[0] + way[0], known[1] + way[1]
             if near in placed or min(near) < 0 or max(near) >= side:
                 continue
-            expected = placed[known] + _step(known, way, placed, cell)
-            apart, saddle = tree.query(expected, distance_upper_bound=REACH * edge_px)
+            expected = placed[known] + _predict_offset(known, way, placed, cell)
+            apart, saddle = tree.query(expected, distance_upper_bound=SEARCH_REACH_EDGES * edge_px)
             if not np.isfinite(apart):
                 continue
             light_below = bool(right_px @ saddles.bend[saddle] @ down_px > 0)
@@ -101,7 +104,7 @@ def grow(saddles: Saddles, start: dict[Place, Points], side: int, cell: Points) 
 
     for place, xy in start.items():
         apart, saddle = tree.query(xy)
-        if apart <= SMOOTH * float(np.linalg.norm(cell[0])) + 1:
+        if apart <= SMOOTHING_EDGES * float(np.linalg.norm(cell[0])) + 1:
             used.add(int(saddle))
         offer_neighbours(place)
     while queue:
@@ -113,7 +116,9 @@ def grow(saddles: Saddles, start: dict[Place, Points], side: int, cell: Points) 
     return placed
 
 
-def _step(place: Place, way: Place, placed: dict[Place, Points], cell: Points) -> Points:
+def _predict_offset(
+    place: LatticePlace, way: LatticePlace, placed: dict[LatticePlace, Points], cell: Points
+) -> Points:
     """The step to a neighbour: the mean of the step behind and those beside, or as at rest."""
     (row, column), (down, right) = place, way
     pairs = [((row - down, column - right), place)]

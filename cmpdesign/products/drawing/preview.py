@@ -19,9 +19,9 @@ _SUBPIXEL_BITS = 8
 # Ids are drawn when an edge is long enough to hold one.
 _ID_EDGE_PX = 34
 
-_PAPER = (250, 250, 248)
-_TEXT = (60, 52, 44)
-_FAINT = (150, 142, 134)
+_PAPER_BGR = (250, 250, 248)
+_TEXT_BGR = (60, 52, 44)
+_FAINT_BGR = (150, 142, 134)
 
 Image = NDArray[np.uint8]
 
@@ -37,9 +37,9 @@ def preview_png(layout: Layout, pictures: Mapping[str, Image] | None = None) -> 
 
     image = draw_preview(layout)
     if pictures:
-        from cmpdesign.products.drawing.preview_pictures import with_pictures
+        from cmpdesign.products.drawing.preview_pictures import compose_pictures
 
-        image = with_pictures(image, pictures, _PAPER)
+        image = compose_pictures(image, pictures, _PAPER_BGR)
     return bytes(cv2.imencode(".png", image)[1])
 
 
@@ -47,34 +47,40 @@ def draw_preview(layout: Layout) -> Image:
     """The preview as a (H, W, 3) uint8 BGR image; the outline's longer side takes ``LONG_SIDE_PX``."""
     scale = LONG_SIDE_PX / max(layout.size_mm)
     width, height = (int(np.ceil(scale * side)) for side in layout.size_mm)
-    image: Image = np.full((height + 2 * MARGIN_PX + TITLE_PX, width + 2 * MARGIN_PX, 3), _PAPER, np.uint8)
+    image: Image = np.full(
+        (height + 2 * MARGIN_PX + TITLE_PX, width + 2 * MARGIN_PX, 3), _PAPER_BGR, np.uint8
+    )
     origin = np.array([MARGIN_PX, MARGIN_PX + TITLE_PX])
     corner = layout.outline_mm.min(axis=0)[0], layout.outline_mm.max(axis=0)[1]
 
     def to_px(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(origin + scale * (xy_mm - corner) * (1, -1))
 
-    image = _filled(image, layout, to_px(layout.outline_mm), to_px(layout.marker_xy_mm))
-    _ids(image, layout, to_px(layout.marker_xy_mm), scale)
-    _dimensions(image, layout, origin, (width, height))
-    _title(image, layout)
+    image = _cells_image(image, layout, to_px(layout.outline_mm), to_px(layout.marker_xy_mm))
+    _draw_ids(image, layout, to_px(layout.marker_xy_mm), scale)
+    _draw_dimensions(image, layout, origin, (width, height))
+    _draw_title(image, layout)
     return image
 
 
-def _filled(image: Image, layout: Layout, outline: NDArray[np.float64], xy: NDArray[np.float64]) -> Image:
+def _cells_image(
+    image: Image, layout: Layout, outline: NDArray[np.float64], xy: NDArray[np.float64]
+) -> Image:
     import cv2
 
     large: Image = np.empty((image.shape[0] * _SUPERSAMPLING, image.shape[1] * _SUPERSAMPLING, 3), np.uint8)
-    large[:] = _PAPER
-    _fill(large, [outline], _bgr(layout, BLACK))
+    large[:] = _PAPER_BGR
+    _draw_polygons(large, [outline], _ink_bgr(layout, BLACK))
     for color in range(len(COLORS)):
         if color != BLACK:
-            _fill(large, list(xy[layout.cell_corners[layout.cell_color == color]]), _bgr(layout, color))
+            _draw_polygons(
+                large, list(xy[layout.cell_corners[layout.cell_color == color]]), _ink_bgr(layout, color)
+            )
     small = cv2.resize(large, (image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)
 
 
-def _fill(large: Image, polygons: list[NDArray[np.float64]], color: tuple[int, int, int]) -> None:
+def _draw_polygons(large: Image, polygons: list[NDArray[np.float64]], color: tuple[int, int, int]) -> None:
     import cv2
 
     # A pixel's centre is a whole number for OpenCV, so the large image's grid lies half a pixel off.
@@ -84,7 +90,7 @@ def _fill(large: Image, polygons: list[NDArray[np.float64]], color: tuple[int, i
         cv2.fillConvexPoly(large, points, color, cv2.LINE_8, _SUBPIXEL_BITS)
 
 
-def _ids(image: Image, layout: Layout, xy: NDArray[np.float64], scale: float) -> None:
+def _draw_ids(image: Image, layout: Layout, xy: NDArray[np.float64], scale: float) -> None:
     """Every seen marker as a dot with its id, when there is room for all of them."""
     ends = xy[layout.edges]
     edge_px = float(np.median(np.hypot(*(ends[:, 1] - ends[:, 0]).T)))
@@ -93,24 +99,24 @@ def _ids(image: Image, layout: Layout, xy: NDArray[np.float64], scale: float) ->
     size = min(0.5, edge_px / 130)
     for marker in np.flatnonzero(layout.present).tolist():
         at = xy[marker] + (0, -0.16 * edge_px)
-        _text(image, str(marker), at, size, (255, 255, 255), outline=True)
+        _draw_text(image, str(marker), at, size, (255, 255, 255), outline=True)
 
 
-def _dimensions(image: Image, layout: Layout, origin: NDArray[np.int64], size: tuple[int, int]) -> None:
+def _draw_dimensions(image: Image, layout: Layout, origin: NDArray[np.int64], size: tuple[int, int]) -> None:
     """Overall width below and overall height on the right, as on an engineering drawing."""
     (left, top), (width, height) = origin, size
     below, beside = top + height + MARGIN_PX // 2, left + width + MARGIN_PX // 2
     for x in (left, left + width):
-        _line(image, (x, top + height + 8), (x, below + 8), _FAINT)
+        _draw_line(image, (x, top + height + 8), (x, below + 8), _FAINT_BGR)
     for y in (top, top + height):
-        _line(image, (left + width + 8, y), (beside + 8, y), _FAINT)
-    _arrow(image, (left, below), (left + width, below))
-    _arrow(image, (beside, top), (beside, top + height))
-    _label(image, f"{layout.size_mm[0]:.2f} mm", (left + width / 2, below), upright=False)
-    _label(image, f"{layout.size_mm[1]:.2f} mm", (beside, top + height / 2), upright=True)
+        _draw_line(image, (left + width + 8, y), (beside + 8, y), _FAINT_BGR)
+    _draw_arrow(image, (left, below), (left + width, below))
+    _draw_arrow(image, (beside, top), (beside, top + height))
+    _draw_label(image, f"{layout.size_mm[0]:.2f} mm", (left + width / 2, below), upright=False)
+    _draw_label(image, f"{layout.size_mm[1]:.2f} mm", (beside, top + height / 2), upright=True)
 
 
-def _title(image: Image, layout: Layout) -> None:
+def _draw_title(image: Image, layout: Layout) -> None:
     name = str(layout.parameters.get("name") or layout.pattern)
     virtual = len(layout.edges) * layout.virtual_per_edge
     facts = [
@@ -122,35 +128,37 @@ def _title(image: Image, layout: Layout) -> None:
         f"{len(layout.cell_corners)} cells",
         *(["seen from the front, used from the back"] if layout.mirrored else []),
     ]
-    _text(image, name, (MARGIN_PX, 46), 0.9, _TEXT, left=True, weight=2)
-    _text(image, "   ".join(facts), (MARGIN_PX, 82), 0.5, _FAINT, left=True)
+    _draw_text(image, name, (MARGIN_PX, 46), 0.9, _TEXT_BGR, left=True, weight=2)
+    _draw_text(image, "   ".join(facts), (MARGIN_PX, 82), 0.5, _FAINT_BGR, left=True)
 
 
-def _arrow(image: Image, start: tuple[int, int], end: tuple[int, int]) -> None:
+def _draw_arrow(image: Image, start: tuple[int, int], end: tuple[int, int]) -> None:
     import cv2
 
-    _line(image, start, end, _TEXT)
+    _draw_line(image, start, end, _TEXT_BGR)
     direction = np.subtract(end, start) / np.hypot(*np.subtract(end, start))
     normal = np.array([-direction[1], direction[0]])
     for tip, inward in ((np.array(start), direction), (np.array(end), -direction)):
         head = np.array([tip, tip + 14 * inward + 4 * normal, tip + 14 * inward - 4 * normal])
         points = np.rint(head * 256).astype(np.int32)
-        cv2.fillConvexPoly(image, points, _TEXT, cv2.LINE_AA, 8)
+        cv2.fillConvexPoly(image, points, _TEXT_BGR, cv2.LINE_AA, 8)
 
 
-def _line(image: Image, start: tuple[int, int], end: tuple[int, int], color: tuple[int, int, int]) -> None:
+def _draw_line(
+    image: Image, start: tuple[int, int], end: tuple[int, int], color: tuple[int, int, int]
+) -> None:
     import cv2
 
     cv2.line(image, [int(v) for v in start], [int(v) for v in end], color, 1, cv2.LINE_AA)
 
 
-def _label(image: Image, text: str, middle: tuple[float, float], upright: bool) -> None:
+def _draw_label(image: Image, text: str, middle: tuple[float, float], upright: bool) -> None:
     """A label that interrupts its dimension line; upright ones read from below to above."""
     import cv2
 
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
-    patch: Image = np.full((height + 10, width + 20, 3), _PAPER, np.uint8)
-    cv2.putText(patch, text, (10, height + 4), cv2.FONT_HERSHEY_SIMPLEX, 0.6, _TEXT, 1, cv2.LINE_AA)
+    patch: Image = np.full((height + 10, width + 20, 3), _PAPER_BGR, np.uint8)
+    cv2.putText(patch, text, (10, height + 4), cv2.FONT_HERSHEY_SIMPLEX, 0.6, _TEXT_BGR, 1, cv2.LINE_AA)
     if upright:
         patch = np.ascontiguousarray(np.rot90(patch))
     rows, columns = patch.shape[:2]
@@ -159,7 +167,7 @@ def _label(image: Image, text: str, middle: tuple[float, float], upright: bool) 
     target[:] = patch[: target.shape[0], : target.shape[1]]
 
 
-def _text(
+def _draw_text(
     image: Image,
     text: str,
     at: NDArray[np.float64] | tuple[float, float],
@@ -182,6 +190,6 @@ def _text(
     cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, color, weight, cv2.LINE_AA)
 
 
-def _bgr(layout: Layout, color: int) -> tuple[int, int, int]:
+def _ink_bgr(layout: Layout, color: int) -> tuple[int, int, int]:
     text = layout.palette[COLORS[color]]
     return int(text[5:7], 16), int(text[3:5], 16), int(text[1:3], 16)

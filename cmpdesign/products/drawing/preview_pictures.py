@@ -12,15 +12,15 @@ Image = NDArray[np.uint8]
 # Beside the drawing, pictures are at least this high; below it, about this wide.
 BESIDE_PX, BELOW_PX = 1000, 300
 GAP_PX, CAPTION_PX = 12, 26
-_INK = (60, 52, 44)
+_TEXT_BGR = (60, 52, 44)
 
 
-def with_pictures(drawing: Image, pictures: Mapping[str, Image], paper: tuple[int, int, int]) -> Image:
+def compose_pictures(drawing: Image, pictures: Mapping[str, Image], paper: tuple[int, int, int]) -> Image:
     """One (H, W, 3) picture of all; white in the pictures becomes paper."""
-    tinted = {name: _on(picture, paper) for name, picture in pictures.items()}
+    tinted = {name: _on_paper(picture, paper) for name, picture in pictures.items()}
     beside = {name: picture for name, picture in tinted.items() if picture.shape[0] > picture.shape[1]}
     height = max(drawing.shape[0], BESIDE_PX if beside else 0)
-    top = _row([drawing, *(_scaled(p, height / p.shape[0]) for p in beside.values())], paper)
+    top = _picture_row([drawing, *(_scale_picture(p, height / p.shape[0]) for p in beside.values())], paper)
     below = [(name, picture) for name, picture in tinted.items() if name not in beside]
     columns = max(1, top.shape[1] // BELOW_PX)
     # An even number keeps the two sides of a part beside each other.
@@ -28,28 +28,30 @@ def with_pictures(drawing: Image, pictures: Mapping[str, Image], paper: tuple[in
     width = top.shape[1] // columns - GAP_PX
     rows = [top]
     for first in range(0, len(below), columns):
-        cells = [_captioned(name, picture, width, paper) for name, picture in below[first : first + columns]]
-        rows.append(_row(cells, paper))
+        cells = [
+            _caption_picture(name, picture, width, paper) for name, picture in below[first : first + columns]
+        ]
+        rows.append(_picture_row(cells, paper))
     wide = max(row.shape[1] for row in rows)
-    return np.concatenate([_padded(row, row.shape[0] + GAP_PX, wide, paper) for row in rows])
+    return np.concatenate([_pad_picture(row, row.shape[0] + GAP_PX, wide, paper) for row in rows])
 
 
-def _on(picture: Image, paper: tuple[int, int, int]) -> Image:
+def _on_paper(picture: Image, paper: tuple[int, int, int]) -> Image:
     """The picture multiplied by the paper's color."""
     return np.asarray(picture.astype(np.uint16) * np.array(paper) // 255, dtype=np.uint8)
 
 
-def _captioned(name: str, picture: Image, width: int, paper: tuple[int, int, int]) -> Image:
+def _caption_picture(name: str, picture: Image, width: int, paper: tuple[int, int, int]) -> Image:
     import cv2
 
-    small = _scaled(picture, width / picture.shape[1])
-    cell = _padded(small, small.shape[0] + CAPTION_PX, width + GAP_PX, paper)
+    small = _scale_picture(picture, width / picture.shape[1])
+    cell = _pad_picture(small, small.shape[0] + CAPTION_PX, width + GAP_PX, paper)
     text, baseline = name.replace("-above", ", above").replace("-below", ", below"), small.shape[0] + 16
-    cv2.putText(cell, text, [GAP_PX, baseline], cv2.FONT_HERSHEY_SIMPLEX, 0.5, _INK, 1, cv2.LINE_AA)
+    cv2.putText(cell, text, [GAP_PX, baseline], cv2.FONT_HERSHEY_SIMPLEX, 0.5, _TEXT_BGR, 1, cv2.LINE_AA)
     return cell
 
 
-def _scaled(picture: Image, factor: float) -> Image:
+def _scale_picture(picture: Image, factor: float) -> Image:
     import cv2
 
     kind = cv2.INTER_AREA if factor < 1 else cv2.INTER_CUBIC
@@ -57,12 +59,12 @@ def _scaled(picture: Image, factor: float) -> Image:
     return np.asarray(cv2.resize(picture, size, interpolation=kind), dtype=np.uint8)
 
 
-def _row(pictures: list[Image], paper: tuple[int, int, int]) -> Image:
+def _picture_row(pictures: list[Image], paper: tuple[int, int, int]) -> Image:
     height = max(picture.shape[0] for picture in pictures)
-    return np.concatenate([_padded(p, height, p.shape[1], paper) for p in pictures], axis=1)
+    return np.concatenate([_pad_picture(p, height, p.shape[1], paper) for p in pictures], axis=1)
 
 
-def _padded(picture: Image, height: int, width: int, paper: tuple[int, int, int]) -> Image:
+def _pad_picture(picture: Image, height: int, width: int, paper: tuple[int, int, int]) -> Image:
     result = np.empty((height, width, 3), np.uint8)
     result[:] = paper
     result[: picture.shape[0], : picture.shape[1]] = picture

@@ -14,12 +14,12 @@ from cmpdesign.layout.layout import DECIMALS, Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
 
 SCALE_STRIP_MM = 6.0
-_INK = "#000000"
+_TEXT_COLOR = "#000000"
 _FONT = {"font_family": "sans-serif"}
 # The mean letter of a wide sans-serif face.
 _EM_PER_LETTER = 0.6
 
-ToSheet = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+SheetMap = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def write_svg(
@@ -48,29 +48,29 @@ def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mir
 
     width, height = layout.size_mm
     sheet_height = round(height + (SCALE_STRIP_MM if scale else 0.0), DECIMALS)
-    to_sheet = _sheet_frame(layout, mirror)
+    to_sheet = _sheet_from_layout(layout, mirror)
     drawing = svgwrite.Drawing(
         size=(f"{width!r}mm", f"{sheet_height!r}mm"),
         viewBox=f"0 0 {width!r} {sheet_height!r}",
         debug=False,
     )
-    drawing.set_desc(title=_caption(layout))
+    drawing.set_desc(title=_caption_text(layout))
     ground = drawing.g(id=COLORS[BLACK], fill=layout.palette[COLORS[BLACK]])
-    ground.add(drawing.path(d=_closed(to_sheet(layout.outline_mm).tolist())))
+    ground.add(drawing.path(d=_closed_path(to_sheet(layout.outline_mm).tolist())))
     drawing.add(ground)
 
     xy = to_sheet(layout.marker_xy_mm)
     for color, name in enumerate(COLORS):
         if color != BLACK:
-            drawing.add(_cells(drawing, layout, xy, color, name))
+            drawing.add(_cell_group(drawing, layout, xy, color, name))
     if ids:
-        drawing.add(_ids(drawing, layout, xy, mirror))
+        drawing.add(_id_group(drawing, layout, xy, mirror))
     if scale:
-        drawing.add(_scale(drawing, layout, mirror))
+        drawing.add(_scale_group(drawing, layout, mirror))
     return f'<?xml version="1.0" encoding="utf-8" ?>\n{drawing.tostring()}\n'
 
 
-def _sheet_frame(layout: Layout, mirror: bool) -> ToSheet:
+def _sheet_from_layout(layout: Layout, mirror: bool) -> SheetMap:
     left = layout.outline_mm[:, 0].min()
     right, top = layout.outline_mm.max(axis=0)
 
@@ -81,36 +81,36 @@ def _sheet_frame(layout: Layout, mirror: bool) -> ToSheet:
     return to_sheet
 
 
-def _closed(points: list[list[float]]) -> str:
+def _closed_path(points: list[list[float]]) -> str:
     return "M" + "L".join(f"{x!r} {y!r}" for x, y in points) + "Z"
 
 
-def _cells(drawing: Any, layout: Layout, xy: NDArray[np.float64], color: int, name: str) -> Any:
+def _cell_group(drawing: Any, layout: Layout, xy: NDArray[np.float64], color: int, name: str) -> Any:
     group = drawing.g(id=name, fill=layout.palette[name])
     for corners in xy[layout.cell_corners[layout.cell_color == color]].tolist():
-        group.add(drawing.path(d=_closed(corners)))
+        group.add(drawing.path(d=_closed_path(corners)))
     return group
 
 
-def _ids(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: bool) -> Any:
+def _id_group(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: bool) -> Any:
     size = round(0.22 * float(layout.parameters["pitch_mm"]), 3)
     group = drawing.g(id="ids", fill="#ffffff", font_size=size, **_FONT, text_anchor="middle")
     for marker in np.flatnonzero(layout.present).tolist():
         x, y = xy[marker].tolist()
-        group.add(_text(drawing, str(marker), x, round(y + 0.35 * size, DECIMALS), mirror))
+        group.add(_text_element(drawing, str(marker), x, round(y + 0.35 * size, DECIMALS), mirror))
     return group
 
 
-def _scale(drawing: Any, layout: Layout, mirror: bool) -> Any:
+def _scale_group(drawing: Any, layout: Layout, mirror: bool) -> Any:
     """A bar with its length beside it, and below them a caption that shrinks until it fits the sheet."""
     width, height = layout.size_mm
     length = scale_length_mm(width)
-    caption = _caption(layout)
+    caption = _caption_text(layout)
     size = round(min(2.0, width / (_EM_PER_LETTER * len(caption))), 3)
-    group = drawing.g(id="scale", fill=_INK, font_size=size, **_FONT)
+    group = drawing.g(id="scale", fill=_TEXT_COLOR, font_size=size, **_FONT)
     group.add(drawing.rect(insert=(width - length if mirror else 0.0, height + 1.5), size=(length, 0.4)))
     for text, left, y in ((f"{length:g} mm", length + 0.5, height + 2.2), (caption, 0.0, height + 5.0)):
-        group.add(_text(drawing, text, width - left if mirror else left, y, mirror))
+        group.add(_text_element(drawing, text, width - left if mirror else left, y, mirror))
     return group
 
 
@@ -120,14 +120,14 @@ def scale_length_mm(width_mm: float) -> float:
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= width_mm / 2))
 
 
-def _text(drawing: Any, text: str, x: float, y: float, mirror: bool) -> Any:
+def _text_element(drawing: Any, text: str, x: float, y: float, mirror: bool) -> Any:
     """Text at a place; mirrored with the drawing, so that it reads rightly after the transfer."""
     if not mirror:
         return drawing.text(text, insert=(x, y))
     return drawing.text(text, insert=(0, 0), transform=f"translate({x!r} {y!r}) scale(-1 1)")
 
 
-def _caption(layout: Layout) -> str:
+def _caption_text(layout: Layout) -> str:
     width, height = layout.size_mm
     name = layout.parameters.get("name") or layout.pattern
     pitch = float(layout.parameters["pitch_mm"])

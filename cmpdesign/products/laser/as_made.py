@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.laser.job import Job, Pass
-from cmpdesign.products.laser.paths.beam import Beam, Points
+from cmpdesign.products.laser.job import LaserJob, LaserPass
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import Cavities, burnt_areas_mm2, burnt_outlines_mm
 from cmpdesign.products.laser.paths.kerf import polygon_areas
 from cmpdesign.products.laser.paths.webs import burn_depth_mm, smallest_web_mm
 
-Face = Literal["front", "back"]
+SheetFace = Literal["front", "back"]
 # Webs wider than this are no concern of anybody's; only cavities nearer than this are compared.
 WEB_REACH_PITCHES = 1.5
 
@@ -52,24 +52,24 @@ class PassFigures:
     back: FaceFigures | None
 
 
-def as_made(job: Job) -> tuple[PassFigures, ...]:
+def measure_as_made(job: LaserJob) -> tuple[PassFigures, ...]:
     """The figures of every pass of cells."""
     back = job.back if min(job.back.x_mm, job.back.y_mm) > 0 else None
-    front_figures = _face(job, job.front)
-    back_figures = _face(job, back) if back else [None] * len(front_figures)
+    front_figures = _measure_face(job, job.front)
+    back_figures = _measure_face(job, back) if back else [None] * len(front_figures)
     return tuple(
         PassFigures(one.name, front, rear)
         for one, front, rear in zip(job.cell_passes, front_figures, back_figures, strict=True)
     )
 
 
-def burnt_cells(one: Pass, beam: Beam) -> Points:
+def burnt_cell_outlines_mm(one: LaserPass, beam: BeamFootprint) -> Points:
     """(N, P, 2) outlines of a pass' cavities on the bed, in burning order."""
     assert one.cavities is not None
     return burnt_outlines_mm(one.cavities, beam)
 
 
-def _face(job: Job, beam: Beam) -> list[FaceFigures]:
+def _measure_face(job: LaserJob, beam: BeamFootprint) -> list[FaceFigures]:
     figures: list[FaceFigures] = []
     filled: list[Points] = []
     paths: list[Cavities] = []
@@ -84,25 +84,25 @@ def _face(job: Job, beam: Beam) -> list[FaceFigures]:
             to_filled = smallest_web_mm([made, *paths], [outlines, *filled], beam, reach_mm, across=True)
             if to_filled is not None and to_filled <= 0:
                 to_filled = -burn_depth_mm(outlines, np.concatenate(filled))
-        figures.append(_figures(made, outlines, beam, web, to_filled))
+        figures.append(_face_figures(made, outlines, beam, web, to_filled))
         filled.append(outlines)
         paths.append(made)
     return figures
 
 
-def _figures(
-    made: Cavities, outlines: Points, beam: Beam, web: float | None, to_filled: float | None
+def _face_figures(
+    made: Cavities, outlines: Points, beam: BeamFootprint, web: float | None, to_filled: float | None
 ) -> FaceFigures:
     nominal = polygon_areas(made.nominal_mm)
     burnt = burnt_areas_mm2(made, beam)
     errors = 100 * (burnt / nominal - 1)
     return FaceFigures(
-        area_error_percent=_tidy(100 * (float(burnt.sum()) / float(nominal.sum()) - 1)),
-        area_error_worst_percent=_tidy(float(errors[np.abs(errors).argmax()])),
-        corner_loss_mm=_tidy(float(corner_losses_mm(made, outlines).max())),
-        burnt_beside_mm=_tidy(float(np.maximum(beside_mm(made, outlines), 0).max())),
-        web_mm=None if web is None else _tidy(web),
-        web_to_filled_mm=None if to_filled is None else _tidy(to_filled),
+        area_error_percent=_round_figure(100 * (float(burnt.sum()) / float(nominal.sum()) - 1)),
+        area_error_worst_percent=_round_figure(float(errors[np.abs(errors).argmax()])),
+        corner_loss_mm=_round_figure(float(corner_losses_mm(made, outlines).max())),
+        burnt_beside_mm=_round_figure(float(np.maximum(burnt_reach_beside_mm(made, outlines), 0).max())),
+        web_mm=None if web is None else _round_figure(web),
+        web_to_filled_mm=None if to_filled is None else _round_figure(to_filled),
     )
 
 
@@ -117,7 +117,7 @@ def corner_losses_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
     return np.where(past, 0.0, gap)
 
 
-def beside_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
+def burnt_reach_beside_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
     """(N,) how far each burnt outline reaches past its cell's sides; negative where it stays inside."""
     start = made.nominal_mm
     side = np.roll(start, -1, axis=1) - start
@@ -127,6 +127,6 @@ def beside_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
     return np.asarray(reach.max(axis=(1, 2)))
 
 
-def _tidy(value: float) -> float:
+def _round_figure(value: float) -> float:
     """Rounded to what the geometry holds, so that every machine writes the same figure."""
     return round(value, 6) + 0.0

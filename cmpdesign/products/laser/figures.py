@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.laser.as_made import PassFigures
-from cmpdesign.products.laser.job import Job, Pass
+from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.order import shortest_pause
 from cmpdesign.products.laser.paths.timing import (
     begin_times_s,
@@ -19,7 +19,7 @@ from cmpdesign.products.laser.paths.timing import (
 
 
 @dataclass(frozen=True)
-class Timing:
+class PassTiming:
     """A pass in time and length.
 
     Attributes:
@@ -35,7 +35,7 @@ class Timing:
     shortest_pause_s: float | None
 
 
-def timing(job: Job, one: Pass) -> Timing:
+def pass_timing(job: LaserJob, one: LaserPass) -> PassTiming:
     """The time that a pass takes, from speed, travel, acceleration and repeats."""
     machine = job.setup.machine
     travel_speed, accel = machine.travel_mm_s.value, machine.acceleration_mm_s2.value
@@ -59,12 +59,14 @@ def timing(job: Job, one: Pass) -> Timing:
             pause = found if np.isfinite(found) else None
     ways = np.hypot(*one.burnt(0).xy_mm[0]), np.hypot(*one.burnt(0).xy_mm[-1])
     time_s += float(move_times_s(np.array(ways), travel_speed, accel).sum())
-    return Timing(
+    return PassTiming(
         round(time_s, 3), round(burn_mm, 3), round(travel_mm, 3), None if pause is None else round(pause, 3)
     )
 
 
-def job_figures(job: Job, made: tuple[PassFigures, ...], timings: tuple[Timing, ...]) -> dict[str, Any]:
+def job_figures(
+    job: LaserJob, made: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]
+) -> dict[str, Any]:
     """The job's member of ``report.json``; lengths in mm, times in s, areas in percent of the nominal
     cells."""
     setup, by_name = job.setup, {one.name: one for one in made}
@@ -93,7 +95,7 @@ def job_figures(job: Job, made: tuple[PassFigures, ...], timings: tuple[Timing, 
     }
 
 
-def _pass_figures(one: Pass, time: Timing, made: PassFigures | None) -> dict[str, Any]:
+def _pass_figures(one: LaserPass, time: PassTiming, made: PassFigures | None) -> dict[str, Any]:
     return {
         "name": one.name,
         "paths": len(one.walls),

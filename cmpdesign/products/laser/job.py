@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.laser.paths.beam import Beam, Points
-from cmpdesign.products.laser.paths.cavities import Cavities, cavities
-from cmpdesign.products.laser.paths.fill import hatch, rings
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
+from cmpdesign.products.laser.paths.cavities import Cavities, make_cavities
+from cmpdesign.products.laser.paths.fill import hatch_strokes, ring_strokes
 from cmpdesign.products.laser.paths.kerf import outset_outline
-from cmpdesign.products.laser.paths.order import ordered
-from cmpdesign.products.laser.paths.strokes import Strokes, joined, loops, ragged
-from cmpdesign.products.laser.setup import Setup
+from cmpdesign.products.laser.paths.order import order_cells
+from cmpdesign.products.laser.paths.strokes import Strokes, join_strokes, loop_strokes, ragged_strokes
+from cmpdesign.products.laser.setup import LaserSetup
 
 CIRCLE_POINTS = 96
-Kind = Literal["holes", "cells", "outline", "coupon"]
+PassKind = Literal["holes", "cells", "outline", "coupon"]
 
 
 @dataclass(frozen=True, eq=False)
-class Pass:
+class LaserPass:
     """What is burnt before the pad is taken out.
 
     Attributes:
@@ -44,7 +44,7 @@ class Pass:
     """
 
     name: str
-    kind: Kind
+    kind: PassKind
     color: int | None
     cavities: Cavities | None
     walls: Strokes
@@ -56,11 +56,11 @@ class Pass:
     def burnt(self, repeat: int) -> Strokes:
         """Open strokes of one repeat, exactly as the beam runs them."""
         walls = self.walls.opened()
-        return joined([self.fills[repeat], walls]) if self.fills else walls
+        return join_strokes([self.fills[repeat], walls]) if self.fills else walls
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class LaserJob:
     """All passes of a layout on a bed.
 
     Attributes:
@@ -75,24 +75,24 @@ class Job:
 
     name: str
     layout: Layout
-    setup: Setup
+    setup: LaserSetup
     origin_mm: Points
-    passes: tuple[Pass, ...]
+    passes: tuple[LaserPass, ...]
     fiducials_mm: Points
     outline_mm: Points
 
     @cached_property
-    def front(self) -> Beam:
+    def front(self) -> BeamFootprint:
         """The footprint where the beam enters."""
-        return Beam.of_kerf(self.setup.kerf_x_mm, self.setup.kerf_y_mm)
+        return BeamFootprint.of_kerf(self.setup.kerf_x_mm, self.setup.kerf_y_mm)
 
     @cached_property
-    def back(self) -> Beam:
+    def back(self) -> BeamFootprint:
         """The footprint at the cavities' bottom."""
         return self.front.at_depth(self.setup.depth_mm, self.setup.taper_deg)
 
     @property
-    def cell_passes(self) -> tuple[Pass, ...]:
+    def cell_passes(self) -> tuple[LaserPass, ...]:
         return tuple(one for one in self.passes if one.kind == "cells")
 
     @cached_property
@@ -106,32 +106,32 @@ class Job:
         return left, bottom, right, top
 
 
-def make_job(name: str, layout: Layout, setup: Setup) -> Job:
+def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
     """The passes of a layout: holes, each color's cells, the outline. Nothing is checked yet."""
-    origin_mm = _origin(layout, setup)
-    front = Beam.of_kerf(setup.kerf_x_mm, setup.kerf_y_mm)
+    origin_mm = _job_origin_mm(layout, setup)
+    front = BeamFootprint.of_kerf(setup.kerf_x_mm, setup.kerf_y_mm)
     share = {"front": 0.0, "middle": 0.5, "back": 1.0}[setup.options.face]
     beam = front.at_depth(share * setup.depth_mm, setup.taper_deg)
-    passes: list[Pass] = []
+    passes: list[LaserPass] = []
     if setup.options.holes and len(layout.fiducials_mm):
         circles = layout.fiducials_mm + origin_mm
         passes.append(
-            _through("0-holes", "holes", _holes(circles, layout.fiducial_diameter_mm, front), setup)
+            _cut_pass("0-holes", "holes", _hole_strokes(circles, layout.fiducial_diameter_mm, front), setup)
         )
     for number, (color, part, cells) in enumerate(cell_groups(layout), start=1):
         polygons_mm = layout.marker_xy_mm[layout.cell_corners[cells]] + origin_mm
         suffix = f"-{part + 1}" if part else ""
-        made = cavities(cells, polygons_mm, beam, setup.options.corner)
-        passes.append(_cells(f"{number}-{COLORS[color]}{suffix}", color, made, setup))
+        made = make_cavities(cells, polygons_mm, beam, setup.options.corner)
+        passes.append(_cell_pass(f"{number}-{COLORS[color]}{suffix}", color, made, setup))
     if setup.options.outline:
         paths = outset_outline(layout.outline_mm + origin_mm, front)
-        strokes = ragged(paths, range(len(paths)), closed=True)
+        strokes = ragged_strokes(paths, range(len(paths)), closed=True)
         passes.append(
-            _through(
+            _cut_pass(
                 f"{len(passes) + 1 - bool(passes[0].kind == 'holes')}-outline", "outline", strokes, setup
             )
         )
-    return Job(
+    return LaserJob(
         name=name,
         layout=layout,
         setup=setup,
@@ -153,12 +153,12 @@ def cell_groups(layout: Layout) -> list[tuple[int, int, NDArray[np.int64]]]:
         cells = np.flatnonzero(layout.cell_color == color)
         if color == BLACK or not len(cells):
             continue
-        part = _parts(layout.cell_corners[cells])
+        part = _contact_free_groups(layout.cell_corners[cells])
         groups += [(color, p, cells[part == p]) for p in range(int(part.max()) + 1)]
     return groups
 
 
-def _parts(corners: NDArray[np.int32]) -> NDArray[np.int64]:
+def _contact_free_groups(corners: NDArray[np.int32]) -> NDArray[np.int64]:
     """(N,) the smallest part for each cell that none of its corners' earlier cells has."""
     taken: dict[int, set[int]] = {}
     part = np.zeros(len(corners), dtype=np.int64)
@@ -172,7 +172,7 @@ def _parts(corners: NDArray[np.int32]) -> NDArray[np.int64]:
     return part
 
 
-def _origin(layout: Layout, setup: Setup) -> Points:
+def _job_origin_mm(layout: Layout, setup: LaserSetup) -> Points:
     """Where the layout's origin comes to lie: the job's box is centred on the bed, or put where the
     options say."""
     radius = layout.fiducial_diameter_mm / 2
@@ -187,27 +187,27 @@ def _origin(layout: Layout, setup: Setup) -> Points:
     return np.asarray(np.round(corner - low, 3))
 
 
-def _cells(name: str, color: int, made: Cavities, setup: Setup) -> Pass:
-    order, entry = ordered(made.entries_mm, setup.options.order)
+def _cell_pass(name: str, color: int, made: Cavities, setup: LaserSetup) -> LaserPass:
+    order, entry = order_cells(made.entries_mm, setup.options.order)
     made = made.selected(order)
     paths = made.loops_mm
     points = paths.shape[1]
     turned = (made.entry_step * entry[:, None] + np.arange(points)) % points
-    walls = loops(np.take_along_axis(paths, turned[..., None], axis=1), np.arange(len(paths)))
+    walls = loop_strokes(np.take_along_axis(paths, turned[..., None], axis=1), np.arange(len(paths)))
     fills: tuple[Strokes, ...] = ()
     if setup.options.mode == "pocket" and setup.options.fill == "hatch":
         turn = setup.options.hatch_turn_deg
         angles = [setup.options.hatch_deg + turn * repeat for repeat in range(setup.repeats)]
-        fills = tuple(hatch(made.path_mm, setup.hatch_mm, angle) for angle in angles)
+        fills = tuple(hatch_strokes(made.path_mm, setup.hatch_mm, angle) for angle in angles)
     elif setup.options.mode == "pocket":
-        walls = _with_rings(made, walls, setup.hatch_mm)
-    return Pass(
+        walls = _walls_with_rings(made, walls, setup.hatch_mm)
+    return LaserPass(
         name, "cells", color, made, walls, fills, setup.power_percent, setup.speed_mm_s, setup.repeats
     )
 
 
-def _with_rings(made: Cavities, walls: Strokes, spacing_mm: float) -> Strokes:
-    inner = rings(made.path_mm, spacing_mm)
+def _walls_with_rings(made: Cavities, walls: Strokes, spacing_mm: float) -> Strokes:
+    inner = ring_strokes(made.path_mm, spacing_mm)
     first = np.concatenate([inner.first, walls.first[1:] + inner.first[-1]])
     together = Strokes(
         np.concatenate([inner.xy_mm, walls.xy_mm]), first, np.concatenate([inner.owner, walls.owner]), True
@@ -215,8 +215,8 @@ def _with_rings(made: Cavities, walls: Strokes, spacing_mm: float) -> Strokes:
     return together.taken(np.argsort(together.owner, kind="stable"))
 
 
-def _through(name: str, kind: Kind, strokes: Strokes, setup: Setup) -> Pass:
-    return Pass(
+def _cut_pass(name: str, kind: PassKind, strokes: Strokes, setup: LaserSetup) -> LaserPass:
+    return LaserPass(
         name,
         kind,
         None,
@@ -229,7 +229,7 @@ def _through(name: str, kind: Kind, strokes: Strokes, setup: Setup) -> Pass:
     )
 
 
-def _holes(centres_mm: Points, diameter_mm: float, beam: Beam) -> Strokes:
+def _hole_strokes(centres_mm: Points, diameter_mm: float, beam: BeamFootprint) -> Strokes:
     """Paths along which an elliptic beam burns round holes: the circle less the footprint's extent,
     exactly."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
@@ -237,4 +237,4 @@ def _holes(centres_mm: Points, diameter_mm: float, beam: Beam) -> Strokes:
     squares = np.array([beam.x_mm**2, beam.y_mm**2])
     touching = normal * squares / np.sqrt((normal**2 * squares).sum(axis=1))[:, None]
     circle = diameter_mm / 2 * normal - touching
-    return loops(centres_mm[:, None] + circle, np.arange(len(centres_mm)))
+    return loop_strokes(centres_mm[:, None] + circle, np.arange(len(centres_mm)))

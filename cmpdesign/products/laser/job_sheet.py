@@ -6,10 +6,10 @@ from html import escape
 
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
-from cmpdesign.products.laser.figures import Timing
-from cmpdesign.products.laser.formats.palette import number
+from cmpdesign.products.laser.figures import PassTiming
+from cmpdesign.products.laser.formats.palette import format_mm
 from cmpdesign.products.laser.formats.svg import path_data
-from cmpdesign.products.laser.job import Job, Pass
+from cmpdesign.products.laser.job import LaserJob, LaserPass
 
 _STYLE = """
 @page { size: A4; margin: 14mm }
@@ -33,24 +33,24 @@ _CORNERS = {
 }
 
 
-def job_sheet(job: Job, figures: tuple[PassFigures, ...], timings: tuple[Timing, ...]) -> str:
+def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]) -> str:
     """The page's HTML."""
     parts = [
         "<!doctype html>",
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(job.name)}: laser job</title>',
         f"<style>{_STYLE}</style></head><body>",
         f"<h1>{escape(job.name)}: laser job</h1>",
-        _warning(job),
-        _facts(job, timings),
+        _warning_html(job),
+        _facts_html(job, timings),
         "<h2>Order of work</h2>",
-        _steps(job, timings),
+        _steps_html(job, timings),
         "<h2>Passes</h2>",
-        _pictures(job),
+        _pictures_html(job),
         "<h2>As made</h2>",
         f"<p>{_CORNERS[job.setup.options.corner]}</p>",
-        _made(figures),
+        _as_made_html(figures),
         "<h2>Registration</h2>",
-        _registration(job),
+        _registration_html(job),
         f"<p><small>Layout {job.layout.digest[:16]}. {escape(job.setup.material.fumes)}</small></p>",
         "</body></html>",
         "",
@@ -58,7 +58,7 @@ def job_sheet(job: Job, figures: tuple[PassFigures, ...], timings: tuple[Timing,
     return "\n".join(parts)
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Seconds as people say them: 48 s, 3 min 20 s, 2 h 05 min."""
     whole = round(seconds)
     if whole < 60:
@@ -68,7 +68,7 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
-def _warning(job: Job) -> str:
+def _warning_html(job: LaserJob) -> str:
     if not job.setup.assumed:
         return ""
     names = escape(", ".join(job.setup.assumed))
@@ -78,7 +78,7 @@ def _warning(job: Job) -> str:
     )
 
 
-def _facts(job: Job, timings: tuple[Timing, ...]) -> str:
+def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
     setup, (left, bottom, right, top) = job.setup, job.extent_mm
     bed = f"{setup.machine.bed_width_mm.value:g} x {setup.machine.bed_height_mm.value:g} mm"
     rows = {
@@ -86,16 +86,17 @@ def _facts(job: Job, timings: tuple[Timing, ...]) -> str:
         "Material": f"{setup.material.name}, {setup.material.thickness_mm.value:g} mm",
         "Cavities": f"{setup.options.mode}, {setup.depth_mm:g} mm deep, {setup.options.corner} corners, "
         f"nominal size at the {setup.options.face}",
-        "Kerf": f"front {_widths(job.front.kerf_mm)}, back {_widths(job.back.kerf_mm)} (cuts along y, along x); "
+        "Kerf": f"front {_format_kerf(job.front.kerf_mm)}, back {_format_kerf(job.back.kerf_mm)} (cuts "
+        f"along y, along x); "
         f"walls lean by {setup.taper_deg:g}°",
         "On the bed": f"{right - left:.2f} x {top - bottom:.2f} mm, lower left corner at X{left:.2f} Y{bottom:.2f}",
-        "Laser time": duration(sum(one.time_s for one in timings)) + f", order: {setup.options.order}",
+        "Laser time": format_duration(sum(one.time_s for one in timings)) + f", order: {setup.options.order}",
     }
     cells = [f"<tr><td>{name}</td><td>{escape(text)}</td></tr>" for name, text in rows.items()]
     return f'<table class="facts">{"".join(cells)}</table>'
 
 
-def _steps(job: Job, timings: tuple[Timing, ...]) -> str:
+def _steps_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
     head = (
         "<tr><th></th><th>Pass</th><th class=n>Paths</th><th class=n>Power</th><th class=n>Speed</th>"
         "<th class=n>Times over</th><th class=n>Laser time</th><th>Then</th></tr>"
@@ -106,7 +107,7 @@ def _steps(job: Job, timings: tuple[Timing, ...]) -> str:
             f"<tr><td class=box>☐</td><td><b>{one.name}</b></td>"
             f"<td class=n>{len(one.walls)}</td><td class=n>{one.power_percent:g} %</td>"
             f"<td class=n>{one.speed_mm_s:g} mm/s</td><td class=n>{one.repeats}</td>"
-            f"<td class=n>{duration(time.time_s)}</td><td>{_then(one)}</td></tr>"
+            f"<td class=n>{format_duration(time.time_s)}</td><td>{_after_pass_text(one)}</td></tr>"
         )
     setup = job.setup
     return (
@@ -114,11 +115,11 @@ def _steps(job: Job, timings: tuple[Timing, ...]) -> str:
         "<p>Each pass is a file of its name for every program: .svg, .dxf, .lbrn2 (LightBurn), .gcode (GRBL); job.* "
         "holds all passes, one layer each.</p>"
         f"<p><b>Fill.</b> {escape(setup.material.fill)}</p><p><b>Cure.</b> {escape(setup.material.cure)}</p>"
-        f"{_pocket(job)}"
+        f"{_pocket_html(job)}"
     )
 
 
-def _then(one: Pass) -> str:
+def _after_pass_text(one: LaserPass) -> str:
     if one.kind == "holes":
         return "put pins in; they stay to the end"
     if one.kind == "outline":
@@ -127,51 +128,51 @@ def _then(one: Pass) -> str:
     return f"take out, fill <b>{COLORS[one.color]}</b>, cure, put back on the pins"
 
 
-def _pocket(job: Job) -> str:
+def _pocket_html(job: LaserJob) -> str:
     options = job.setup.options
     if options.mode != "pocket":
         return ""
-    text = f"pitch {number(job.setup.hatch_mm)} mm"
+    text = f"pitch {format_mm(job.setup.hatch_mm)} mm"
     if options.fill == "hatch":
         text += f", {options.hatch_deg:g}° and {options.hatch_turn_deg:g}° further at every repeat"
         text += "; the G-code holds the lines, in SVG and DXF set them as the fill of the outlines"
     return f"<p><b>Pocket.</b> {options.fill}, {text}.</p>"
 
 
-def _pictures(job: Job) -> str:
-    return f'<div class="passes">{"".join(_picture(job, one) for one in job.passes)}</div>'
+def _pictures_html(job: LaserJob) -> str:
+    return f'<div class="passes">{"".join(_pass_picture_svg(job, one) for one in job.passes)}</div>'
 
 
-def _picture(job: Job, one: Pass) -> str:
+def _pass_picture_svg(job: LaserJob, one: LaserPass) -> str:
     """The pad as it lies there during this pass: cured cells full, this pass' paths in red outlines over its ink."""
     left, bottom, right, top = job.extent_mm
     margin = 1.0
-    box = f"{number(left - margin)} {number(-margin)} {number(right - left + 2 * margin)} "
-    box += number(top - bottom + 2 * margin)
+    box = f"{format_mm(left - margin)} {format_mm(-margin)} {format_mm(right - left + 2 * margin)} "
+    box += format_mm(top - bottom + 2 * margin)
     inks = job.layout.palette
-    shapes = [_polygons([job.outline_mm], top, inks[COLORS[BLACK]], "")]
+    shapes = [_polygons_svg([job.outline_mm], top, inks[COLORS[BLACK]], "")]
     for other in job.passes:
         drawn = other.color is not None and other.cavities is not None
         if drawn and job.passes.index(other) <= job.passes.index(one):
             assert other.cavities is not None and other.color is not None
             strength = "" if other is one else ' opacity="0.45"'
             shapes.append(
-                _polygons(list(other.cavities.nominal_mm), top, inks[COLORS[other.color]], strength)
+                _polygons_svg(list(other.cavities.nominal_mm), top, inks[COLORS[other.color]], strength)
             )
     line = 0.004 * max(right - left, top - bottom)
-    style = f'fill="none" stroke="#e0a100" stroke-width="{number(line / 2)}"'
+    style = f'fill="none" stroke="#e0a100" stroke-width="{format_mm(line / 2)}"'
     shapes.append(f'<path {style} d="{"".join(path_data(one.walls, top))}"/>')
-    radius = number(job.layout.fiducial_diameter_mm / 2)
+    radius = format_mm(job.layout.fiducial_diameter_mm / 2)
     for x, y in job.fiducials_mm.tolist():
-        place = f'cx="{number(x)}" cy="{number(top - y)}" r="{radius}"'
-        shapes.append(f'<circle {place} fill="none" stroke="#1c1a18" stroke-width="{number(line)}"/>')
+        place = f'cx="{format_mm(x)}" cy="{format_mm(top - y)}" r="{radius}"'
+        shapes.append(f'<circle {place} fill="none" stroke="#1c1a18" stroke-width="{format_mm(line)}"/>')
     return (
         f'<div class="pass"><h3>{one.name}</h3><svg viewBox="{box}" role="img" '
         f'aria-label="{one.name}">{"".join(shapes)}</svg></div>'
     )
 
 
-def _polygons(polygons: list, top: float, fill: str, extra: str) -> str:  # type: ignore[type-arg]
+def _polygons_svg(polygons: list, top: float, fill: str, extra: str) -> str:  # type: ignore[type-arg]
     data = []
     for polygon in polygons:
         points = [f"{x:.2f} {top - y:.2f}" for x, y in polygon.tolist()]
@@ -179,7 +180,7 @@ def _polygons(polygons: list, top: float, fill: str, extra: str) -> str:  # type
     return f'<path fill="{fill}"{extra} d="{"".join(data)}"/>'
 
 
-def _made(figures: tuple[PassFigures, ...]) -> str:
+def _as_made_html(figures: tuple[PassFigures, ...]) -> str:
     head = (
         "<tr><th>Pass</th><th>Face</th><th class=n>Area</th><th class=n>Worst cell</th><th class=n>Corner lost</th>"
         "<th class=n>Burnt beside</th><th class=n>Web in the pass</th><th class=n>Web to filled cells</th></tr>"
@@ -187,14 +188,14 @@ def _made(figures: tuple[PassFigures, ...]) -> str:
     rows = []
     for one in figures:
         faces = [("front", one.front)] + ([("back", one.back)] if one.back else [])
-        rows += [_made_row(one.name if name == "front" else "", name, face) for name, face in faces]
+        rows += [_as_made_row(one.name if name == "front" else "", name, face) for name, face in faces]
     return (
         f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to "
         "filled cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
     )
 
 
-def _made_row(name: str, where: str, face: FaceFigures) -> str:
+def _as_made_row(name: str, where: str, face: FaceFigures) -> str:
     lengths = [face.corner_loss_mm, face.burnt_beside_mm, face.web_mm, face.web_to_filled_mm]
     texts = ["-" if value is None else f"{value:.3f}" for value in lengths]
     areas = [f"{face.area_error_percent:+.2f} %", f"{face.area_error_worst_percent:+.2f} %"]
@@ -202,7 +203,7 @@ def _made_row(name: str, where: str, face: FaceFigures) -> str:
     return f"<tr><td>{name}</td><td>{where}</td>{cells}</tr>"
 
 
-def _registration(job: Job) -> str:
+def _registration_html(job: LaserJob) -> str:
     if not len(job.fiducials_mm):
         text = "This design has no fiducials (fiducials.count = 0): do not move the pad between passes."
         return f'<div class="warn">{text}</div>'
@@ -223,5 +224,5 @@ def _registration(job: Job) -> str:
     )
 
 
-def _widths(kerf_mm: tuple[float, float]) -> str:
+def _format_kerf(kerf_mm: tuple[float, float]) -> str:
     return f"{kerf_mm[0]:.3f} / {kerf_mm[1]:.3f} mm"

@@ -22,18 +22,18 @@ Lean = Annotated[float, Field(gt=-45, lt=45)]
 Count = Annotated[int, Field(ge=1, le=200, strict=True)]
 
 
-class _Closed(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Sourced(_Closed, Generic[Value]):
+class Sourced(_StrictModel, Generic[Value]):
     """A value and where it comes from: a reference, a measurement, or "assumed"."""
 
     value: Value
     source: str = Field(min_length=3)
 
 
-class Machine(_Closed):
+class Machine(_StrictModel):
     """A laser. Speeds in mm/s; ``s_max`` is the S word of full power (GRBL's $30)."""
 
     name: str
@@ -48,7 +48,7 @@ class Machine(_Closed):
     acceleration_mm_s2: Sourced[Positive]
 
 
-class Settings(_Closed):
+class Settings(_StrictModel):
     """How one machine carves one material. Kerf: full width at the front, of cuts that run in y (x) and in
     x (y)."""
 
@@ -63,7 +63,7 @@ class Settings(_Closed):
     pocket_depth_per_pass_mm: Sourced[Length]
 
 
-class Material(_Closed):
+class Material(_StrictModel):
     """A sheet of silicone, and its settings on each machine that can carve it."""
 
     name: str
@@ -91,7 +91,7 @@ def load_machine(name_or_path: str) -> Machine:
     Raises:
         DesignError: no such machine, or a file that does not describe one.
     """
-    return _load(Machine, name_or_path, machines(), "machine")
+    return _load_file(Machine, name_or_path, machines(), "machine")
 
 
 def load_material(name_or_path: str) -> Material:
@@ -100,7 +100,7 @@ def load_material(name_or_path: str) -> Material:
     Raises:
         DesignError: no such material, or a file that does not describe one.
     """
-    return _load(Material, name_or_path, materials(), "material")
+    return _load_file(Material, name_or_path, materials(), "material")
 
 
 def settings_on(material: Material, machine_name: str) -> Settings:
@@ -118,7 +118,7 @@ def settings_on(material: Material, machine_name: str) -> Settings:
     return material.on[name]
 
 
-def _load(model: type[Model], name_or_path: str, known: Mapping[str, Path], kind: str) -> Model:
+def _load_file(model: type[Model], name_or_path: str, known: Mapping[str, Path], kind: str) -> Model:
     path = known.get(name_or_path, Path(name_or_path))
     if not path.is_file():
         near = difflib.get_close_matches(name_or_path, known, n=1, cutoff=0.5)
@@ -132,10 +132,10 @@ def _load(model: type[Model], name_or_path: str, known: Mapping[str, Path], kind
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DesignError(f"laser.{kind}: {path}: is no TOML file of a {kind} ({error})") from None
     except ValidationError as error:
-        raise DesignError(f"laser.{kind}: {path}: {_problem(error, model)}") from None
+        raise DesignError(f"laser.{kind}: {path}: {_validation_message(error, model)}") from None
 
 
-def _problem(error: ValidationError, model: type[BaseModel]) -> str:
+def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
     """The first thing wrong, in one line."""
     item = error.errors()[0]
     where = ".".join(str(part) for part in item["loc"])

@@ -7,23 +7,23 @@ from collections.abc import Callable, Mapping
 
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
-from cmpdesign.products.laser.as_made import as_made
+from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
-from cmpdesign.products.laser.coupon.job import coupon
-from cmpdesign.products.laser.figures import job_figures, timing
-from cmpdesign.products.laser.formats.drawing import Drawing, job_drawing
+from cmpdesign.products.laser.coupon.job import coupon_job
+from cmpdesign.products.laser.figures import job_figures, pass_timing
+from cmpdesign.products.laser.formats.drawing import LaserDrawing, job_drawing
 from cmpdesign.products.laser.formats.dxf import drawing_to_dxf
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
 from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.job import make_job
-from cmpdesign.products.laser.job_sheet import job_sheet
-from cmpdesign.products.laser.refuse import made_findings, path_findings, refuse, setup_findings
-from cmpdesign.products.laser.setup import complete
-from cmpdesign.products.registry import Made
+from cmpdesign.products.laser.job_sheet import job_sheet_html
+from cmpdesign.products.laser.refuse import as_made_findings, path_findings, require_no_errors, setup_findings
+from cmpdesign.products.laser.setup import complete_setup
+from cmpdesign.products.registry import ProductFiles
 
 FOLDER = "laser"
-FORMATS: Mapping[str, Callable[[Drawing], str]] = {
+FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
     "svg": drawing_to_svg,
     "dxf": drawing_to_dxf,
     "lbrn2": drawing_to_lightburn,
@@ -31,24 +31,24 @@ FORMATS: Mapping[str, Callable[[Drawing], str]] = {
 }
 
 
-def product(design: Design, layout: Layout) -> Made:
+def make_laser(design: Design, layout: Layout) -> ProductFiles:
     """Everything that a shop needs to carve the design's cells.
 
     Raises:
         DesignError: the machine or material is unknown, or the job would go wrong; every reason in one line.
     """
-    job = make_job(design.name, layout, complete(design.laser))
-    refuse(setup_findings(design, job))
-    refuse(path_findings(job))
-    figures = as_made(job)
-    warnings = refuse(made_findings(job, figures))
-    timings = tuple(timing(job, one) for one in job.passes)
+    job = make_job(design.name, layout, complete_setup(design.laser))
+    require_no_errors(setup_findings(design, job))
+    require_no_errors(path_findings(job))
+    figures = measure_as_made(job)
+    warnings = require_no_errors(as_made_findings(job, figures))
+    timings = tuple(pass_timing(job, one) for one in job.passes)
     files: dict[str, str | bytes] = {}
     whole = job_drawing(job)
-    drawings = {one.name: whole.only(one) for one in job.passes} | {"job": whole}
-    drawings["coupon"], files[f"{FOLDER}/coupon.json"] = coupon(job.setup)
+    drawings = {one.name: whole.with_one_pass(one) for one in job.passes} | {"job": whole}
+    drawings["coupon"], files[f"{FOLDER}/coupon.json"] = coupon_job(job.setup)
     for name, drawing in drawings.items():
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
-    files[f"{FOLDER}/job-sheet.html"] = job_sheet(job, figures, timings)
-    return Made(files, job_figures(job, figures, timings), warnings)
+    files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings)
+    return ProductFiles(files, job_figures(job, figures, timings), warnings)

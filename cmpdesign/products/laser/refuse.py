@@ -11,7 +11,7 @@ from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
-from cmpdesign.products.laser.job import Job, Pass
+from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.strokes import Strokes
 
 # A cured neighbour may lose a thin skin where cavities meet; half a kerf of it changes what its corners show.
@@ -20,7 +20,7 @@ BURN_LIMIT_KERFS = 0.5
 SAME_MM = 1e-3
 
 
-def refuse(findings: Iterator[Finding]) -> tuple[Finding, ...]:
+def require_no_errors(findings: Iterator[Finding]) -> tuple[Finding, ...]:
     """The warnings among the findings.
 
     Raises:
@@ -33,41 +33,47 @@ def refuse(findings: Iterator[Finding]) -> tuple[Finding, ...]:
     return tuple(finding for finding in found if finding.severity == "warning")
 
 
-def setup_findings(design: Design, job: Job) -> Iterator[Finding]:
+def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
     """What is wrong before any figure is computed: text, machine limits, a beam that closes, cells that
     vanish."""
     setup = job.setup
     texts = [name for name in ("print_ids", "print_scale") if getattr(design, name)]
     if texts:
         remedy = f"a laser burns outlines only; leave {' and '.join(texts)} out"
-        yield _error("texts asked for", len(texts), 0, "", remedy)
+        yield _error_finding("texts asked for", len(texts), 0, "", remedy)
     speed_max = setup.machine.speed_max_mm_s.value
     if max(setup.speed_mm_s, setup.cut_speed_mm_s) > speed_max:
         speed = max(setup.speed_mm_s, setup.cut_speed_mm_s)
-        yield _error("speed", speed, speed_max, "mm/s", "lower laser.speed_mm_s to the machine's maximum")
+        yield _error_finding(
+            "speed", speed, speed_max, "mm/s", "lower laser.speed_mm_s to the machine's maximum"
+        )
     thickness = setup.material.thickness_mm.value
     if setup.depth_mm > thickness + 1e-9:
         remedy = "lower laser.depth_mm or take a thicker material"
-        yield _error("depth of the cavities in this material", setup.depth_mm, thickness, "mm", remedy)
+        yield _error_finding(
+            "depth of the cavities in this material", setup.depth_mm, thickness, "mm", remedy
+        )
     if min(job.back.x_mm, job.back.y_mm) <= 0:
         remedy = "lower laser.taper_deg or laser.depth_mm, or widen the kerf: the beam closes before the back"
-        yield _error("kerf at the back", 2 * min(job.back.x_mm, job.back.y_mm), 0, "mm", remedy)
-    yield from _spacing(job)
+        yield _error_finding("kerf at the back", 2 * min(job.back.x_mm, job.back.y_mm), 0, "mm", remedy)
+    yield from _spacing_findings(job)
     for one in job.cell_passes:
         assert one.cavities is not None
         lost = one.cavities.cell[~one.cavities.exists]
         if len(lost):
             remedy = f"cell {int(lost[0])} is among them; make pitch_mm larger or the kerf smaller"
-            yield _error(f"cells of {one.name} that the kerf leaves nothing of", len(lost), 0, "", remedy)
+            yield _error_finding(
+                f"cells of {one.name} that the kerf leaves nothing of", len(lost), 0, "", remedy
+            )
 
 
-def path_findings(job: Job) -> Iterator[Finding]:
+def path_findings(job: LaserJob) -> Iterator[Finding]:
     """What is wrong with the paths: off the bed, drawn twice, not closed, crossing themselves."""
     left, bottom, right, top = job.extent_mm
     bed = job.setup.machine.bed_width_mm.value, job.setup.machine.bed_height_mm.value
     for axis, low, high, size in (("width", left, right, bed[0]), ("height", bottom, top, bed[1])):
         if high - low > size:
-            yield _error(
+            yield _error_finding(
                 f"{axis} of the job, on the bed",
                 high - low,
                 size,
@@ -77,31 +83,33 @@ def path_findings(job: Job) -> Iterator[Finding]:
         elif low < 0 or high > size:
             name = "laser.x_mm" if axis == "width" else "laser.y_mm"
             beyond = high if high > size else low
-            yield _error(f"edge of the job beyond the bed's {axis}", beyond, size, "mm", f"move it by {name}")
+            yield _error_finding(
+                f"edge of the job beyond the bed's {axis}", beyond, size, "mm", f"move it by {name}"
+            )
     for one in job.passes:
-        twins, flat = duplicates(one.walls), open_paths(one.walls)
+        twins, flat = count_duplicate_paths(one.walls), count_open_paths(one.walls)
         if twins:
-            yield _error(
+            yield _error_finding(
                 f"paths of {one.name} that are drawn twice", twins, 0, "", "remove the repeated cells"
             )
         if flat:
-            yield _error(
+            yield _error_finding(
                 f"paths of {one.name} that enclose nothing", flat, 0, "", "close them, or remove them"
             )
         if one.kind == "outline":
-            yield from _crossings(one)
+            yield from _crossing_findings(one)
 
 
-def made_findings(job: Job, figures: tuple[PassFigures, ...]) -> Iterator[Finding]:
+def as_made_findings(job: LaserJob, figures: tuple[PassFigures, ...]) -> Iterator[Finding]:
     """What is wrong with what the job leaves: webs too thin, cured neighbours burnt."""
     limit = job.setup.minimum_web_mm
     for one in figures:
         for where, face, beam in (("front", one.front, job.front), ("back", one.back, job.back)):
             if face is not None:
                 burn_limit = BURN_LIMIT_KERFS * beam.narrow_mm
-                yield from _webs(f"{one.name} at the {where}", face, limit, burn_limit)
+                yield from _web_findings(f"{one.name} at the {where}", face, limit, burn_limit)
     if job.setup.options.holes and len(job.fiducials_mm):
-        yield from _hole_web(job, limit)
+        yield from _hole_web_findings(job, limit)
     if job.setup.assumed:
         remedy = "cut the coupon and measure it: " + ", ".join(job.setup.assumed)
         yield Finding(
@@ -114,7 +122,7 @@ def made_findings(job: Job, figures: tuple[PassFigures, ...]) -> Iterator[Findin
         )
 
 
-def duplicates(strokes: Strokes) -> int:
+def count_duplicate_paths(strokes: Strokes) -> int:
     """How many closed paths repeat another one, wherever they start and whichever way round they run."""
     counts = np.diff(strokes.first)
     sums = np.add.reduceat(strokes.xy_mm, strokes.first[:-1]) / counts[:, None]
@@ -124,7 +132,7 @@ def duplicates(strokes: Strokes) -> int:
     return len(key) - len(np.unique(key, axis=0))
 
 
-def open_paths(strokes: Strokes) -> int:
+def count_open_paths(strokes: Strokes) -> int:
     """How many paths are not closed round an area."""
     if not strokes.closed:
         return len(strokes)
@@ -135,7 +143,7 @@ def open_paths(strokes: Strokes) -> int:
     return int(np.count_nonzero(np.abs(area) < SAME_MM**2))
 
 
-def _spacing(job: Job) -> Iterator[Finding]:
+def _spacing_findings(job: LaserJob) -> Iterator[Finding]:
     options = job.setup.options
     if options.mode != "pocket":
         return
@@ -143,21 +151,23 @@ def _spacing(job: Job) -> Iterator[Finding]:
     limit = share * job.back.narrow_mm
     if 0 < limit < job.setup.hatch_mm:
         remedy = "lower laser.hatch_mm, or ridges stay between the lines"
-        yield _error(
+        yield _error_finding(
             "spacing of the fill, against the kerf at the bottom", job.setup.hatch_mm, limit, "mm", remedy
         )
 
 
-def _webs(where: str, face: FaceFigures, limit: float, burn_limit: float) -> Iterator[Finding]:
+def _web_findings(where: str, face: FaceFigures, limit: float, burn_limit: float) -> Iterator[Finding]:
     if face.web_mm is not None and face.web_mm < limit:
         remedy = "make pitch_mm larger, the kerf smaller, or laser.minimum_web_mm if thinner walls hold"
-        yield _error(f"smallest web of {where}", face.web_mm, limit, "mm", remedy)
+        yield _error_finding(f"smallest web of {where}", face.web_mm, limit, "mm", remedy)
     if face.web_to_filled_mm is not None and -face.web_to_filled_mm > burn_limit:
         remedy = 'choose laser.corner = "plain" or laser.face = "front"'
-        yield _error(f"burn of {where} into cured cells", -face.web_to_filled_mm, burn_limit, "mm", remedy)
+        yield _error_finding(
+            f"burn of {where} into cured cells", -face.web_to_filled_mm, burn_limit, "mm", remedy
+        )
 
 
-def _hole_web(job: Job, limit: float) -> Iterator[Finding]:
+def _hole_web_findings(job: LaserJob, limit: float) -> Iterator[Finding]:
     import shapely
 
     pad = shapely.Polygon(job.outline_mm)
@@ -166,18 +176,20 @@ def _hole_web(job: Job, limit: float) -> Iterator[Finding]:
         - job.layout.fiducial_diameter_mm / 2
     )
     if web < limit:
-        yield _error(
+        yield _error_finding(
             "web between a fiducial hole and the pattern", web, limit, "mm", "make fiducials.gap_mm larger"
         )
 
 
-def _crossings(one: Pass) -> Iterator[Finding]:
+def _crossing_findings(one: LaserPass) -> Iterator[Finding]:
     import shapely
 
     crossed = sum(not shapely.LinearRing(path).is_simple for path in one.walls)
     if crossed:
-        yield _error(f"paths of {one.name} that cross themselves", crossed, 0, "", "smooth the clip outline")
+        yield _error_finding(
+            f"paths of {one.name} that cross themselves", crossed, 0, "", "smooth the clip outline"
+        )
 
 
-def _error(subject: str, value: float, limit: float, unit: str, remedy: str) -> Finding:
+def _error_finding(subject: str, value: float, limit: float, unit: str, remedy: str) -> Finding:
     return Finding(subject, value, limit, unit, remedy, "error")

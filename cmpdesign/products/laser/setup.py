@@ -22,7 +22,7 @@ SMALLEST_MM = 0.001
 
 
 @dataclass(frozen=True)
-class Setup:
+class LaserSetup:
     """Everything about machine, material and way of carving; lengths in mm.
 
     Attributes:
@@ -56,7 +56,7 @@ class Setup:
     assumed: tuple[str, ...]
 
 
-def complete(options: LaserOptions) -> Setup:
+def complete_setup(options: LaserOptions) -> LaserSetup:
     """The options with what the machine's and the material's files add.
 
     Raises:
@@ -72,7 +72,7 @@ def complete(options: LaserOptions) -> Setup:
     pocket = options.mode == "pocket"
     layers = math.ceil(depth_mm / found.pocket_depth_per_pass_mm.value - 1e-9)
     web_mm = options.minimum_web_mm
-    return Setup(
+    return LaserSetup(
         options=options,
         machine=machine,
         material=material,
@@ -89,11 +89,11 @@ def complete(options: LaserOptions) -> Setup:
         cut_repeats=found.cut_passes.value,
         hatch_mm=options.hatch_mm or math.floor(1e4 * HATCH_SHARE * max(bottom_mm, SMALLEST_MM)) / 1e4,
         minimum_web_mm=material.minimum_web_mm.value if web_mm is None else web_mm,
-        assumed=_assumed(options, material, found),
+        assumed=_assumed_values(options, material, found),
     )
 
 
-def _assumed(options: LaserOptions, material: Material, found: Settings) -> tuple[str, ...]:
+def _assumed_values(options: LaserOptions, material: Material, found: Settings) -> tuple[str, ...]:
     """Values from the files that nobody measured and no option overrides."""
     kind = "pocket" if options.mode == "pocket" else "cut"
     steps = "pocket_depth_per_pass_mm" if options.mode == "pocket" else "cut_passes"

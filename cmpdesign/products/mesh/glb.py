@@ -7,14 +7,14 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.triangles import TriangleMesh
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
 _METRES = 1e-3
 
 
-def meshes_to_glb(meshes: Sequence[Mesh], opacity: dict[str, float] | None = None) -> bytes:
+def meshes_to_glb(meshes: Sequence[TriangleMesh], opacity: dict[str, float] | None = None) -> bytes:
     """One node, mesh and material for each; ``opacity`` (name -> 0 to 1) for clear layers."""
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "cmpdesign"},
@@ -22,7 +22,7 @@ def meshes_to_glb(meshes: Sequence[Mesh], opacity: dict[str, float] | None = Non
         "scenes": [{"nodes": list(range(len(meshes)))}],
         "nodes": [{"name": mesh.name, "mesh": number} for number, mesh in enumerate(meshes)],
         "meshes": [],
-        "materials": [_material(mesh, (opacity or {}).get(mesh.name, 1.0)) for mesh in meshes],
+        "materials": [_glb_material(mesh, (opacity or {}).get(mesh.name, 1.0)) for mesh in meshes],
         "accessors": [],
         "bufferViews": [],
     }
@@ -38,7 +38,7 @@ def meshes_to_glb(meshes: Sequence[Mesh], opacity: dict[str, float] | None = Non
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def _add_mesh(document: dict[str, Any], number: int, mesh: Mesh, offset: int) -> bytes:
+def _add_mesh(document: dict[str, Any], number: int, mesh: TriangleMesh, offset: int) -> bytes:
     points = (mesh.points[:, [0, 2, 1]] * (_METRES, _METRES, -_METRES)).astype("<f4")
     indices = mesh.triangles.astype("<u4")
     view, sizes = 2 * number, (points.nbytes, indices.nbytes)
@@ -63,7 +63,7 @@ def _add_mesh(document: dict[str, Any], number: int, mesh: Mesh, offset: int) ->
     return points.tobytes() + indices.tobytes()
 
 
-def _material(mesh: Mesh, opacity: float) -> dict[str, Any]:
+def _glb_material(mesh: TriangleMesh, opacity: float) -> dict[str, Any]:
     rgb = [(int(mesh.color[i : i + 2], 16) / 255) ** 2.2 for i in (1, 3, 5)]
     material: dict[str, Any] = {
         "name": mesh.name,

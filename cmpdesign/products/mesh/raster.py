@@ -7,7 +7,7 @@ import numpy as np
 
 
 @numba.njit(cache=True)
-def rasterize(corners, depth, number):  # type: ignore[no-untyped-def]
+def fill_depth_buffer(corners, depth, number):  # type: ignore[no-untyped-def]
     """Draw triangles (T, 3, 3: x, y in pixels, z towards the viewer) into depth and triangle number."""
     height, width = depth.shape
     for t in range(corners.shape[0]):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.triangles import TriangleMesh
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER_BYTES = 80
 
 
-def mesh_to_stl(mesh: Mesh) -> bytes:
+def mesh_to_stl(mesh: TriangleMesh) -> bytes:
     """The file's bytes; the header holds the name."""
     corners = mesh.points[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

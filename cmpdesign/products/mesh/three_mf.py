@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.triangles import TriangleMesh
 
 # The library's identifiers and the package's dates are random by default; these follow from the names.
 _NAMESPACE = uuid.UUID("6f9a3c1e-6f0e-5f5b-9d54-6d6f6c64cafe")
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def meshes_to_3mf(meshes: Sequence[Mesh], title: str) -> bytes:
+def meshes_to_3mf(meshes: Sequence[TriangleMesh], title: str) -> bytes:
     """The package's bytes, the same for the same meshes.
 
     Raises:
@@ -28,23 +28,23 @@ def meshes_to_3mf(meshes: Sequence[Mesh], title: str) -> bytes:
 
     model = lib3mf.get_wrapper().CreateModel()
     model.SetUnit(lib3mf.ModelUnit.MilliMeter)
-    model.SetBuildUUID(_uuid(f"{title}/build"))
+    model.SetBuildUUID(_name_uuid(f"{title}/build"))
     model.GetMetaDataGroup().AddMetaData("", "Title", title, "xs:string", True)
     materials = model.AddBaseMaterialGroup()
     for number, mesh in enumerate(meshes):
         item = _add_object(lib3mf, model, materials, mesh)
-        item.SetUUID(_uuid(f"{title}/item/{number}"))
+        item.SetUUID(_name_uuid(f"{title}/item/{number}"))
     writer = model.QueryWriter("3mf")
     writer.SetStrictModeActive(True)
-    return _canonical(bytes(writer.WriteToBuffer()))
+    return _canonical_package(bytes(writer.WriteToBuffer()))
 
 
-def _add_object(lib3mf: Any, model: Any, materials: Any, mesh: Mesh) -> Any:
+def _add_object(lib3mf: Any, model: Any, materials: Any, mesh: TriangleMesh) -> Any:
     red, green, blue = (int(mesh.color[i : i + 2], 16) for i in (1, 3, 5))
     material = materials.AddMaterial(mesh.name, lib3mf.Color(red, green, blue, 255))
     part = model.AddMeshObject()
     part.SetName(mesh.name)
-    part.SetUUID(_uuid(f"object/{mesh.name}"))
+    part.SetUUID(_name_uuid(f"object/{mesh.name}"))
     points = np.ascontiguousarray(mesh.points, dtype=np.float32)
     corners = np.ascontiguousarray(mesh.triangles, dtype=np.uint32)
     vertices = (lib3mf.Position * len(points))()
@@ -58,11 +58,11 @@ def _add_object(lib3mf: Any, model: Any, materials: Any, mesh: Mesh) -> Any:
     return model.AddBuildItem(part, lib3mf.get_wrapper().GetIdentityTransform())
 
 
-def _uuid(name: str) -> str:
+def _name_uuid(name: str) -> str:
     return str(uuid.uuid5(_NAMESPACE, name))
 
 
-def _canonical(package: bytes) -> bytes:
+def _canonical_package(package: bytes) -> bytes:
     """The same entries in the same order with a fixed date."""
     result = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(package)) as old, zipfile.ZipFile(result, "w") as new:

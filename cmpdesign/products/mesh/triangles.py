@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class TriangleMesh:
     """A closed triangle mesh.
 
     Attributes:
@@ -29,7 +29,7 @@ class Mesh:
         a, b, c = np.moveaxis((self.points - self.points[0])[self.triangles], 1, 0)
         return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
-    def moved(self, x_mm: float, y_mm: float, z_mm: float, turned: bool = False) -> Mesh:
+    def moved(self, x_mm: float, y_mm: float, z_mm: float, turned: bool = False) -> TriangleMesh:
         """At another place; ``turned`` first turns it about the x axis by 180 degrees."""
         flip = np.array([1.0, -1.0, -1.0]) if turned else np.ones(3)
         return replace(self, points=self.points * flip + np.array([x_mm, y_mm, z_mm]))

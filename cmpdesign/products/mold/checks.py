@@ -11,10 +11,10 @@ import numpy as np
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.mold.shapes.bosses import bosses
+from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3, inset_cells
 from cmpdesign.products.mold.stack.crown import Crown
-from cmpdesign.products.mold.stack.stack import LAYERS, Stack, crown_edge_mm
+from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crown_edge_mm
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ToolLimits:
 
 # Usual values of makers' design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm a nozzle's
 # line, 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
-TOOLS = {
+TOOL_LIMITS = {
     "sla-resin": ToolLimits(0.2, 0.4),
     "fdm-pla": ToolLimits(0.4, 0.6),
     "fdm-petg": ToolLimits(0.4, 0.6),
@@ -49,32 +49,38 @@ THIN_WARNING = 0.85
 LEAST_WALL_MM = 0.3
 
 
-def check_mold(stack: Stack) -> list[Finding]:
+def check_mold(stack: MoldStack) -> list[Finding]:
     """Findings, errors first."""
-    found = [*_bosses(stack), *_draft(stack), *_sheets(stack), *_curing(stack), *_shapes(stack)]
-    found += _unused(stack)
+    found = [
+        *_boss_findings(stack),
+        *_draft_findings(stack),
+        *_sheet_findings(stack),
+        *_curing_findings(stack),
+        *_shape_findings(stack),
+    ]
+    found += _unused_option_findings(stack)
     return sorted(found, key=lambda finding: finding.severity)
 
 
-def refuse_impossible(findings: list[Finding]) -> None:
+def require_no_errors(findings: list[Finding]) -> None:
     """Raise ``DesignError`` for the first finding that is an error."""
     for finding in findings:
         if finding.severity == "error":
             raise DesignError(f"mold: {finding}")
 
 
-def feature_limit_mm(stack: Stack) -> float:
+def min_feature_mm(stack: MoldStack) -> float:
     """The nozzle, beam or cutter."""
-    return stack.options.minimum_feature_mm or TOOLS[stack.options.tool].feature_mm
+    return stack.options.minimum_feature_mm or TOOL_LIMITS[stack.options.tool].feature_mm
 
 
-def tip_width_mm(stack: Stack) -> float:
+def tip_width_mm(stack: MoldStack) -> float:
     """Diameter of the circle inside the narrowest boss's tip; negative when nothing is left."""
     inset = stack.options.gap_mm / 2 + stack.lean * stack.thickness_mm[1]
-    return min(_inscribed_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+    return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
-def _inscribed_mm(cells: Points) -> float:
+def _inscribed_diameter_mm(cells: Points) -> float:
     side = np.roll(cells, -1, axis=1) - cells
     area = (
         np.abs(
@@ -86,8 +92,8 @@ def _inscribed_mm(cells: Points) -> float:
     return float((4 * area / np.hypot(side[..., 0], side[..., 1]).sum(axis=1)).min())
 
 
-def _bosses(stack: Stack) -> Iterator[Finding]:
-    option, limit = stack.options, feature_limit_mm(stack)
+def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
+    option, limit = stack.options, min_feature_mm(stack)
     if option.gap_mm == 0:
         yield Finding(
             "mold.gap_mm",
@@ -117,20 +123,20 @@ def _bosses(stack: Stack) -> Iterator[Finding]:
         yield Finding(
             "mold.tip_radius_mm", option.tip_radius_mm, stencil_width_mm(stack) / 2, "mm", remedy, "error"
         )
-    yield from _slender(height / width)
+    yield from _slenderness_findings(height / width)
     web, name = plate_web_mm(stack)
     if web < limit:
         remedy = "use a finer tool, or make pitch_mm or mold.gap_mm larger"
         yield Finding(f"valley between bosses of boss-{name}", web, limit, "mm", remedy, "warning")
 
 
-def stencil_width_mm(stack: Stack) -> float:
+def stencil_width_mm(stack: MoldStack) -> float:
     """Diameter of the circle inside the narrowest stencil hole's lower face."""
     inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
-    return min(_inscribed_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+    return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
-def _slender(ratio: float) -> Iterator[Finding]:
+def _slenderness_findings(ratio: float) -> Iterator[Finding]:
     remedy = "make mold.marker_mm smaller or pitch_mm larger"
     if ratio > SLENDER_ERROR:
         yield Finding("boss height over width", ratio, SLENDER_ERROR, "", remedy, "error")
@@ -138,7 +144,7 @@ def _slender(ratio: float) -> Iterator[Finding]:
         yield Finding("boss height over width", ratio, SLENDER_WARNING, "", remedy, "warning")
 
 
-def plate_web_mm(stack: Stack) -> tuple[float, str]:
+def plate_web_mm(stack: MoldStack) -> tuple[float, str]:
     """The least distance between bosses of one plate, at their roots, and the plate's color."""
     import shapely
 
@@ -154,7 +160,7 @@ def plate_web_mm(stack: Stack) -> tuple[float, str]:
     return least, name
 
 
-def _draft(stack: Stack) -> Iterator[Finding]:
+def _draft_findings(stack: MoldStack) -> Iterator[Finding]:
     draft = stack.options.draft_deg
     if draft < 0:
         yield Finding("mold.draft_deg (an undercut)", draft, 0.0, "deg", "make it 0 or larger", "error")
@@ -165,17 +171,17 @@ def _draft(stack: Stack) -> Iterator[Finding]:
         yield Finding("mold.draft_deg", draft, DRAFT_WARNING_DEG, "deg", remedy, "warning")
 
 
-def _sheets(stack: Stack) -> Iterator[Finding]:
+def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
     option = stack.options
-    limit = TOOLS[option.tool].sheet_mm
+    limit = TOOL_LIMITS[option.tool].sheet_mm
     sheets = {"frame": stack.thickness_mm[1], "cover": stack.thickness_mm[2], "stencils": option.stencil_mm}
     for name, thickness in sheets.items():
         if thickness < limit:
             remedy = "cut it from shim stock instead: its shape is plain"
             yield Finding(f"thickness of {name} as {option.tool}", thickness, limit, "mm", remedy, "warning")
-    if option.vents and option.vent_mm < feature_limit_mm(stack):
+    if option.vents and option.vent_mm < min_feature_mm(stack):
         remedy = "make mold.vent_mm larger, or drill the vents"
-        yield Finding("mold.vent_mm", option.vent_mm, feature_limit_mm(stack), "mm", remedy, "error")
+        yield Finding("mold.vent_mm", option.vent_mm, min_feature_mm(stack), "mm", remedy, "error")
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
         if getattr(option, field) < least:
@@ -189,16 +195,16 @@ def _sheets(stack: Stack) -> Iterator[Finding]:
         )
 
 
-def _curing(stack: Stack) -> Iterator[Finding]:
+def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
     tool = stack.options.tool
     by_remedy: dict[str, list[str]] = {}
-    for name, silicone in zip(LAYERS, stack.silicones, strict=True):
+    for name, silicone in zip(SILICONE_LAYERS, stack.silicones, strict=True):
         if tool in silicone.inhibited_by.value:
             by_remedy.setdefault(silicone.remedy, []).append(f"{name}: {silicone.name}")
     for remedy, names in by_remedy.items():
         subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
         yield Finding(subject, len(names), 0, "", remedy, "warning")
-    layers = list(zip(LAYERS, stack.silicones, strict=True))
+    layers = list(zip(SILICONE_LAYERS, stack.silicones, strict=True))
     for (below, under), (above, over) in pairwise(layers):
         # Neither cures against the other, the makers say.
         if under.cure != over.cure:
@@ -216,7 +222,7 @@ def _curing(stack: Stack) -> Iterator[Finding]:
         yield Finding(subject, mismatch, MISMATCH_WARNING_MM, "mm", remedy, "warning")
 
 
-def _shapes(stack: Stack) -> Iterator[Finding]:
+def _shape_findings(stack: MoldStack) -> Iterator[Finding]:
     option = stack.options
     if stack.crown is not None and stack.layout.cell_corners.shape[1] != 3:
         remedy = "choose a triangular pattern, or make the pad flat"
@@ -233,10 +239,10 @@ def _shapes(stack: Stack) -> Iterator[Finding]:
         yield Finding("mold.fillet_mm", option.fillet_mm, float(size) / 2, "mm", "make it smaller", "error")
     if stack.crown is None:
         return
-    yield from _crown(stack, stack.crown)
+    yield from _crown_findings(stack, stack.crown)
 
 
-def _crown(stack: Stack, crown: Crown) -> Iterator[Finding]:
+def _crown_findings(stack: MoldStack, crown: Crown) -> Iterator[Finding]:
     thin = float(np.cos(np.radians(crown.slope_deg)))
     if thin < THIN_WARNING:
         remedy = "make mold.crown_radius_mm larger, or expect thinner layers at the pad's edge"
@@ -251,7 +257,7 @@ def _crown(stack: Stack, crown: Crown) -> Iterator[Finding]:
         yield Finding("crown over a flat boss's tip", sag, limit, "mm", remedy, "warning")
 
 
-def _unused(stack: Stack) -> Iterator[Finding]:
+def _unused_option_findings(stack: MoldStack) -> Iterator[Finding]:
     """What was asked for and has no effect, or another one than it says."""
     option, layout = stack.options, stack.layout
     if stack.crown is None:
@@ -270,7 +276,7 @@ def _unused(stack: Stack) -> Iterator[Finding]:
         yield Finding(subject, 1, 0, "", "only cells are clipped; leave it out to keep them all", "warning")
 
 
-def moat_to_pin_mm(stack: Stack) -> float:
+def moat_to_pin_mm(stack: MoldStack) -> float:
     """The least wall between the moat and a pin hole in the base."""
     import shapely
 
@@ -280,7 +286,7 @@ def moat_to_pin_mm(stack: Stack) -> float:
     return float(shapely.distance(pad, pins).min()) - away
 
 
-def facet_sag_mm(stack: Stack) -> float:
+def facet_sag_mm(stack: MoldStack) -> float:
     """How far the crown rises over the flat facets of plates, at most; 0 on a flat pad.
 
     Over a chord between points of a sphere or cylinder of radius R, the circle rises by R - sqrt(R^2 - a^2), a
@@ -299,7 +305,7 @@ def facet_sag_mm(stack: Stack) -> float:
     return float(rise / np.cos(np.radians(stack.crown.slope_deg)))
 
 
-def boss_volume_mm3(stack: Stack, color: int) -> float:
+def boss_volume_mm3(stack: MoldStack, color: int) -> float:
     """Silicone that fills a color's cavities: for the job sheet."""
-    pairs = [(feature.root, feature.tip) for feature in bosses(stack, stack.cells(color))]
+    pairs = [(feature.root, feature.tip) for feature in boss_features(stack, stack.cells(color))]
     return frusta_volume_mm3(pairs, stack.thickness_mm[1])

@@ -20,18 +20,18 @@ from typing import Any
 from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.layout import Layout
-from cmpdesign.products.mold.parts import Part, parts_of
-from cmpdesign.products.mold.solids.measure import drafts_deg, measure
-from cmpdesign.products.mold.stack.stack import stack_of
-from cmpdesign.products.mold.step.step import Solid, solid_to_step
+from cmpdesign.products.mold.parts import Part, make_parts
+from cmpdesign.products.mold.solids.measure import drafts_deg, measure_solid
+from cmpdesign.products.mold.stack.stack import make_stack
+from cmpdesign.products.mold.step.step import NamedSolid, solid_to_step
 
 # The share by which a volume may differ from its formula.
 VOLUME_TOLERANCE = 1e-9
 # Starting a process and loading the kernel there takes as long as some hundred bosses.
-BOSSES_OF_TWO = 400
+MIN_BOSSES_FOR_TWO = 400
 
 # Names of the parts to finish, of a design and its layout.
-Task = tuple[Design, Layout, list[str]]
+FinishTask = tuple[Design, Layout, list[str]]
 
 
 class MoldError(CmpDesignError):
@@ -39,26 +39,30 @@ class MoldError(CmpDesignError):
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedPart:
     """A part's figures as measured on its solid, and its STEP file."""
 
     figures: dict[str, Any]
     step: bytes
 
 
-def finished_all(design: Design, layout: Layout, parts: Sequence[Part]) -> dict[str, Finished]:
+def finish_parts(design: Design, layout: Layout, parts: Sequence[Part]) -> dict[str, FinishedPart]:
     """Every part of a design's mold by name, in order.
 
     Raises:
-        MoldError: see ``finished``.
+        MoldError: see ``finish_part``.
     """
-    here, there = _halves(parts)
-    made = _with_a_helper(design, layout, here, there) if there else [finished(part) for part in here]
+    here, there = _split_work(parts)
+    made = (
+        _finish_in_two_processes(design, layout, here, there)
+        if there
+        else [finish_part(part) for part in here]
+    )
     by_name = dict(zip([part.name for part in (*here, *there)], made, strict=True))
     return {part.name: by_name[part.name] for part in parts}
 
 
-def finished(part: Part) -> Finished:
+def finish_part(part: Part) -> FinishedPart:
     """A part built, checked and written.
 
     Raises:
@@ -66,12 +70,12 @@ def finished(part: Part) -> Finished:
     """
     # A part keeps its solid; a copy's goes with it, so that only one at a time is in memory.
     part = replace(part)
-    return Finished(checked(part), solid_to_step(Solid(part.name, part.color, part.solid)))
+    return FinishedPart(check_part(part), solid_to_step(NamedSolid(part.name, part.color, part.solid)))
 
 
-def checked(part: Part) -> dict[str, Any]:
-    """A part's figures as measured on its solid; raises ``MoldError`` as ``finished`` does."""
-    found = measure(part.solid)
+def check_part(part: Part) -> dict[str, Any]:
+    """A part's figures as measured on its solid; raises ``MoldError`` as ``finish_part`` does."""
+    found = measure_solid(part.solid)
     error = abs(found.volume_mm3 / part.volume_mm3 - 1)
     if not found.valid or not found.closed or error > VOLUME_TOLERANCE:
         state = "closed" if found.closed else "open"
@@ -80,7 +84,7 @@ def checked(part: Part) -> dict[str, Any]:
             f"volume off by {error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of "
             "cmpdesign, please report it"
         )
-    drafts = drafts_deg(part.solid, *part.pulled)
+    drafts = drafts_deg(part.solid, *part.pull_box_mm)
     return {
         "faces": found.faces,
         "volume_mm3": round(found.volume_mm3, 6),
@@ -89,26 +93,26 @@ def checked(part: Part) -> dict[str, Any]:
     }
 
 
-def _halves(parts: Sequence[Part]) -> tuple[list[Part], list[Part]]:
+def _split_work(parts: Sequence[Part]) -> tuple[list[Part], list[Part]]:
     """The parts for this process and for a second one, alike in work; none there if it does not pay."""
-    if sum(map(_bosses, parts)) < BOSSES_OF_TWO or cores() < 2 or not sys.executable:
+    if sum(map(_boss_count, parts)) < MIN_BOSSES_FOR_TWO or available_cores() < 2 or not sys.executable:
         return list(parts), []
     here: list[Part] = []
     there: list[Part] = []
-    for part in sorted(parts, key=_bosses, reverse=True):
-        lighter = here if sum(map(_bosses, here)) <= sum(map(_bosses, there)) else there
+    for part in sorted(parts, key=_boss_count, reverse=True):
+        lighter = here if sum(map(_boss_count, here)) <= sum(map(_boss_count, there)) else there
         lighter.append(part)
     return here, there
 
 
-def cores() -> int:
+def available_cores() -> int:
     """Those that this process may use, where the system tells."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def _bosses(part: Part) -> int:
+def _boss_count(part: Part) -> int:
     """Bosses or holes, which all work goes with; those of a domed pad's parts are their cells."""
     if part.slab is None:
         return 0
@@ -116,9 +120,9 @@ def _bosses(part: Part) -> int:
     return curved + len(part.slab.many) + len(part.slab.many_through)
 
 
-def _with_a_helper(
+def _finish_in_two_processes(
     design: Design, layout: Layout, here: Sequence[Part], there: Sequence[Part]
-) -> list[Finished]:
+) -> list[FinishedPart]:
     """The parts finished here, and those that a second process finishes in the meantime."""
     # Not multiprocessing, which would import a caller's script once more.
     command = [sys.executable, "-P", "-c", f"from {__name__} import helper; helper()"]
@@ -129,22 +133,22 @@ def _with_a_helper(
         try:
             # One that dies at once is heard below.
             with suppress(BrokenPipeError):
-                process.stdin.write(_pickled((design, layout, [part.name for part in there])))
+                process.stdin.write(_pickle_task((design, layout, [part.name for part in there])))
                 process.stdin.flush()
-            made = [finished(part) for part in here]
+            made = [finish_part(part) for part in here]
             output, errors = process.communicate()
         except BaseException:
             process.kill()
             raise
     if process.returncode:
         raise RuntimeError(f"mold: the second process failed: {errors.decode(errors='replace')}")
-    result: list[Finished] | MoldError = pickle.loads(output)
+    result: list[FinishedPart] | MoldError = pickle.loads(output)
     if isinstance(result, MoldError):
         raise result
     return made + result
 
 
-def _pickled(task: Task) -> bytes:
+def _pickle_task(task: FinishTask) -> bytes:
     """A task as bytes; its layout's palette, a read-only view, goes as a copy."""
     buffer = io.BytesIO()
     pickler = pickle.Pickler(buffer)
@@ -158,11 +162,11 @@ def helper() -> None:
     output = os.fdopen(os.dup(1), "wb")
     # Whatever the kernel has to say must not come between.
     os.dup2(2, 1)
-    result: list[Finished] | MoldError
+    result: list[FinishedPart] | MoldError
     try:
         design, layout, names = pickle.load(sys.stdin.buffer)
-        parts = {part.name: part for part in parts_of(stack_of(design, layout))}
-        result = [finished(parts[name]) for name in names]
+        parts = {part.name: part for part in make_parts(make_stack(design, layout))}
+        result = [finish_part(parts[name]) for name in names]
     except MoldError as error:
         result = error
     with output:

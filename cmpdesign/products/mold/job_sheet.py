@@ -9,7 +9,7 @@ from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.mold.make import mold_figures
 from cmpdesign.products.mold.parts import Part
-from cmpdesign.products.mold.stack.stack import LAYERS, Stack
+from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
 
 # Silicone that stays in cups and syringes, in percent of what is cast.
 LOSS_PERCENT = 30
@@ -24,18 +24,18 @@ _STYLE = (
 )
 
 
-def job_sheet(name: str, stack: Stack, parts: Sequence[Part], findings: Sequence[Finding]) -> str:
+def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings: Sequence[Finding]) -> str:
     """The page; it refers to ``pictures/`` beside it."""
     body = [
         f"<h1>Casting {escape(name)}</h1>",
         *(f'<p class="warning">{escape(str(finding))}</p>' for finding in findings),
         '<img class="whole" src="pictures/exploded.png" alt="all parts above each other, in the order of use">',
         "<h2>Mix</h2>",
-        _pours(stack),
+        _pours_html(stack),
         "<h2>Steps</h2>",
-        "<ol>" + "".join(f"<li>{step}</li>" for step in _steps(stack)) + "</ol>",
+        "<ol>" + "".join(f"<li>{step}</li>" for step in _operation_texts(stack)) + "</ol>",
         "<h2>Parts</h2>",
-        *(_part(part) for part in parts),
+        *(_part_html(part) for part in parts),
     ]
     head = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Casting {escape(name)}</title>'
@@ -43,12 +43,12 @@ def job_sheet(name: str, stack: Stack, parts: Sequence[Part], findings: Sequence
     return f"{head}<style>{_STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n"
 
 
-def _pours(stack: Stack) -> str:
+def _pours_html(stack: MoldStack) -> str:
     """Volume and mass of each pour, with what stays in the cup."""
     rows = []
     base, marker, cover = stack.silicones
     for name, volume in mold_figures(stack)["pour_mm3"].items():
-        silicone = base if name == LAYERS[0] else cover if name == LAYERS[2] else marker
+        silicone = base if name == SILICONE_LAYERS[0] else cover if name == SILICONE_LAYERS[2] else marker
         grams = volume * silicone.density_g_cm3.value / 1000
         cells = (
             f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume:.1f} mm³</td>"
@@ -63,7 +63,7 @@ def _pours(stack: Stack) -> str:
     return f"<table>{head}{''.join(rows)}</table>"
 
 
-def _steps(stack: Stack) -> list[str]:
+def _operation_texts(stack: MoldStack) -> list[str]:
     """The way of working that the parts are made for."""
     domed = stack.crown is not None
     spread = "spread it over the dome; the plates shape it" if domed else "draw it off flush with the frame"
@@ -98,7 +98,7 @@ def _steps(stack: Stack) -> list[str]:
     return steps
 
 
-def _part(part: Part) -> str:
+def _part_html(part: Part) -> str:
     pictures = "".join(
         f'<figure><img src="pictures/{part.name}-{side}.png" alt="{part.name} from {side}"></figure>'
         for side in ("above", "below")

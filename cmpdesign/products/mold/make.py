@@ -14,48 +14,57 @@ from cmpdesign.products.mold.checks import (
     facet_sag_mm,
     moat_to_pin_mm,
     plate_web_mm,
-    refuse_impossible,
+    require_no_errors,
 )
-from cmpdesign.products.mold.finish import finished_all
-from cmpdesign.products.mold.parts import Part, parts_of
-from cmpdesign.products.mold.stack.stack import LAYERS, Stack, stack_of
-from cmpdesign.products.mold.step.assembly import Assembly, Place, assembly_to_step
-from cmpdesign.products.registry import Made
+from cmpdesign.products.mold.finish import finish_parts
+from cmpdesign.products.mold.parts import Part, make_parts
+from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, make_stack
+from cmpdesign.products.mold.step.assembly import Assembly, PartPlace, assembly_to_step
+from cmpdesign.products.registry import ProductFiles
 
 FOLDER = "mold"
 # Free space between the steps of the assembly.
-STEP_APART_MM = 10.0
-BASE_STEP = "1-base"
+OPERATION_SPACING_MM = 10.0
+BASE_OPERATION = "1-base"
 
 
-def make_mold(design: Design, layout: Layout) -> Made:
+def make_mold(design: Design, layout: Layout) -> ProductFiles:
     """Every part's STEP file and the assembly's.
 
     Raises:
         DesignError: what cannot be made, before any solid is built.
         MoldError: a solid that is open, invalid or of another volume than computed.
     """
-    stack = stack_of(design, layout)
+    stack = make_stack(design, layout)
     findings = check_mold(stack)
-    refuse_impossible(findings)
-    parts = parts_of(stack)
-    made = finished_all(design, layout, parts)
+    require_no_errors(findings)
+    parts = make_parts(stack)
+    made = finish_parts(design, layout, parts)
     steps = {name: part.step for name, part in made.items()}
     files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": step for name, step in steps.items()}
-    files[f"{FOLDER}/assembly.step"] = assembly_to_step(assembly_of(stack, parts), steps)
+    files[f"{FOLDER}/assembly.step"] = assembly_to_step(make_assembly(stack, parts), steps)
     summary = {"parts": {name: part.figures for name, part in made.items()}, **mold_figures(stack)}
-    return Made(files, summary, tuple(findings))
+    return ProductFiles(files, summary, tuple(findings))
 
 
-def mold_figures(stack: Stack) -> dict[str, Any]:
+def mold_figures(stack: MoldStack) -> dict[str, Any]:
     """What is mixed and poured, and the clearances."""
-    pad = [_frustum(stack, layer) for layer in range(3)]
+    pad = [_layer_volume_mm3(stack, layer) for layer in range(3)]
     fillings = {COLORS[color]: boss_volume_mm3(stack, color) for color in stack.colors}
-    pours = {LAYERS[0]: pad[0], "black": pad[1] - sum(fillings.values()), **fillings, LAYERS[2]: pad[2]}
+    pours = {
+        SILICONE_LAYERS[0]: pad[0],
+        "black": pad[1] - sum(fillings.values()),
+        **fillings,
+        SILICONE_LAYERS[2]: pad[2],
+    }
     web, plate = plate_web_mm(stack)
     return {
-        "scale": {layer: round(s.scale, 9) for layer, s in zip(LAYERS, stack.silicones, strict=True)},
-        "thickness_mm": {layer: round(t, 6) for layer, t in zip(LAYERS, stack.thickness_mm, strict=True)},
+        "scale": {
+            layer: round(s.scale, 9) for layer, s in zip(SILICONE_LAYERS, stack.silicones, strict=True)
+        },
+        "thickness_mm": {
+            layer: round(t, 6) for layer, t in zip(SILICONE_LAYERS, stack.thickness_mm, strict=True)
+        },
         "parting_z_mm": [round(z, 6) for z in (stack.z_base_mm, stack.z_marker_mm, stack.z_cover_mm)],
         "pour_mm3": {name: round(volume, 3) for name, volume in pours.items()},
         "clearance_mm": {
@@ -69,37 +78,37 @@ def mold_figures(stack: Stack) -> dict[str, Any]:
     }
 
 
-def _frustum(stack: Stack, layer: int) -> float:
+def _layer_volume_mm3(stack: MoldStack, layer: int) -> float:
     from cmpdesign.products.mold.solids.loops import frustum_volume_mm3
 
     volume = frustum_volume_mm3(*stack.edges(layer), stack.thickness_mm[layer])
     return volume
 
 
-def assembly_of(stack: Stack, parts: Sequence[Part]) -> Assembly:
+def make_assembly(stack: MoldStack, parts: Sequence[Part]) -> Assembly:
     """One group a step of the work, side by side along x; in each, the parts lie where they are used."""
     by_name = {part.name: part for part in parts}
-    width = float(stack.block.points[:, 0].max() - stack.block.points[:, 0].min()) + STEP_APART_MM
+    width = float(stack.block.points[:, 0].max() - stack.block.points[:, 0].min()) + OPERATION_SPACING_MM
     groups = []
-    for number, (name, members) in enumerate(steps_of(stack).items()):
+    for number, (name, members) in enumerate(operations_of(stack).items()):
         x = number * width
-        places = [_place(by_name[member], x, name) for member in members]
+        places = [_place_part(by_name[member], x, name) for member in members]
         for index, (pin_x, pin_y) in enumerate(stack.pins_mm.tolist(), start=1):
             pin = by_name["pin"]
-            places.append(Place("pin", f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
+            places.append(PartPlace("pin", f"{name}-pin-{index}", (x + pin_x, pin_y, pin.z_mm)))
         groups.append(Assembly(name, places))
     return Assembly("assembly", (), groups)
 
 
-def _place(part: Part, x: float, step: str) -> Place:
+def _place_part(part: Part, x: float, step: str) -> PartPlace:
     # Over the base alone, the lid lies a frame and a cover lower than over the finished pad.
-    z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_STEP) else part.z_mm
-    return Place(part.name, f"{step}-{part.name}", (x, 0.0, z), part.turned)
+    z = part.stack.z_base_mm if (part.name, step) == ("lid", BASE_OPERATION) else part.z_mm
+    return PartPlace(part.name, f"{step}-{part.name}", (x, 0.0, z), part.turned)
 
 
-def steps_of(stack: Stack) -> dict[str, tuple[str, ...]]:
+def operations_of(stack: MoldStack) -> dict[str, tuple[str, ...]]:
     """The steps of the work, and the parts that lie on each other in each."""
-    steps: dict[str, tuple[str, ...]] = {BASE_STEP: ("base", "lid")}
+    steps: dict[str, tuple[str, ...]] = {BASE_OPERATION: ("base", "lid")}
     for color in stack.colors:
         name = COLORS[color]
         steps[f"{len(steps) + 1}-emboss-{name}"] = ("base", "frame", f"boss-{name}")

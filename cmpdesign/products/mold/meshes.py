@@ -13,68 +13,81 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.products.mesh.glb import meshes_to_glb
 from cmpdesign.products.mesh.stl import mesh_to_stl
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf
-from cmpdesign.products.mesh.triangles import Mesh
-from cmpdesign.products.mold.checks import check_mold, refuse_impossible
+from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
-from cmpdesign.products.mold.job_sheet import job_sheet
+from cmpdesign.products.mold.job_sheet import job_sheet_html
 from cmpdesign.products.mold.pad import pad_meshes
-from cmpdesign.products.mold.parts import Part, parts_of
+from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.pictures import mold_pictures
-from cmpdesign.products.mold.solids.loops import boxes_of
-from cmpdesign.products.mold.solids.shells import slab_solid, slab_volume_mm3
-from cmpdesign.products.mold.solids.tessellate import chorded, mesh_of_solid
-from cmpdesign.products.mold.stack.stack import Stack, stack_of
-from cmpdesign.products.registry import Made
+from cmpdesign.products.mold.solids.loops import bounding_boxes
+from cmpdesign.products.mold.solids.shells import make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.tessellate import chorded_slab, tessellate_solid
+from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
+from cmpdesign.products.registry import ProductFiles
 
 FOLDER = "mesh"
 # A flat-sided mesh has its volume in closed form; smooth crowns and pins are met within the chords' error.
-EXACT, SMOOTH = 1e-9, 5e-3
+EXACT_TOLERANCE, SMOOTH_TOLERANCE = 1e-9, 5e-3
 APART_MM = 5.0
 OPACITY = {"base": 0.35, "cover": 0.35}
 
 
-def make_meshes(design: Design, layout: Layout) -> Made:
+def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     """Meshes of the mold's parts (as they are printed) and of the pad's layers.
 
     Raises:
         DesignError: what cannot be made.
         MoldError: a mesh that is open, twisted or of another volume than computed.
     """
-    stack = stack_of(design, layout)
+    stack = make_stack(design, layout)
     findings = check_mold(stack)
-    refuse_impossible(findings)
+    require_no_errors(findings)
     figures: dict[str, Any] = {}
-    parts = parts_of(stack)
-    mold = [_checked(f"mold/{part.name}", *part_mesh(part), figures) for part in parts]
-    pad = [_checked(f"pad/{mesh.name}", mesh, volume, EXACT, figures) for mesh, volume in pad_meshes(stack)]
+    parts = make_parts(stack)
+    mold = [_add_checked_figures(f"mold/{part.name}", *make_part_mesh(part), figures) for part in parts]
+    pad = [
+        _add_checked_figures(f"pad/{mesh.name}", mesh, volume, EXACT_TOLERANCE, figures)
+        for mesh, volume in pad_meshes(stack)
+    ]
     files: dict[str, str | bytes] = {f"{FOLDER}/mold-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in mold}
     files |= {f"{FOLDER}/pad-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in pad}
-    laid_out = side_by_side(stack, mold)
+    laid_out = place_side_by_side(stack, mold)
     files[f"{FOLDER}/mold.glb"] = meshes_to_glb(laid_out)
     files[f"{FOLDER}/mold.3mf"] = meshes_to_3mf(laid_out, f"{design.name} mold")
     files[f"{FOLDER}/pad.glb"] = meshes_to_glb(pad, OPACITY)
     files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad")
     pictures = mold_pictures(parts, mold)
     files |= {f"{FOLDER}/pictures/{name}.png": to_png(picture) for name, picture in pictures.items()}
-    files[f"{FOLDER}/job-sheet.html"] = job_sheet(design.name, stack, parts, findings)
-    return Made(files, figures, tuple(findings), pictures)
+    files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(design.name, stack, parts, findings)
+    return ProductFiles(files, figures, tuple(findings), pictures)
 
 
-def part_mesh(part: Part) -> tuple[Mesh, float, float]:
+def make_part_mesh(part: Part) -> tuple[TriangleMesh, float, float]:
     """A part's mesh, the volume that it must have, and how nearly."""
     if part.slab is None or part.crown in ("raised", "hollow"):
-        return mesh_of_solid(part.name, part.color, part.solid), part.volume_mm3, SMOOTH
-    slab = chorded(part.slab)
+        return tessellate_solid(part.name, part.color, part.solid), part.volume_mm3, SMOOTH_TOLERANCE
+    slab = chorded_slab(part.slab)
     if part.crown:
-        from cmpdesign.products.mold.shapes.dished import dished_plate, dished_sheet, dished_volume_mm3
+        from cmpdesign.products.mold.shapes.dished import (
+            dished_plate_solid,
+            dished_sheet_solid,
+            dished_volume_mm3,
+        )
 
-        build = dished_plate if part.crown == "plate" else dished_sheet
+        build = dished_plate_solid if part.crown == "plate" else dished_sheet_solid
         volume = dished_volume_mm3(slab, part.dish, part.crown)
-        return mesh_of_solid(part.name, part.color, build(slab, part.dish)), volume, EXACT
-    return mesh_of_solid(part.name, part.color, slab_solid(slab)), slab_volume_mm3(slab), EXACT
+        return tessellate_solid(part.name, part.color, build(slab, part.dish)), volume, EXACT_TOLERANCE
+    return (
+        tessellate_solid(part.name, part.color, make_slab_solid(slab)),
+        slab_volume_mm3(slab),
+        EXACT_TOLERANCE,
+    )
 
 
-def _checked(name: str, mesh: Mesh, volume: float, tolerance: float, figures: dict[str, Any]) -> Mesh:
+def _add_checked_figures(
+    name: str, mesh: TriangleMesh, volume: float, tolerance: float, figures: dict[str, Any]
+) -> TriangleMesh:
     """The mesh, checked by trimesh; its figures are added."""
     import trimesh
 
@@ -94,9 +107,9 @@ def _checked(name: str, mesh: Mesh, volume: float, tolerance: float, figures: di
     return mesh
 
 
-def side_by_side(stack: Stack, meshes: Sequence[Mesh]) -> list[Mesh]:
+def place_side_by_side(stack: MoldStack, meshes: Sequence[TriangleMesh]) -> list[TriangleMesh]:
     """The parts on a plate, four in a row, each standing on z = 0."""
-    low, high = boxes_of([stack.block])[0]
+    low, high = bounding_boxes([stack.block])[0]
     step = high - low + APART_MM
     placed = []
     for number, mesh in enumerate(meshes):

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.mold.shapes.bosses import bosses, stencil_holes
-from cmpdesign.products.mold.shapes.dish import Dish, dish_of
-from cmpdesign.products.mold.shapes.dished import dished_plate, dished_sheet, dished_volume_mm3
-from cmpdesign.products.mold.solids.loops import Loop, Points, circle, grown, polygon
+from cmpdesign.products.mold.shapes.bosses import boss_features, stencil_hole_outlines
+from cmpdesign.products.mold.shapes.dish import Dish, make_dish
+from cmpdesign.products.mold.shapes.dished import dished_plate_solid, dished_sheet_solid, dished_volume_mm3
+from cmpdesign.products.mold.solids.loops import Loop, Points, circle_loop, polygon_loop, rounded_offset
 from cmpdesign.products.mold.solids.pins import pin_solid, pin_volume_mm3
-from cmpdesign.products.mold.solids.shells import Feature, Slab, slab_solid, slab_volume_mm3
-from cmpdesign.products.mold.stack.stack import Stack
+from cmpdesign.products.mold.solids.shells import Feature, Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.stack.stack import MoldStack
 
 # A vent widens towards the outside, so that its plug is torn off at the pad.
 VENT_LEAN = float(np.tan(np.radians(5.0)))
@@ -30,7 +30,13 @@ PIN_CHAMFER_MM = 0.3
 PIN_FLOOR_MM = 1.0
 # A pad's outline with more corners is a circle in disguise: offset with mitres instead of arcs.
 MANY_CORNERS = 24
-STEEL, TRAY, FRAME, COVER, LID = "#b4b8bd", "#8796a5", "#3c3c40", "#c9b99a", "#9fc6d8"
+STEEL_COLOR, TRAY_COLOR, FRAME_COLOR, COVER_COLOR, LID_COLOR = (
+    "#b4b8bd",
+    "#8796a5",
+    "#3c3c40",
+    "#c9b99a",
+    "#9fc6d8",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +60,13 @@ class Part:
     color: str
     slab: Slab | None
     z_mm: float
-    stack: Stack
+    stack: MoldStack
     turned: bool = False
     crown: str = ""
     color_number: int = -1
 
     @property
-    def pulled(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    def pull_box_mm(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """The box, in the part's own frame, in which its walls are pulled from silicone."""
         # Layers that shrink differently differ in size.
         edges = np.concatenate([self.stack.edges(layer)[1].points for layer in range(3)])
@@ -78,7 +84,7 @@ class Part:
 
     @cached_property
     def dish(self) -> Dish:
-        return dish_of(self.stack, self.color_number, through=self.crown == "sheet")
+        return make_dish(self.stack, self.color_number, through=self.crown == "sheet")
 
     @cached_property
     def volume_mm3(self) -> float:
@@ -99,73 +105,86 @@ class Part:
         if self.slab is None:
             return pin_solid(self.stack.pin_diameter_mm, pin_length_mm(self.stack), PIN_CHAMFER_MM)
         if self.crown in ("plate", "sheet"):
-            build = dished_plate if self.crown == "plate" else dished_sheet
+            build = dished_plate_solid if self.crown == "plate" else dished_sheet_solid
             return build(self.slab, self.dish)
-        solid = slab_solid(self.slab)
+        solid = make_slab_solid(self.slab)
         if self.crown:
-            from cmpdesign.products.mold.shapes.caps import with_cap
+            from cmpdesign.products.mold.shapes.caps import solid_with_cap
 
             assert self.stack.crown is not None
-            return with_cap(solid, self.stack.crown, raised=self.crown == "raised")
+            return solid_with_cap(solid, self.stack.crown, raised=self.crown == "raised")
         return solid
 
 
-def parts_of(stack: Stack) -> list[Part]:
+def make_parts(stack: MoldStack) -> list[Part]:
     """Every part once, in the order of use; nothing is built yet."""
-    plates = [part for color in stack.colors for part in (_boss_plate(stack, color), _stencil(stack, color))]
-    return [_base(stack), _frame(stack), *plates, _cover(stack), _lid(stack), _pin(stack)]
+    plates = [
+        part
+        for color in stack.colors
+        for part in (_boss_plate_part(stack, color), _stencil_part(stack, color))
+    ]
+    return [
+        _base_part(stack),
+        _frame_part(stack),
+        *plates,
+        _cover_part(stack),
+        _lid_part(stack),
+        _pin_part(stack),
+    ]
 
 
-def pin_length_mm(stack: Stack) -> float:
+def pin_length_mm(stack: MoldStack) -> float:
     """From the bottom of its hole to 1 mm below the lid's back."""
     height = 0.0 if stack.crown is None else stack.crown.height_mm
     return pin_depth_mm(stack) + stack.z_cover_mm - stack.z_base_mm + stack.options.plate_mm + height - 1.0
 
 
-def pin_depth_mm(stack: Stack) -> float:
+def pin_depth_mm(stack: MoldStack) -> float:
     """Of the blind holes in the base."""
     return stack.z_base_mm + stack.options.floor_mm - PIN_FLOOR_MM
 
 
-def _base(stack: Stack) -> Part:
+def _base_part(stack: MoldStack) -> Part:
     option, lean = stack.options, stack.lean
     low, high = stack.edges(0)
     pad = Feature(high, low, -stack.z_base_mm)
-    inner = _around(high, option.parting_mm)
-    outer = _around(high, option.parting_mm + option.moat_mm)
+    inner = _offset_outline(high, option.parting_mm)
+    outer = _offset_outline(high, option.parting_mm + option.moat_mm)
     depth = option.moat_depth_mm
     moat = Feature(outer, outer.moved(-lean * depth), -depth, (inner, inner.moved(lean * depth)))
     sockets = [Feature(hole, hole, -pin_depth_mm(stack)) for hole in stack.holes(clearance=False)]
     slab = Slab(stack.block, -option.floor_mm, stack.z_base_mm, (), (pad, moat, *sockets))
     crown = "raised" if stack.crown else ""
-    return Part("base", "tray of the clear base layer", TRAY, slab, 0.0, stack, crown=crown)
+    return Part("base", "tray of the clear base layer", TRAY_COLOR, slab, 0.0, stack, crown=crown)
 
 
-def _around(edge: Loop, offset_mm: float) -> Loop:
-    return grown(edge.points, offset_mm) if len(edge.points) <= MANY_CORNERS else edge.moved(offset_mm)
+def _offset_outline(edge: Loop, offset_mm: float) -> Loop:
+    return (
+        rounded_offset(edge.points, offset_mm) if len(edge.points) <= MANY_CORNERS else edge.moved(offset_mm)
+    )
 
 
-def _frame(stack: Stack) -> Part:
-    slab = _ring(stack, 1)
-    return Part("frame", "pouring frame of the black layer", FRAME, slab, stack.z_base_mm, stack)
+def _frame_part(stack: MoldStack) -> Part:
+    slab = _ring_slab(stack, 1)
+    return Part("frame", "pouring frame of the black layer", FRAME_COLOR, slab, stack.z_base_mm, stack)
 
 
-def _cover(stack: Stack) -> Part:
-    slab = _ring(stack, 2)
-    return Part("cover", "frame of the protective layer", COVER, slab, stack.z_marker_mm, stack)
+def _cover_part(stack: MoldStack) -> Part:
+    slab = _ring_slab(stack, 2)
+    return Part("cover", "frame of the protective layer", COVER_COLOR, slab, stack.z_marker_mm, stack)
 
 
-def _ring(stack: Stack, layer: int) -> Slab:
+def _ring_slab(stack: MoldStack, layer: int) -> Slab:
     holes = [stack.edges(layer), *((hole, hole) for hole in stack.holes())]
     return Slab(stack.block, 0.0, stack.thickness_mm[layer], holes)
 
 
-def _boss_plate(stack: Stack, color: int) -> Part:
+def _boss_plate_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    standing = () if stack.crown else bosses(stack, turned_over(stack.cells(color)))
-    holes = [hole for loop in (*stack.holes(), *_jacks(stack)) for hole in [_loop_turned(loop)]]
+    standing = () if stack.crown else boss_features(stack, mirror_cells(stack.cells(color)))
+    holes = [hole for loop in (*stack.holes(), *_jack_holes(stack)) for hole in [_mirror_loop(loop)]]
     depth = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
-    slab = Slab(_loop_turned(stack.block), -depth, 0.0, [(h, h) for h in holes], (), standing)
+    slab = Slab(_mirror_loop(stack.block), -depth, 0.0, [(h, h) for h in holes], (), standing)
     use = f"bosses that leave the {name} cavities in the black layer"
     crown = "plate" if stack.crown else ""
     return Part(
@@ -173,9 +192,9 @@ def _boss_plate(stack: Stack, color: int) -> Part:
     )
 
 
-def _stencil(stack: Stack, color: int) -> Part:
+def _stencil_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    through = () if stack.crown else stencil_holes(stack, stack.cells(color))
+    through = () if stack.crown else stencil_hole_outlines(stack, stack.cells(color))
     holes = [(hole, hole) for hole in stack.holes()]
     slab = Slab(stack.block, 0.0, stack.options.stencil_mm, holes, many_through=through)
     use = f"mask for filling the {name} cavities"
@@ -193,27 +212,27 @@ def _stencil(stack: Stack, color: int) -> Part:
     )
 
 
-def _lid(stack: Stack) -> Part:
+def _lid_part(stack: MoldStack) -> Part:
     height = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
-    holes = [(hole, hole) for hole in (*stack.holes(), *_jacks(stack))]
+    holes = [(hole, hole) for hole in (*stack.holes(), *_jack_holes(stack))]
     diameter = stack.options.vent_mm
     for place in vent_places(stack):
-        holes.append((circle(place, diameter), circle(place, diameter + 2 * VENT_LEAN * height)))
+        holes.append((circle_loop(place, diameter), circle_loop(place, diameter + 2 * VENT_LEAN * height)))
     slab = Slab(stack.block, 0.0, height, holes)
     crown = "hollow" if stack.crown else ""
-    return Part("lid", "closes the base and the cover", LID, slab, stack.z_cover_mm, stack, crown=crown)
+    return Part("lid", "closes the base and the cover", LID_COLOR, slab, stack.z_cover_mm, stack, crown=crown)
 
 
-def _pin(stack: Stack) -> Part:
-    return Part("pin", "dowel, four of them", STEEL, None, stack.z_base_mm - pin_depth_mm(stack), stack)
+def _pin_part(stack: MoldStack) -> Part:
+    return Part("pin", "dowel, four of them", STEEL_COLOR, None, stack.z_base_mm - pin_depth_mm(stack), stack)
 
 
-def vent_places(stack: Stack) -> Points:
+def vent_places(stack: MoldStack) -> Points:
     """(V, 2) inside the pad's edge, at equal distances along it from its first corner."""
     count = stack.options.vents
     inset = stack.options.vent_mm / 2 + 0.1
     low = min((stack.edges(layer)[0] for layer in (0, 2)), key=lambda loop: loop.area_mm2())
-    path = polygon(low.points).moved(-inset).points
+    path = polygon_loop(low.points).moved(-inset).points
     sides = np.hypot(*(np.roll(path, -1, axis=0) - path).T)
     along = np.concatenate([[0.0], np.cumsum(sides)])
     closed = np.concatenate([path, path[:1]])
@@ -221,21 +240,21 @@ def vent_places(stack: Stack) -> Points:
     return np.stack([np.interp(at, along, closed[:, axis]) for axis in (0, 1)], axis=-1)
 
 
-def _jacks(stack: Stack) -> list[Loop]:
+def _jack_holes(stack: MoldStack) -> list[Loop]:
     """Two tapped holes over the base's solid rim, a quarter of the height from opposite corners."""
     (left, bottom), _, (_, top) = stack.pins_mm[0], stack.pins_mm[1], stack.pins_mm[2]
     right = stack.pins_mm[1][0]
     quarter = (top - bottom) / 4
-    return [circle(np.array(p), JACK_MM) for p in ((left, bottom + quarter), (right, top - quarter))]
+    return [circle_loop(np.array(p), JACK_MM) for p in ((left, bottom + quarter), (right, top - quarter))]
 
 
-def turned_over(cells: Points) -> Points:
+def mirror_cells(cells: Points) -> Points:
     """Cells as on a plate that lies on its back: y mirrored, still counter-clockwise."""
     turned: Points = cells[:, ::-1] * np.array([1.0, -1.0])
     return turned
 
 
-def _loop_turned(loop: Loop) -> Loop:
+def _mirror_loop(loop: Loop) -> Loop:
     """A loop as seen on a plate that lies on its back."""
     flip = np.array([1.0, -1.0])
     # Side i runs from point i to i + 1; backwards, the centre of side i belongs to the point before.

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, View, draw_meshes, write
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, ViewDirection, draw_label, draw_meshes
+from cmpdesign.products.mesh.triangles import TriangleMesh
 from cmpdesign.products.mold.parts import Part
 
 Image = NDArray[np.uint8]
@@ -17,18 +17,18 @@ SIZE_PX = (560, 400)
 EXPLODED_PX = (860, 1200)
 # Free at the right of the exploded parts, for their names.
 NAMES_PX = 170
-EXPLODED = View(-60.0, 22.0)
+EXPLODED_VIEW = ViewDirection(-60.0, 22.0)
 # Free between exploded parts, as a share of their width.
-APART = 0.2
+EXPLODED_GAP_SHARE = 0.2
 EXPLODED_NAME = "exploded"
 
 
-def mold_pictures(parts: Sequence[Part], meshes: Sequence[Mesh]) -> dict[str, Image]:
-    """``exploded``, and ``part-above`` and ``part-below`` of every part; BGR."""
+def mold_pictures(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> dict[str, Image]:
+    """``exploded_meshes``, and ``part-above`` and ``part-below`` of every part; BGR."""
     return {EXPLODED_NAME: exploded_picture(parts, meshes), **part_pictures(meshes)}
 
 
-def part_pictures(meshes: Sequence[Mesh]) -> dict[str, Image]:
+def part_pictures(meshes: Sequence[TriangleMesh]) -> dict[str, Image]:
     """Every part from two sides."""
     views = {"above": ABOVE, "below": BELOW}
     return {
@@ -38,28 +38,30 @@ def part_pictures(meshes: Sequence[Mesh]) -> dict[str, Image]:
     }
 
 
-def exploded_picture(parts: Sequence[Part], meshes: Sequence[Mesh]) -> Image:
+def exploded_picture(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> Image:
     """The parts above each other with their names."""
-    groups = exploded(parts, meshes)
+    groups = exploded_meshes(parts, meshes)
     size = (EXPLODED_PX[0] - NAMES_PX, EXPLODED_PX[1])
     placed = [mesh for group in groups.values() for mesh in group]
-    framing = Framing.of(placed, EXPLODED, size)
+    framing = Framing.of(placed, EXPLODED_VIEW, size)
     picture = np.full((EXPLODED_PX[1], EXPLODED_PX[0], 3), 255, np.uint8)
-    picture[:, : size[0]] = draw_meshes(placed, EXPLODED, size)
+    picture[:, : size[0]] = draw_meshes(placed, EXPLODED_VIEW, size)
     for name, group in groups.items():
         points = framing.to_px(np.concatenate([mesh.points for mesh in group]))
         x, y, _ = points[points[:, 0].argmax()]
         text = name if len(group) == 1 else f"{name} ({len(group)})"
-        write(picture, text, (x, y), size[0] + 10)
+        draw_label(picture, text, (x, y), size[0] + 10)
     return picture
 
 
-def exploded(parts: Sequence[Part], meshes: Sequence[Mesh]) -> Mapping[str, list[Mesh]]:
+def exploded_meshes(
+    parts: Sequence[Part], meshes: Sequence[TriangleMesh]
+) -> Mapping[str, list[TriangleMesh]]:
     """The parts above each other in the order of use, turned as they are used, the pins over the base."""
-    placed: dict[str, list[Mesh]] = {}
-    apart = APART * float(np.ptp(meshes[0].points[:, :2], axis=0).max())
+    placed: dict[str, list[TriangleMesh]] = {}
+    apart = EXPLODED_GAP_SHARE * float(np.ptp(meshes[0].points[:, :2], axis=0).max())
     top = 0.0
-    for part, mesh in _in_order(parts, meshes):
+    for part, mesh in _parts_in_order(parts, meshes):
         turned = mesh.moved(0.0, 0.0, 0.0, part.turned)
         low, high = float(turned.points[:, 2].min()), float(turned.points[:, 2].max())
         places = part.stack.pins_mm.tolist() if part.name == "pin" else [(0.0, 0.0)]
@@ -68,7 +70,7 @@ def exploded(parts: Sequence[Part], meshes: Sequence[Mesh]) -> Mapping[str, list
     return placed
 
 
-def _in_order(parts: Sequence[Part], meshes: Sequence[Mesh]) -> list[tuple[Part, Mesh]]:
+def _parts_in_order(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> list[tuple[Part, TriangleMesh]]:
     """Base, pins, then the others."""
     pairs = list(zip(parts, meshes, strict=True))
     pins = [pair for pair in pairs if pair[0].name == "pin"]

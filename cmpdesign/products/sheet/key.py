@@ -20,7 +20,7 @@ CODE_MM = 24.0
 # First and last end of each bar's middle line.
 X_BAR = ((30.0, 20.0), (30.0 + BAR_MM, 20.0))
 Y_BAR = ((4.0, -6.0), (4.0, -6.0 - BAR_MM))
-MARK = "CMP1"
+KEY_PREFIX = "CMP1"
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,13 @@ class SheetKey:
 
     def text(self) -> str:
         """The code's text; the name comes last, since it may hold anything."""
-        return f"{MARK}|{self.digest}|{self.pattern}|{self.layers}|{self.pitch_mm!r}|{self.name}"
+        return f"{KEY_PREFIX}|{self.digest}|{self.pattern}|{self.layers}|{self.pitch_mm!r}|{self.name}"
 
 
 def parse_key(text: str) -> SheetKey | None:
     """The key in a code's text; None when it is some other code."""
     parts = text.split("|", 5)
-    if len(parts) != 6 or parts[0] != MARK:
+    if len(parts) != 6 or parts[0] != KEY_PREFIX:
         return None
     try:
         return SheetKey(parts[1], parts[5], parts[2], int(parts[3]), float(parts[4]))

@@ -15,7 +15,7 @@ POINTS_PER_MM = 72 / 25.4
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes:
+class FilledPolygons:
     """Filled polygons of one color."""
 
     polygons: Sequence[NDArray[np.float64]]
@@ -24,7 +24,7 @@ class Shapes:
 
 
 @dataclass(frozen=True)
-class Text:
+class TextLine:
     """One line of text, its left end on the base line; ``turned``: it runs upwards."""
 
     text: str
@@ -41,10 +41,10 @@ class Page:
     width_mm: float
     height_mm: float
     title: str
-    items: Sequence[Shapes | Text]
+    items: Sequence[FilledPolygons | TextLine]
 
 
-def box(left: float, top: float, width: float, height: float) -> NDArray[np.float64]:
+def rectangle_points(left: float, top: float, width: float, height: float) -> NDArray[np.float64]:
     """An upright rectangle's corners."""
     right, bottom = left + width, top + height
     return np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
@@ -61,7 +61,7 @@ def page_to_svg(page: Page) -> str:
     )
     drawing.set_desc(title=page.title)
     for item in page.items:
-        if isinstance(item, Text):
+        if isinstance(item, TextLine):
             drawing.add(_svg_text(drawing, item))
             continue
         group = drawing.g(fill=item.color, **({"id": item.name} if item.name else {}))
@@ -72,7 +72,7 @@ def page_to_svg(page: Page) -> str:
     return f'<?xml version="1.0" encoding="utf-8" ?>\n{drawing.tostring()}\n'
 
 
-def _svg_text(drawing: Any, item: Text) -> Any:
+def _svg_text(drawing: Any, item: TextLine) -> Any:
     style = {"font_size": item.size_mm, "font_family": "Helvetica, Arial, sans-serif", "fill": "#000000"}
     if not item.turned:
         return drawing.text(item.text, insert=(item.x_mm, item.y_mm), **style)
@@ -91,7 +91,7 @@ def page_to_pdf(page: Page) -> bytes:
     # From here on in mm, y still up.
     canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
     for item in page.items:
-        if isinstance(item, Text):
+        if isinstance(item, TextLine):
             _pdf_text(canvas, item, page.height_mm)
             continue
         canvas.setFillColor(HexColor(item.color))
@@ -108,7 +108,7 @@ def page_to_pdf(page: Page) -> bytes:
     return result.getvalue()
 
 
-def _pdf_text(canvas: Any, item: Text, height_mm: float) -> None:
+def _pdf_text(canvas: Any, item: TextLine, height_mm: float) -> None:
     canvas.saveState()
     canvas.setFillGray(0)
     canvas.translate(item.x_mm, height_mm - item.y_mm)

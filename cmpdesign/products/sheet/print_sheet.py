@@ -9,11 +9,18 @@ from cmpdesign.design.design import Design
 from cmpdesign.design.sheet_options import PAGES_MM, SheetOptions
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
-from cmpdesign.layout.outline import mitres
+from cmpdesign.layout.outline import corner_offsets
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.registry import Made
+from cmpdesign.products.registry import ProductFiles
 from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
-from cmpdesign.products.sheet.page import Page, Shapes, Text, box, page_to_pdf, page_to_svg
+from cmpdesign.products.sheet.page import (
+    FilledPolygons,
+    Page,
+    TextLine,
+    page_to_pdf,
+    page_to_svg,
+    rectangle_points,
+)
 
 FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
@@ -26,38 +33,46 @@ PATCH_MM, FRAME_MM = 6.0, 0.2
 Points = NDArray[np.float64]
 
 
-def make_print_sheet(design: Design, layout: Layout) -> Made:
+def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
     """``print/sheet.svg`` and ``print/sheet.pdf``.
 
     Raises:
         DesignError: not one pad fits on the page.
     """
-    page, pads = print_page(design, layout)
+    page, pads = make_print_page(design, layout)
     files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
     files[f"{FOLDER}/sheet.pdf"] = page_to_pdf(page)
-    return Made(files, {"pads": pads, "page": design.sheet.page, "bleed_mm": design.sheet.bleed_mm})
+    return ProductFiles(files, {"pads": pads, "page": design.sheet.page, "bleed_mm": design.sheet.bleed_mm})
 
 
-def print_page(design: Design, layout: Layout) -> tuple[Page, int]:
+def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
     """The page, and how many pads are on it."""
     width, height = PAGES_MM[design.sheet.page]
-    places = _places(design.sheet, layout, width, height)
+    places = _pad_places(design.sheet, layout, width, height)
     # A transparent page becomes black in many a viewer, and its code unreadable.
-    items: list[Shapes | Text] = [Shapes([box(0, 0, width, height)], PAPER, "paper")]
+    items: list[FilledPolygons | TextLine] = [
+        FilledPolygons([rectangle_points(0, 0, width, height)], PAPER, "paper")
+    ]
     for place in places:
-        items += _pad(layout, place, design)
-    items.append(Shapes([mark for place in places for mark in _marks(layout, place, design)], INK, "crop"))
-    items += _key(layout, height)
-    items += _patches(layout, width, height)
+        items += _pad_items(layout, place, design)
+    items.append(
+        FilledPolygons(
+            [mark for place in places for mark in _fiducial_polygons(layout, place, design)], INK, "crop"
+        )
+    )
+    items += _key_items(layout, height)
+    items += _color_patch_items(layout, width, height)
     return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(
         places
     )
 
 
-def _places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
+def _pad_places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
     """Upper left corner of each pad's bounding box, row by row."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    printed = np.concatenate([_bleed(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)])
+    printed = np.concatenate(
+        [_bleed_outline(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)]
+    )
     around = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
     step = np.array(layout.size_mm) + 2 * around
     left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM
@@ -81,28 +96,28 @@ def _places(option: SheetOptions, layout: Layout, width: float, height: float) -
     return [corner + step * (n % columns, n // columns) for n in range(wanted)]
 
 
-def _pad(layout: Layout, place: Points, design: Design) -> list[Shapes | Text]:
-    ground = _on_page(_bleed(layout, design.sheet), layout, place, design)
-    items: list[Shapes | Text] = [Shapes([ground], layout.palette[COLORS[BLACK]])]
+def _pad_items(layout: Layout, place: Points, design: Design) -> list[FilledPolygons | TextLine]:
+    ground = _page_from_layout(_bleed_outline(layout, design.sheet), layout, place, design)
+    items: list[FilledPolygons | TextLine] = [FilledPolygons([ground], layout.palette[COLORS[BLACK]])]
     for color, name in enumerate(COLORS):
         cells = layout.cell_corners[layout.cell_color == color]
         if color != BLACK and len(cells):
-            corners = _on_page(layout.marker_xy_mm[cells], layout, place, design)
-            items.append(Shapes(list(corners), layout.palette[name]))
+            corners = _page_from_layout(layout.marker_xy_mm[cells], layout, place, design)
+            items.append(FilledPolygons(list(corners), layout.palette[name]))
     return items
 
 
-def _bleed(layout: Layout, option: SheetOptions) -> Points:
-    bleed: Points = layout.outline_mm + option.bleed_mm * mitres(layout.outline_mm)
+def _bleed_outline(layout: Layout, option: SheetOptions) -> Points:
+    bleed: Points = layout.outline_mm + option.bleed_mm * corner_offsets(layout.outline_mm)
     return bleed
 
 
-def _marks(layout: Layout, place: Points, design: Design) -> list[Points]:
+def _fiducial_polygons(layout: Layout, place: Points, design: Design) -> list[Points]:
     marks = crop_marks(layout.outline_mm, design.sheet.bleed_mm)
-    return [_on_page(mark, layout, place, design) for mark in marks]
+    return [_page_from_layout(mark, layout, place, design) for mark in marks]
 
 
-def _on_page(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
+def _page_from_layout(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
     """From the layout to the page, the upper left corner of the pad's bounding box at ``place``."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     x = high[0] - xy[..., 0] if design.print_mirror else xy[..., 0] - low[0]
@@ -121,42 +136,45 @@ def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
     Returns:
         Two (4, 2) outlines for each corner.
     """
-    corners, sine = outline_mm, _turns(outline_mm)
+    corners, sine = outline_mm, _turn_sines(outline_mm)
     if (sine < SHARP).any():
         (left, low), (right, high) = outline_mm.min(axis=0), outline_mm.max(axis=0)
         corners = np.array([(left, low), (right, low), (right, high), (left, high)])
         sine = np.ones(4)
     before, after = (
-        _along(np.roll(corners, 1, axis=0), corners),
-        _along(np.roll(corners, -1, axis=0), corners),
+        _unit_directions(np.roll(corners, 1, axis=0), corners),
+        _unit_directions(np.roll(corners, -1, axis=0), corners),
     )
     marks = []
     for corner, away, *ways in zip(corners, (bleed_mm + CROP_APART_MM) / sine, before, after, strict=True):
         # Where a side goes on, it leaves the next one's bleed at this distance from the corner.
-        marks += [_hairline(corner + away * way, way) for way in ways]
+        marks += [_hairline_polygon(corner + away * way, way) for way in ways]
     return marks
 
 
-def _turns(outline: Points) -> Points:
+def _turn_sines(outline: Points) -> Points:
     """(N,) sine of the angle by which the outline turns to the left at each corner."""
-    first, then = _along(np.roll(outline, 1, axis=0), outline), _along(outline, np.roll(outline, -1, axis=0))
+    first, then = (
+        _unit_directions(np.roll(outline, 1, axis=0), outline),
+        _unit_directions(outline, np.roll(outline, -1, axis=0)),
+    )
     turns: Points = first[:, 0] * then[:, 1] - first[:, 1] * then[:, 0]
     return turns
 
 
-def _along(start: Points, end: Points) -> Points:
+def _unit_directions(start: Points, end: Points) -> Points:
     """(N, 2) directions of length one."""
     way: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
     return way
 
 
-def _hairline(start: Points, way: Points) -> Points:
+def _hairline_polygon(start: Points, way: Points) -> Points:
     half = HAIRLINE_MM / 2 * np.array([-way[1], way[0]])
     end = start + CROP_MM * way
     return np.array([start - half, end - half, end + half, start + half])
 
 
-def _key(layout: Layout, height: float) -> list[Shapes | Text]:
+def _key_items(layout: Layout, height: float) -> list[FilledPolygons | TextLine]:
     """QR code, scale bars and text, in the lower left corner."""
     import segno
 
@@ -169,11 +187,12 @@ def _key(layout: Layout, height: float) -> list[Shapes | Text]:
     matrix = np.array([list(row) for row in segno.make_qr(key.text(), error="m").matrix], dtype=bool)
     module = CODE_MM / len(matrix)
     modules = [
-        box(left + module * c, top + module * r, module, module) for r, c in np.argwhere(matrix).tolist()
+        rectangle_points(left + module * c, top + module * r, module, module)
+        for r, c in np.argwhere(matrix).tolist()
     ]
     half = THICK_MM / 2
-    x_bar = box(left + X_BAR[0][0], top + X_BAR[0][1] - half, BAR_MM, THICK_MM)
-    y_bar = box(left + Y_BAR[1][0] - half, top + Y_BAR[1][1], THICK_MM, BAR_MM)
+    x_bar = rectangle_points(left + X_BAR[0][0], top + X_BAR[0][1] - half, BAR_MM, THICK_MM)
+    y_bar = rectangle_points(left + Y_BAR[1][0] - half, top + Y_BAR[1][1], THICK_MM, BAR_MM)
     text_x = left + X_BAR[0][0]
     width, tall = layout.size_mm
     lines = (
@@ -183,24 +202,30 @@ def _key(layout: Layout, height: float) -> list[Shapes | Text]:
         f"{layout.digest[32:]}",
         "print at 100 %, not fitted to the page",
     )
-    items: list[Shapes | Text] = [Shapes(modules, INK, "code"), Shapes([x_bar, y_bar], INK, "scale")]
-    items += [Text(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
-    items.append(Text(f"{BAR_MM:g} mm", text_x, top + X_BAR[0][1] + 4, 2.6))
-    items.append(Text(f"{BAR_MM:g} mm", left + Y_BAR[0][0] - 2, top + Y_BAR[0][1], 2.6, turned=True))
+    items: list[FilledPolygons | TextLine] = [
+        FilledPolygons(modules, INK, "code"),
+        FilledPolygons([x_bar, y_bar], INK, "scale"),
+    ]
+    items += [TextLine(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
+    items.append(TextLine(f"{BAR_MM:g} mm", text_x, top + X_BAR[0][1] + 4, 2.6))
+    items.append(TextLine(f"{BAR_MM:g} mm", left + Y_BAR[0][0] - 2, top + Y_BAR[0][1], 2.6, turned=True))
     return items
 
 
-def _patches(layout: Layout, width: float, height: float) -> list[Shapes | Text]:
+def _color_patch_items(layout: Layout, width: float, height: float) -> list[FilledPolygons | TextLine]:
     """One patch a color, with its name and value, in the lower right corner."""
     names = [name for number, name in enumerate(COLORS) if (layout.cell_color == number).any()]
-    items: list[Shapes | Text] = []
+    items: list[FilledPolygons | TextLine] = []
     for number, name in enumerate(names):
         x = width - MARGIN_MM - (len(names) - number) * (PATCH_MM + 8)
         y = height - MARGIN_MM - PATCH_MM - 6
-        frame = box(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
-        items += [Shapes([frame], INK), Shapes([box(x, y, PATCH_MM, PATCH_MM)], layout.palette[name])]
+        frame = rectangle_points(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
         items += [
-            Text(name, x, y + PATCH_MM + 3, 2.2),
-            Text(layout.palette[name], x, y + PATCH_MM + 5.6, 2.2),
+            FilledPolygons([frame], INK),
+            FilledPolygons([rectangle_points(x, y, PATCH_MM, PATCH_MM)], layout.palette[name]),
+        ]
+        items += [
+            TextLine(name, x, y + PATCH_MM + 3, 2.2),
+            TextLine(layout.palette[name], x, y + PATCH_MM + 5.6, 2.2),
         ]
     return items

@@ -22,7 +22,7 @@ SEARCH_PX = (2400, 1800, 1200)
 # width.
 REACH_MM, ACROSS_MM, INSIDE_MM = 2.5, 0.6 * THICK_MM, 3.0
 LEAST_CONTRAST = 40.0
-PASSES = 3
+REFINE_PASSES = 3
 MM_PER_INCH = 25.4
 NO_CODE = "no print sheet's code was found; scan the whole sheet, lying straight, at 150 dpi or more"
 
@@ -74,15 +74,15 @@ class SheetReading:
         }
 
 
-def find_bars(image: Image) -> SheetBars | str:
+def find_sheet_bars(image: Image) -> SheetBars | str:
     """Find a sheet's code and bars, or say in a few words why that fails.
 
     Args:
         image: (H, W, 3) BGR, 8 or 16 bits.
     """
-    grey = _grey(image)
+    grey = _gray_image(image)
     reason = NO_CODE
-    for key, corners in _codes(grey):
+    for key, corners in _find_codes(grey):
         x_bar, y_bar = (_measure_bar(grey, corners, *bar) for bar in (X_BAR, Y_BAR))
         if x_bar is not None and y_bar is not None:
             return SheetBars(key, x_bar, y_bar)
@@ -90,7 +90,7 @@ def find_bars(image: Image) -> SheetBars | str:
     return reason
 
 
-def measured(bars: SheetBars, dpi: tuple[float, float] | None = None) -> SheetReading:
+def measure_sheet(bars: SheetBars, dpi: tuple[float, float] | None = None) -> SheetReading:
     """The print's scales, as far as they are known, and its skew.
 
     Args:
@@ -126,14 +126,14 @@ def _perspective_mm(bars: SheetBars) -> float:
     return float(np.hypot(*off_mm.T).max())
 
 
-def _grey(image: Image) -> NDArray[np.uint8]:
+def _gray_image(image: Image) -> NDArray[np.uint8]:
     import cv2
 
     eight = image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
     return np.asarray(cv2.cvtColor(eight, cv2.COLOR_BGR2GRAY))
 
 
-def _codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
+def _find_codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
     """Keys and their codes' (4, 2) corners: upper left, upper right, lower right, lower left.
 
     The detector misses codes that are small in a large picture, or of a size that it dislikes: several sizes
@@ -142,7 +142,7 @@ def _codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
     import cv2
 
     detectors = (cv2.QRCodeDetectorAruco(), cv2.QRCodeDetector())
-    for left, top, part in _regions(grey):
+    for left, top, part in _search_regions(grey):
         # Pictures smaller than a size are taken as they are, once.
         factors = dict.fromkeys(min(1.0, side / max(part.shape)) for side in SEARCH_PX)
         for factor, detector in product(factors, detectors):
@@ -156,7 +156,7 @@ def _codes(grey: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
     return None
 
 
-def _regions(grey: NDArray[np.uint8]) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+def _search_regions(grey: NDArray[np.uint8]) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """The picture, then its overlapping quarters, with their upper left corners."""
     yield 0, 0, grey
     height, width = grey.shape
@@ -172,27 +172,27 @@ def _measure_bar(
     """(2, 2) both ends of a bar in the picture, to a fraction of a pixel."""
     ends = np.array([first, last])
     found = ends
-    basis = _plane(corners)
+    basis = _fit_code_affine(corners)
     # Ends that were found replace the code's poorer prediction of direction and scale.
-    for _ in range(PASSES):
+    for _ in range(REFINE_PASSES):
         places = ends @ basis[:, :2].T + basis[:, 2]
         along = (places[1] - places[0]) / BAR_MM
-        start, end = _end(grey, places[0], -along), _end(grey, places[1], along)
+        start, end = _find_bar_end(grey, places[0], -along), _find_bar_end(grey, places[1], along)
         if start is None or end is None:
             return None
         found = np.array([start, end])
-        basis = _through(basis, ends, found)
+        basis = _correct_affine(basis, ends, found)
     return found
 
 
-def _plane(corners: Points) -> Points:
+def _fit_code_affine(corners: Points) -> Points:
     """(2, 3) affine map from mm beside the code to pixels."""
     code = np.array([(0, 0), (CODE_MM, 0), (CODE_MM, CODE_MM), (0, CODE_MM)])
     solution, *_ = np.linalg.lstsq(np.column_stack([code, np.ones(4)]), corners, rcond=None)
     return np.asarray(solution.T)
 
 
-def _through(basis: Points, ends: Points, found: Points) -> Points:
+def _correct_affine(basis: Points, ends: Points, found: Points) -> Points:
     """The map corrected by a similarity so that it takes the ends to where they were found."""
     a, b = (complex(*p) for p in ends @ basis[:, :2].T + basis[:, 2])
     c, d = (complex(*p) for p in found)
@@ -202,20 +202,20 @@ def _through(basis: Points, ends: Points, found: Points) -> Points:
     return np.column_stack([matrix @ basis[:, :2], matrix @ basis[:, 2] + (shift.real, shift.imag)])
 
 
-def _end(grey: NDArray[np.uint8], place: Points, outward: Points) -> Points | None:
+def _find_bar_end(grey: NDArray[np.uint8], place: Points, outward: Points) -> Points | None:
     """The middle of a bar's end; ``outward`` is a millimetre along the bar, in pixels."""
     side = np.array([-outward[1], outward[0]])
     # Across, a little inside the end: ink between two edges.
     inside = place - INSIDE_MM * outward
-    edges = [_edge(grey, inside, direction, outward, THICK_MM / 2) for direction in (side, -side)]
+    edges = [_locate_edge_mm(grey, inside, direction, outward, THICK_MM / 2) for direction in (side, -side)]
     if edges[0] is None or edges[1] is None:
         return None
     middle = place + (edges[0] - edges[1]) / 2 * side
-    along = _edge(grey, middle, outward, side, 0.0)
+    along = _locate_edge_mm(grey, middle, outward, side, 0.0)
     return None if along is None else middle + along * outward
 
 
-def _edge(
+def _locate_edge_mm(
     grey: NDArray[np.uint8], place: Points, towards: Points, beside: Points, expected_mm: float
 ) -> float | None:
     """How far from ``place`` (mm) the mean brightness along ``beside`` is half way from ink to paper."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.sheet.key import BAR_MM
-from cmpdesign.products.sheet.scan import NO_CODE, SheetBars, SheetReading, find_bars, measured
+from cmpdesign.products.sheet.scan import NO_CODE, SheetBars, SheetReading, find_sheet_bars, measure_sheet
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -18,7 +18,7 @@ SCALE_TOLERANCE, SKEW_TOLERANCE_DEG = 0.005, 0.2
 # A camera that leans by four degrees 400 mm away moves a bar's end by this.
 PERSPECTIVE_TOLERANCE_MM = 0.1
 # No printer fits a page by more than from A3 to A5: beyond, a file's resolution is not its picture's.
-BELIEVABLE = 0.45, 2.2
+PLAUSIBLE_SCALES = 0.45, 2.2
 
 
 @dataclass(frozen=True)
@@ -69,33 +69,35 @@ def judge_sheet(image: Image, path: Path, digest: str, dpi: float | None = None)
         digest: the layout's.
         dpi: the resolution, if it is known better; 0 when it is not known at all.
     """
-    bars = find_bars(image)
+    bars = find_sheet_bars(image)
     if isinstance(bars, str):
         return SheetVerdict(False, bars, None, None)
-    reading, note = _measured(bars, path, dpi)
-    reason = _reason(reading, digest)
+    reading, note = _measure_with_resolution(bars, path, dpi)
+    reason = _failure_reason(reading, digest)
     return SheetVerdict(reason is None, reason, note, reading)
 
 
-def _measured(bars: SheetBars, path: Path, dpi: float | None) -> tuple[SheetReading, str | None]:
+def _measure_with_resolution(
+    bars: SheetBars, path: Path, dpi: float | None
+) -> tuple[SheetReading, str | None]:
     """The reading, and why the scales themselves are not known, if they are not."""
     if dpi:
-        return measured(bars, (dpi, dpi)), None
+        return measure_sheet(bars, (dpi, dpi)), None
     stated = "no resolution is given" if dpi == 0 else resolution_dpi(path)
     if not isinstance(stated, str):
-        reading = measured(bars, stated)
+        reading = measure_sheet(bars, stated)
         assert reading.scale_x is not None and reading.scale_y is not None
-        low, high = BELIEVABLE
+        low, high = PLAUSIBLE_SCALES
         if low < reading.scale_x < high and low < reading.scale_y < high:
             return reading, None
         stated = (
             f"the file states {stated[0]:.4g} dpi, by which the bars are "
             f"{BAR_MM * reading.scale_x:.3g} x {BAR_MM * reading.scale_y:.3g} mm"
         )
-    return measured(bars), f"scales not known, only their ratio: {stated}"
+    return measure_sheet(bars), f"scales not known, only their ratio: {stated}"
 
 
-def _reason(reading: SheetReading, digest: str) -> str | None:
+def _failure_reason(reading: SheetReading, digest: str) -> str | None:
     """Why the sheet is not the layout, true to size; None when nothing speaks against it."""
     if reading.key.digest != digest:
         return f"the sheet is of another layout ({reading.key.name}, digest {reading.key.digest[:12]})"

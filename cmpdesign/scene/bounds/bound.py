@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.pinhole import Area
-from cmpdesign.scene.drawing.render import missing_cells, render_truth
-from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.drawing.render import missing_cell_mask, render_truth
+from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.parts.light import gain
+from cmpdesign.scene.parts.light import light_gain
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
 
@@ -42,7 +42,7 @@ def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[n
     Raises:
         SceneError: the scene has no noise, so nothing bounds it; or it has several views, each with its own bound.
     """
-    look(scene, size)  # refuses several views
+    single_view(scene, size)  # refuses several views
     truth = render_truth(scene, size=size)
     return _inverse_blocks(edge_information(scene, truth, size), truth)
 
@@ -53,7 +53,7 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
     Raises:
         SceneError: the scene has no noise, or several views.
     """
-    area = look(scene, size).area
+    area = single_view(scene, size).area
     noise = scene.sensor.noise if scene.sensor else 0.0
     if noise <= 0:
         raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
@@ -61,7 +61,7 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
     spread = np.sqrt(scene.blur_px**2 + 1 / 12)
     contrast_squared = _contrast_squared(scene, ends.mean(axis=1), size)
     per_px = contrast_squared / (2 * np.sqrt(np.pi) * spread * noise**2)
-    return _information(scene.layout.edges, ends, per_px, area, len(truth.marker_xy_px))
+    return _sum_information(scene.layout.edges, ends, per_px, area, len(truth.marker_xy_px))
 
 
 def _contrast_squared(
@@ -69,7 +69,7 @@ def _contrast_squared(
 ) -> NDArray[np.float64]:
     """(E,): squared difference of the colors on both sides of each edge, under the light at its middle."""
     layout = scene.layout
-    color = np.where(missing_cells(scene), BLACK, layout.cell_color)
+    color = np.where(missing_cell_mask(scene), BLACK, layout.cell_color)
     over_black = np.array([np.subtract(scene.ink(c)[::-1], scene.ink(BLACK)[::-1]) for c in color])
     corners = layout.cell_corners.astype(np.int64)
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -82,11 +82,11 @@ def _contrast_squared(
     np.add.at(difference, edge, sign * np.repeat(over_black, corners.shape[1], axis=0))
     if scene.light:
         x, y = np.clip(np.rint(middle_px), 0, np.asarray(size) - 1).astype(np.int64).T
-        difference = difference * gain(scene.light, size)[:, y, x].T
+        difference = difference * light_gain(scene.light, size)[:, y, x].T
     return np.asarray(np.sum(difference**2, axis=1))
 
 
-def _information(
+def _sum_information(
     edges: NDArray[np.int32],
     ends: NDArray[np.float64],
     per_px: NDArray[np.float64],
@@ -99,7 +99,7 @@ def _information(
     step = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(step, axis=1)
     normal = np.stack([-step[:, 1], step[:, 0]], axis=-1) / length[:, None]
-    low, high = _inside(ends, area)
+    low, high = _clip_to_area(ends, area)
     weight = per_px * length
     # Integrals of (1 - t)^2, t (1 - t) and t^2 over the part inside.
     both = {
@@ -123,7 +123,7 @@ def _information(
     return matrix.tocsc()
 
 
-def _inside(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _clip_to_area(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The range of t, (E,) each, over which each edge lies inside the area; empty ranges are (0, 0)."""
     start, step = ends[:, 0], ends[:, 1] - ends[:, 0]
     step = np.where(np.abs(step) < 1e-12, 1e-12, step)

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from cmpdesign.scene.bounds.bound import _inverse_blocks
 from cmpdesign.scene.drawing.render import render, render_truth
-from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
 
 STEP_PX = 0.1
-APART = 3  # rings between markers that move together
+MIN_SEPARATION_RINGS = 3  # rings between markers that move together
 REACH_SIGMA = 5.0
 
 
@@ -41,13 +41,13 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     clean = replace(scene, sensor=Sensor(bits=16))
     truth = render_truth(scene, size=size)
     markers = len(truth.visible)
-    groups = _far_apart(scene.layout.edges, markers)
-    owners = _owners(scene, truth.marker_xy_px, size)
+    groups = _separated_groups(scene.layout.edges, markers)
+    owners = _influence_boxes(scene, truth.marker_xy_px, size)
     rows, columns, values = [], [], []
     for group in range(groups.max() + 1):
         moved = np.flatnonzero(groups == group)
         for axis in (0, 1):
-            change = _derivative(clean, moved, axis, size)
+            change = _image_derivative(clean, moved, axis, size)
             for marker in moved:
                 low, high = owners[marker]
                 if (high <= low).any():
@@ -64,15 +64,16 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     return _inverse_blocks((jacobian.T @ jacobian).tocsc(), truth)
 
 
-def _far_apart(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
-    """(M,) group numbers: markers of one group are more than ``APART`` - 1 rings from each other (greedily)."""
+def _separated_groups(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
+    """(M,) group numbers: markers of one group are more than ``MIN_SEPARATION_RINGS`` - 1 rings from each other
+    (greedily)."""
     from scipy.sparse import coo_array, eye_array
 
     one = np.ones(2 * len(edges))
     both = np.concatenate([edges, edges[:, ::-1]])
     step = (coo_array((one, both.T), shape=(markers, markers)) + eye_array(markers)).tocsr()
     reached = step
-    for _ in range(APART - 1):
+    for _ in range(MIN_SEPARATION_RINGS - 1):
         reached = reached @ step
     group = np.full(markers, -1)
     for marker in range(markers):
@@ -81,7 +82,7 @@ def _far_apart(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
     return group
 
 
-def _owners(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
+def _influence_boxes(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
     """(M, 2, 2): the box of pixels (from, to) that a marker's cells and their blur can reach."""
     edges = scene.layout.edges
     low, high = xy_px.copy(), xy_px.copy()
@@ -93,12 +94,12 @@ def _owners(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> 
     return np.asarray(np.clip(box, 0, np.asarray(size)), dtype=np.int64)
 
 
-def _derivative(
+def _image_derivative(
     scene: Scene, moved: NDArray[np.int64], axis: int, size: tuple[int, int]
 ) -> NDArray[np.float64]:
     """(H, W, 3): change of the image with the shift (1 px) of these markers along an image axis."""
     xy_mm = scene.layout.marker_xy_mm
-    step_mm = STEP_PX * _layout_from_image(scene, moved, size)[:, :, axis]
+    step_mm = STEP_PX * _inverse_jacobians(scene, moved, size)[:, :, axis]
     images = []
     for sign in (1, -1):
         shifted = xy_mm.copy()
@@ -108,11 +109,11 @@ def _derivative(
     return (images[0] - images[1]) / (2 * STEP_PX)
 
 
-def _layout_from_image(
+def _inverse_jacobians(
     scene: Scene, markers: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
     """(n, 2, 2) mm per px: the inverse derivative of the map from layout to image at these markers."""
-    view, xy = look(scene, size), scene.layout.marker_xy_mm[markers]
+    view, xy = single_view(scene, size), scene.layout.marker_xy_mm[markers]
     step = 1e-4 * np.ptp(scene.layout.marker_xy_mm)
     columns = [
         (view.image_from_layout(xy + step * unit) - view.image_from_layout(xy - step * unit)) / (2 * step)

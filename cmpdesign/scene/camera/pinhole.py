@@ -23,7 +23,7 @@ NEAREST_MM = 1e-3
 ORTHOGONAL = 1e-6
 
 
-def _half_turn() -> Points:
+def _front_rotation() -> Points:
     """Straight on from the front: x right, y down, z into the pattern."""
     return np.diag([1.0, -1.0, -1.0])
 
@@ -45,14 +45,14 @@ class Pinhole:
     focal_px: tuple[float, float]
     centre_px: tuple[float, float]
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    R_camera_from_layout: Points = field(default_factory=_half_turn)
+    R_camera_from_layout: Points = field(default_factory=_front_rotation)
     t_camera_from_layout_mm: Points = field(default_factory=lambda: np.array([0.0, 0.0, 50.0]))
     area_px: Area | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
-        r = _frozen(self.R_camera_from_layout, (3, 3), "R_camera_from_layout")
-        t = _frozen(self.t_camera_from_layout_mm, (3,), "t_camera_from_layout_mm")
+        r = _frozen_array(self.R_camera_from_layout, (3, 3), "R_camera_from_layout")
+        t = _frozen_array(self.t_camera_from_layout_mm, (3,), "t_camera_from_layout_mm")
         object.__setattr__(self, "R_camera_from_layout", r)
         object.__setattr__(self, "t_camera_from_layout_mm", t)
         if not min(self.focal_px) > 0:
@@ -192,7 +192,7 @@ def _looking_rotation(tilt_deg: float, azimuth_deg: float, roll_deg: float, back
     return np.asarray(np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ upright)
 
 
-def _frozen(value: object, shape: tuple[int, ...], name: str) -> Points:
+def _frozen_array(value: object, shape: tuple[int, ...], name: str) -> Points:
     array = np.array(value, dtype=np.float64)
     if array.shape != shape or not np.isfinite(array).all():
         raise SceneError(f"{name} has the shape {array.shape}; it must hold finite numbers of shape {shape}")
@@ -210,16 +210,16 @@ def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
     depth = at[:, 2]
     if not np.all(depth > NEAREST_MM):
         if not np.isfinite(depth).all():
-            raise SceneError(f"{_who(camera)}the surface is not finite everywhere; mend the map")
+            raise SceneError(f"{_camera_label(camera)}the surface is not finite everywhere; mend the map")
         worst = int(np.argmin(depth))
         place = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
         raise SceneError(
-            f"{_who(camera)}a part of the pattern lies behind the camera: ({place}) mm has a depth of "
+            f"{_camera_label(camera)}a part of the pattern lies behind the camera: ({place}) mm has a depth of "
             f"{depth[worst]:.3g} mm, it must be above 0 mm; move the camera away or tilt it less"
         )
     xy = at[:, :2] / depth[:, None]
     if any(camera.distortion):
-        xy = distorted(camera, xy)
+        xy = distort_points(camera, xy)
     return np.asarray(xy * np.asarray(camera.focal_px) + np.asarray(camera.centre_px))
 
 
@@ -228,7 +228,7 @@ def depth_mm(camera: Pinhole, xyz_mm: Points) -> Points:
     return np.asarray(xyz_mm @ camera.R_camera_from_layout[2] + camera.t_camera_from_layout_mm[2])
 
 
-def distorted(camera: Pinhole, xy: Points) -> Points:
+def distort_points(camera: Pinhole, xy: Points) -> Points:
     """Normalised coordinates (N, 2) after the lens (OpenCV's model with k1, k2, p1, p2, k3).
 
     Raises:
@@ -239,7 +239,8 @@ def distorted(camera: Pinhole, xy: Points) -> Points:
     r2 = x * x + y * y
     if r2.max(initial=0.0) >= camera.reach**2:
         raise SceneError(
-            f"{_who(camera)}the pattern reaches {np.sqrt(r2.max()):.3g} focal lengths from the optical axis, but the "
+            f"{_camera_label(camera)}the pattern reaches {np.sqrt(r2.max()):.3g} focal lengths from the "
+            f"optical axis, but the "
             f"distortion turns back on itself at {camera.reach:.3g}; take a weaker distortion or move the camera away"
         )
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -248,5 +249,5 @@ def distorted(camera: Pinhole, xy: Points) -> Points:
     return np.stack([u, v], axis=-1)
 
 
-def _who(camera: Pinhole) -> str:
+def _camera_label(camera: Pinhole) -> str:
     return f"view {camera.name}: " if camera.name else ""

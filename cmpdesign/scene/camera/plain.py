@@ -60,49 +60,51 @@ def pitch_mm(layout: Layout) -> float:
     return float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
 
 
-def homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> NDArray[np.float64]:
+def camera_homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> NDArray[np.float64]:
     """H_image_from_layout, (3, 3) float64, H[2, 2] = 1; ``size`` is the image's (width, height)."""
-    focal, (centre_x, centre_y) = _focal(camera, size), _centre(camera, size)
-    scale, middle = camera.pitch_px / pitch_mm(layout), _middle(layout)
-    planar = scale * _turned(camera, layout)
+    focal, (centre_x, centre_y) = _focal_px(camera, size), _centre_px(camera, size)
+    scale, middle = camera.pitch_px / pitch_mm(layout), _layout_middle_mm(layout)
+    planar = scale * _image_axes(camera, layout)
     from_middle = np.column_stack([np.eye(2), -middle])
-    tilted = _tilt(camera)[:, :2] @ planar
+    tilted = _tilt_rotation(camera)[:, :2] @ planar
     pose = tilted @ from_middle + np.outer([0.0, 0.0, focal], [0.0, 0.0, 1.0])
     intrinsics = np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
     h = intrinsics @ pose
     return np.asarray(h / h[2, 2], dtype=np.float64)
 
 
-def pinhole(camera: Camera, layout: Layout, size: tuple[int, int]) -> Pinhole:
-    """The same camera in space: its homography of the layout's plane is ``homography``."""
-    focal = _focal(camera, size)
-    planar = _turned(camera, layout)
+def to_pinhole(camera: Camera, layout: Layout, size: tuple[int, int]) -> Pinhole:
+    """The same camera in space: its homography of the layout's plane is ``camera_homography``."""
+    focal = _focal_px(camera, size)
+    planar = _image_axes(camera, layout)
     # Seen from the front the layout's z points at the camera, seen from the back away from it.
-    r = _tilt(camera) @ np.block([[planar, np.zeros((2, 1))], [np.zeros((1, 2)), np.linalg.det(planar)]])
+    r = _tilt_rotation(camera) @ np.block(
+        [[planar, np.zeros((2, 1))], [np.zeros((1, 2)), np.linalg.det(planar)]]
+    )
     away = np.array([0.0, 0.0, focal * pitch_mm(layout) / camera.pitch_px])
     return Pinhole(
         (focal, focal),
-        _centre(camera, size),
+        _centre_px(camera, size),
         R_camera_from_layout=r,
-        t_camera_from_layout_mm=away - r[:, :2] @ _middle(layout),
+        t_camera_from_layout_mm=away - r[:, :2] @ _layout_middle_mm(layout),
     )
 
 
-def _focal(camera: Camera, size: tuple[int, int]) -> float:
+def _focal_px(camera: Camera, size: tuple[int, int]) -> float:
     return camera.focal_px if camera.focal_px is not None else 1.5 * max(size)
 
 
-def _centre(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
+def _centre_px(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
     return camera.centre_px or ((size[0] - 1) / 2, (size[1] - 1) / 2)
 
 
-def _middle(layout: Layout) -> NDArray[np.float64]:
+def _layout_middle_mm(layout: Layout) -> NDArray[np.float64]:
     """(2,) mm: the middle of the outline's bounding box."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     return np.asarray(np.round(0.5 * (low + high), 9))
 
 
-def _turned(camera: Camera, layout: Layout) -> NDArray[np.float64]:
+def _image_axes(camera: Camera, layout: Layout) -> NDArray[np.float64]:
     """(2, 2): the layout's axes in the image's, before the tilt."""
     turn = np.radians(camera.rotation_deg)
     side = -1.0 if is_mirrored(camera, layout) else 1.0
@@ -111,19 +113,19 @@ def _turned(camera: Camera, layout: Layout) -> NDArray[np.float64]:
     return np.asarray(np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0]))
 
 
-def _tilt(camera: Camera) -> NDArray[np.float64]:
+def _tilt_rotation(camera: Camera) -> NDArray[np.float64]:
     axis = np.radians(camera.tilt_axis_deg)
-    return _rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))
+    return _axis_rotation(np.array([np.cos(axis), -np.sin(axis), 0.0]), np.radians(camera.tilt_deg))
 
 
-def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+def _axis_rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """Rotation matrix about a unit axis (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))
 
 
-def project(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
+def project_by_homography(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (..., 2) through a homography.
 
     Raises:

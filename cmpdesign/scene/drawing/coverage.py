@@ -21,19 +21,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.drawing.coverage_task import Task
-from cmpdesign.scene.drawing.paths import Segments
+from cmpdesign.scene.drawing.coverage_task import CoverageTask
+from cmpdesign.scene.drawing.paths import PolygonSegments
 from cmpdesign.scene.parts.optics import PointSpread
 
 Engine = Literal["compiled", "numpy"]
 BAND_ROWS = 64
 
 # The image is drawn in bands of rows, so that a large one needs no large memory.
-Band = Callable[["Task", int, int], NDArray[np.float32]]
+BandFunction = Callable[["CoverageTask", int, int], NDArray[np.float32]]
 
 
-def coverage(
-    paths: Segments,
+def draw_coverage(
+    paths: PolygonSegments,
     values: NDArray[np.float64],
     size: tuple[int, int],
     spread: PointSpread,
@@ -55,8 +55,8 @@ def coverage(
         (planes, height, width) float32.
     """
     width, height = size
-    task = _task(paths, _signed(paths, values, orientation), size, spread)
-    draw = _engine(engine)
+    task = _make_task(paths, _signed_values(paths, values, orientation), size, spread)
+    draw = _load_engine(engine)
     image = np.empty((values.shape[1], height, width), dtype=np.float32)
     for first in range(0, height, BAND_ROWS):
         count = min(BAND_ROWS, height - first)
@@ -64,7 +64,7 @@ def coverage(
     return image
 
 
-def _engine(engine: Engine) -> Band:
+def _load_engine(engine: Engine) -> BandFunction:
     if engine == "numpy":
         return draw_band
     from cmpdesign.scene.drawing.coverage_compiled import draw_band as compiled_band
@@ -72,18 +72,22 @@ def _engine(engine: Engine) -> Band:
     return compiled_band
 
 
-def _task(paths: Segments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread) -> Task:
+def _make_task(
+    paths: PolygonSegments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread
+) -> CoverageTask:
     fine = spread.oversampling
     columns, rows = (fine * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
     # Knots of the even degree lie between the samples.
     shift = spread.reach + (0.5 if spread.degree == 0 else 0.0)
-    cut, owner = _cut(fine * paths.xy_px + shift, paths.owner, columns, rows)
+    cut, owner = _clip_segments(fine * paths.xy_px + shift, paths.owner, columns, rows)
     nodes, weights = np.polynomial.legendre.leggauss(spread.degree + 1)
     quadrature = np.stack([(nodes + 1) / 2, weights / 2])
-    return Task(cut, owner, values, columns, rows, spread, size[0], quadrature)
+    return CoverageTask(cut, owner, values, columns, rows, spread, size[0], quadrature)
 
 
-def _signed(paths: Segments, values: NDArray[np.float64], orientation: float | None) -> NDArray[np.float64]:
+def _signed_values(
+    paths: PolygonSegments, values: NDArray[np.float64], orientation: float | None
+) -> NDArray[np.float64]:
     """What the contour integral is to be weighted with."""
     if orientation is not None:
         return -orientation * values
@@ -92,7 +96,7 @@ def _signed(paths: Segments, values: NDArray[np.float64], orientation: float | N
     return values * -np.sign(area)[:, None]
 
 
-def _cut(
+def _clip_segments(
     uv: NDArray[np.float64], owner: NDArray[np.int64], columns: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Drop what lies above, below or right of the samples; push what lies left of them onto their margin.
@@ -128,16 +132,16 @@ def _cut(
     return np.ascontiguousarray(pieces[kept]), owners[kept]
 
 
-def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
+def draw_band(task: CoverageTask, first: int, count: int) -> NDArray[np.float32]:
     """Pixel rows ``first`` to ``first + count`` as (planes, count, width) float32, in plain numpy."""
     fine, reach, degree = task.spread.oversampling, task.spread.reach, task.spread.degree
     rows = fine * (count - 1) + 2 * reach + 1
-    differences = _accumulate(task, fine * first, rows, degree)
-    vertical = np.stack([_filtered(plane.T, task.spread, count).T for plane in differences])
-    return _filtered(np.cumsum(vertical, axis=2), task.spread, task.width).astype(np.float32)
+    differences = _edge_differences(task, fine * first, rows, degree)
+    vertical = np.stack([_apply_point_spread(plane.T, task.spread, count).T for plane in differences])
+    return _apply_point_spread(np.cumsum(vertical, axis=2), task.spread, task.width).astype(np.float32)
 
 
-def _filtered(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
+def _apply_point_spread(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
     """The point spread's weights along the last axis, one result a pixel."""
     windows = np.lib.stride_tricks.sliding_window_view(samples, len(spread.weights), axis=-1)
     return np.asarray(
@@ -145,16 +149,16 @@ def _filtered(samples: NDArray[np.float64], spread: PointSpread, count: int) -> 
     )
 
 
-def _accumulate(task: Task, top: int, rows: int, degree: int) -> NDArray[np.float64]:
+def _edge_differences(task: CoverageTask, top: int, rows: int, degree: int) -> NDArray[np.float64]:
     """Differences along the rows (planes, rows, columns) of the band that starts at sample row ``top``."""
-    pieces, source = _split(task.segments)
+    pieces, source = _split_at_knots(task.segments)
     drop = pieces[:, 3] - pieces[:, 1]
     nodes, weights = task.quadrature
     cell = np.floor(0.5 * (pieces[:, :2] + pieces[:, 2:])).astype(np.int64)
     total = np.zeros((task.values.shape[1], rows * task.columns))
     for node, weight in zip(nodes, weights, strict=True):
         u, v = (pieces[:, :2] + node * (pieces[:, 2:] - pieces[:, :2]) - cell).T
-        across, along = _basis(u, degree + 1), _basis(v, degree)
+        across, along = _bspline_basis(u, degree + 1), _bspline_basis(v, degree)
         for j in range(degree + 1):
             row = cell[:, 1] - degree // 2 + j - top
             for i in range(degree + 2):
@@ -168,7 +172,7 @@ def _accumulate(task: Task, top: int, rows: int, degree: int) -> NDArray[np.floa
     return total.reshape(-1, rows, task.columns)
 
 
-def _split(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _split_at_knots(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Pieces (n, 4) of the segments that lie inside one sample cell each, and their segments' numbers."""
     source = [np.arange(len(segments)), np.arange(len(segments))]
     t = [np.zeros(len(segments)), np.ones(len(segments))]
@@ -188,7 +192,7 @@ def _split(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
     return np.concatenate([xy[:-1], xy[1:]], axis=1)[together], all_source[1:][together]
 
 
-def _basis(t: NDArray[np.float64], degree: int) -> list[NDArray[np.float64]]:
+def _bspline_basis(t: NDArray[np.float64], degree: int) -> list[NDArray[np.float64]]:
     """The degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
     values = [np.ones_like(t)]
     for d in range(1, degree + 1):

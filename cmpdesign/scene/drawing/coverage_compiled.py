@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from cmpdesign.scene.drawing.coverage_task import Task
+    from cmpdesign.scene.drawing.coverage_task import CoverageTask
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -20,19 +20,19 @@ def _compiled(function: Function) -> Function:
     return cast(Function, numba.njit(**options)(function))
 
 
-def draw_band(task: Task, first: int, count: int) -> NDArray[np.float32]:
+def draw_band(task: CoverageTask, first: int, count: int) -> NDArray[np.float32]:
     """Pixel rows ``first`` to ``first + count`` as (planes, count, width) float32."""
     fine, reach = task.spread.oversampling, task.spread.reach
     rows = fine * (count - 1) + 2 * reach + 1
     differences = np.zeros((task.values.shape[1], rows, task.columns), dtype=np.float32)
-    _accumulate(
+    _accumulate_differences(
         differences, task.segments, task.owner, task.values, fine * first, task.spread.degree, task.quadrature
     )
-    return _blurred(differences, task.spread.weights, fine, count, task.width)
+    return _apply_point_spread(differences, task.spread.weights, fine, count, task.width)
 
 
 @_compiled
-def _cubic(t: float) -> tuple[float, float, float, float]:
+def _cubic_bsplines(t: float) -> tuple[float, float, float, float]:
     """The four cubic B-splines that reach a knot interval, at the fraction t, leftmost first."""
     s = 1.0 - t
     tt, ss = t * t, s * s
@@ -40,9 +40,9 @@ def _cubic(t: float) -> tuple[float, float, float, float]:
 
 
 @_compiled
-def _quartic(t: float) -> tuple[float, float, float, float, float]:
+def _quartic_bsplines(t: float) -> tuple[float, float, float, float, float]:
     """The five quartic B-splines that reach a knot interval, by one more step of the recursion."""
-    a, b, c, d = _cubic(t)
+    a, b, c, d = _cubic_bsplines(t)
     s = 1.0 - t
     return (
         s * a / 4,
@@ -54,7 +54,7 @@ def _quartic(t: float) -> tuple[float, float, float, float, float]:
 
 
 @_compiled
-def _accumulate(
+def _accumulate_differences(
     differences: NDArray[np.float32],
     segments: NDArray[np.float64],
     owner: NDArray[np.int64],
@@ -99,7 +99,7 @@ def _accumulate(
                         patch[0, 0] += share * (1.0 - u)
                         patch[0, 1] += share * u
                         continue
-                    across, along = _quartic(u), _cubic(v)
+                    across, along = _quartic_bsplines(u), _cubic_bsplines(v)
                     for j in range(4):
                         for i in range(5):
                             patch[j, i] += share * along[j] * across[i]
@@ -127,7 +127,7 @@ def _add_patch(
 
 
 @_compiled
-def _blurred(
+def _apply_point_spread(
     differences: NDArray[np.float32], weights: NDArray[np.float32], fine: int, count: int, width: int
 ) -> NDArray[np.float32]:
     """Point spread down the columns, cumulative sum along the rows, point spread along the rows."""

@@ -11,7 +11,7 @@ from cmpdesign.scene.parts.optics import PointSpread
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class CoverageTask:
     """What an engine needs.
 
     Attributes:

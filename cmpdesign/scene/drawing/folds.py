@@ -2,7 +2,8 @@
 
 ``coverage`` adds every cell with the sign of its facing. Where the surface turns away and back again, three sheets lie
 over a pixel, +1, -1 and +1, and their sum is right only if they have the same color. So the places where a part turns
-away are drawn again from small triangles, at ``SAMPLES`` x ``SAMPLES`` points a pixel, in the colors of a flat picture
+away are drawn again from small triangles, at ``SAMPLES_PER_PX`` x ``SAMPLES_PER_PX`` points a pixel, in the colors
+of a flat picture
 of the layout: the nearest sheet's color less the signed sum of all sheets is what is missing there. Everywhere else it
 is 0, and the image stays exact.
 """
@@ -17,24 +18,24 @@ from numpy.typing import NDArray
 
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene.camera.plain import pitch_mm
-from cmpdesign.scene.drawing.patches import patches, subdivision
+from cmpdesign.scene.drawing.patches import ground_patches, subdivide_triangle
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.optics import REACH_SIGMA, box_gaussian
 
 Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
 
-COARSE, FINE = 4, 16  # parts of a patch's side: to look for folds, and to draw them
-SUSPECT = 0.35  # of the median facing area per layout area: below, it is looked at more closely
-LARGEST_SHARE = 0.1  # of the pattern that may turn away
-TILE_PX, SAMPLES = 32, 8
-TEXELS = 64  # of the flat picture, to a pitch
-LARGEST_TEXTURE = 2048
+COARSE_PARTS, FINE_PARTS = 4, 16  # parts of a patch's side: to look for folds, and to draw them
+SUSPECT_AREA_SHARE = 0.35  # of the median facing area per layout area: below, it is looked at more closely
+MAX_BACKFACING_SHARE = 0.1  # of the pattern that may turn away
+TILE_PX, SAMPLES_PER_PX = 32, 8
+TEXELS_PER_PITCH = 64  # of the flat picture, to a pitch
+MAX_TEXTURE_PX = 2048
 DEPTH_SHARE = 0.02  # of the pitch: sheets nearer to each other count as one
 
 
 @dataclass(frozen=True, eq=False)
-class Folds:
+class Occlusion:
     """The small triangles around the places where a surface turns away, in one view.
 
     Attributes:
@@ -70,9 +71,9 @@ class Folds:
         return int(width), int(height)
 
 
-def find_folds(
+def find_occlusion(
     layout: Layout, seen: Callable[[Points], Points], sign: float, area_size: tuple[int, int]
-) -> Folds | None:
+) -> Occlusion | None:
     """The folds of a view; None where the surface faces the camera everywhere.
 
     Args:
@@ -84,66 +85,67 @@ def find_folds(
     Raises:
         SceneError: more than a tenth of the pattern turns away.
     """
-    ground = patches(layout)
-    coarse = _mapped(ground, seen, COARSE)
-    facing = sign * _areas(coarse) / _areas(_nodes(ground, COARSE))
-    suspects = np.asarray((facing < SUSPECT * np.median(facing)).any(axis=1))
+    ground = ground_patches(layout)
+    coarse = _project_subdivided(ground, seen, COARSE_PARTS)
+    facing = sign * _signed_areas(coarse) / _signed_areas(_subdivided_corners_mm(ground, COARSE_PARTS))
+    suspects = np.asarray((facing < SUSPECT_AREA_SHARE * np.median(facing)).any(axis=1))
     if not suspects.any():
         return None
     close = ground[suspects]
-    fine, fine_mm = _mapped(close, seen, FINE), _nodes(close, FINE)
-    away = sign * _areas(fine) < 0
+    fine, fine_mm = _project_subdivided(close, seen, FINE_PARTS), _subdivided_corners_mm(close, FINE_PARTS)
+    away = sign * _signed_areas(fine) < 0
     if not away.any():
         return None
-    areas_mm = _areas(fine_mm)
-    share = float(areas_mm[away].sum() / _areas(ground).sum())
+    areas_mm = _signed_areas(fine_mm)
+    share = float(areas_mm[away].sum() / _signed_areas(ground).sum())
     place = fine_mm[away].mean(axis=1)[np.argmax(areas_mm[away])]
-    if share > LARGEST_SHARE:
+    if share > MAX_BACKFACING_SHARE:
         raise SceneError(
             f"{100 * share:.0f} % of the pattern turn away from the camera, among others at ({place[0]:.3g}, "
-            f"{place[1]:.3g}) mm; at most {100 * LARGEST_SHARE:.0f} % can be drawn: take a smaller displacement, "
+            f"{place[1]:.3g}) mm; at most {100 * MAX_BACKFACING_SHARE:.0f} % can be drawn: take a "
+            f"smaller displacement, "
             "a larger radius or a camera that looks more steeply"
         )
-    tiles = _tiles(fine[away], area_size)
-    around = ground[_touching(coarse, tiles)]
-    xyd = _mapped(around, seen, FINE)
-    corners_mm = _nodes(around, FINE).reshape(-1, 3, 2)
+    tiles = _touched_tiles(fine[away], area_size)
+    around = ground[_is_near_tiles(coarse, tiles)]
+    xyd = _project_subdivided(around, seen, FINE_PARTS)
+    corners_mm = _subdivided_corners_mm(around, FINE_PARTS).reshape(-1, 3, 2)
     origin_mm = corners_mm.min(axis=(0, 1))
     span_mm = float((corners_mm.max(axis=(0, 1)) - origin_mm).max())
-    return Folds(
+    return Occlusion(
         xyd=xyd.reshape(-1, 3, 3),
         corners_mm=corners_mm,
-        facing=np.sign(sign * _areas(xyd)).ravel(),
+        facing=np.sign(sign * _signed_areas(xyd)).ravel(),
         tiles=tiles,
         share=share,
         place_mm=place,
         tolerance_mm=DEPTH_SHARE * pitch_mm(layout),
         origin_mm=origin_mm,
-        texel_mm=max(pitch_mm(layout) / TEXELS, span_mm / LARGEST_TEXTURE),
+        texel_mm=max(pitch_mm(layout) / TEXELS_PER_PITCH, span_mm / MAX_TEXTURE_PX),
     )
 
 
-def _nodes(ground: Points, parts: int) -> Points:
+def _subdivided_corners_mm(ground: Points, parts: int) -> Points:
     """(P, parts^2, 3, 2) mm: the small triangles' corners."""
-    at, small = subdivision(parts)
+    at, small = subdivide_triangle(parts)
     return np.asarray((at @ ground)[:, small])
 
 
-def _mapped(ground: Points, seen: Callable[[Points], Points], parts: int) -> Points:
+def _project_subdivided(ground: Points, seen: Callable[[Points], Points], parts: int) -> Points:
     """(P, parts^2, 3, 3): x, y in px and depth in mm of the small triangles' corners."""
-    at, small = subdivision(parts)
+    at, small = subdivide_triangle(parts)
     nodes = at @ ground
     mapped = seen(nodes.reshape(-1, 2))
     return np.asarray(mapped.reshape(*nodes.shape[:2], 3)[:, small])
 
 
-def _areas(triangles: Points) -> Points:
+def _signed_areas(triangles: Points) -> Points:
     """(...) signed areas of triangles (..., 3, 2 or more)."""
     a, b = (triangles[..., i, :2] - triangles[..., 0, :2] for i in (1, 2))
     return np.asarray(0.5 * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]))
 
 
-def _tiles(away: Points, area_size: tuple[int, int]) -> NDArray[np.int64]:
+def _touched_tiles(away: Points, area_size: tuple[int, int]) -> NDArray[np.int64]:
     """(K, 2) the tiles inside the area that triangles (n, 3, 3) reach into."""
     last = (np.asarray(area_size) - 1) // TILE_PX
     low = np.floor((away[..., :2].min(axis=1) + 0.5) / TILE_PX).astype(np.int64)
@@ -157,7 +159,7 @@ def _tiles(away: Points, area_size: tuple[int, int]) -> NDArray[np.int64]:
     return np.stack([columns, rows], axis=-1) * TILE_PX
 
 
-def _touching(coarse: Points, tiles: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _is_near_tiles(coarse: Points, tiles: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(P,) which patches, as far as their coarse nodes tell, reach into or near one of the tiles."""
     flat = np.ascontiguousarray(np.moveaxis(coarse[..., :2], -1, 0)).reshape(2, len(coarse), -1)
     low, high = flat.min(axis=2).T, flat.max(axis=2).T
@@ -168,7 +170,7 @@ def _touching(coarse: Points, tiles: NDArray[np.int64]) -> NDArray[np.bool_]:
     return found
 
 
-def add_hidden_parts(planes: Planes, folds: Folds, texture: Planes, blur_px: float) -> None:
+def update_hidden_parts(planes: Planes, folds: Occlusion, texture: Planes, blur_px: float) -> None:
     """Correct an area's planes (n, height, width), made by ``coverage``, in place.
 
     Args:
@@ -177,19 +179,19 @@ def add_hidden_parts(planes: Planes, folds: Folds, texture: Planes, blur_px: flo
         texture: (n, height, width) the same sums for the flat layout, of ``folds.texture_size``.
         blur_px: the optics' blur.
     """
-    from cmpdesign.scene.drawing.folds_compiled import sample_tile
+    from cmpdesign.scene.drawing.folds_compiled import occlusion_residual
 
     uv = folds.texels_from_layout(folds.corners_mm)
     height, width = planes.shape[1:]
     reach = int(np.ceil(REACH_SIGMA * blur_px + 1)) if blur_px else 0
-    offset = (np.arange(TILE_PX * SAMPLES) + 0.5) / SAMPLES - 0.5
+    offset = (np.arange(TILE_PX * SAMPLES_PER_PX) + 0.5) / SAMPLES_PER_PX - 0.5
     x, y = (np.ascontiguousarray(folds.xyd[..., axis].T) for axis in (0, 1))
     low_x, high_x, low_y, high_y = x.min(axis=0), x.max(axis=0), y.min(axis=0), y.max(axis=0)
     for left, top in folds.tiles:
         near = (high_x >= left - 0.5) & (low_x <= left + TILE_PX - 0.5)
         near &= (high_y >= top - 0.5) & (low_y <= top + TILE_PX - 0.5)
-        row, column, missing = sample_tile(
-            folds.xyd[near], uv[near], folds.facing[near], texture, left, top, TILE_PX, SAMPLES
+        row, column, missing = occlusion_residual(
+            folds.xyd[near], uv[near], folds.facing[near], texture, left, top, TILE_PX, SAMPLES_PER_PX
         )
         if not missing.size:
             continue
@@ -197,19 +199,22 @@ def add_hidden_parts(planes: Planes, folds: Folds, texture: Planes, blur_px: flo
         y, x = top + offset[row : row + tall], left + offset[column : column + wide]
         rows = np.arange(max(int(y[0]) - reach, 0), min(int(y[-1]) + 2 + reach, height))
         columns = np.arange(max(int(x[0]) - reach, 0), min(int(x[-1]) + 2 + reach, width))
-        down, across = _response(rows[:, None] - y, blur_px), _response(columns[:, None] - x, blur_px)
+        down, across = (
+            _pixel_response(rows[:, None] - y, blur_px),
+            _pixel_response(columns[:, None] - x, blur_px),
+        )
         window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         planes[:, *window] += (down @ missing @ across.T).astype(np.float32)
 
 
-def _response(distance: Points, blur_px: float) -> Points:
+def _pixel_response(distance: Points, blur_px: float) -> Points:
     """What a pixel sees of a sample at a distance along one axis."""
     if blur_px == 0:
-        return (np.abs(distance) < 0.5) / SAMPLES
-    return box_gaussian(distance, blur_px) / SAMPLES
+        return (np.abs(distance) < 0.5) / SAMPLES_PER_PX
+    return box_gaussian(distance, blur_px) / SAMPLES_PER_PX
 
 
-def hidden(folds: Folds, xyd: Points, facing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def is_hidden(folds: Occlusion, xyd: Points, facing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(N,) which points, x and y in px of the area and depth in mm, lie behind another part or ``facing`` away."""
     from cmpdesign.scene.drawing.folds_compiled import nearest_depth
 

@@ -14,19 +14,19 @@ Points = NDArray[np.float64]
 
 
 @lru_cache(maxsize=4)
-def patches(layout: Layout) -> Points:
+def ground_patches(layout: Layout) -> Points:
     """(P, 3, 2) mm: triangles that fill a layout's outline, counter-clockwise from the front.
 
     First the cells in their order (of square ones the first half of each, then the second), then the border.
     """
     corners = layout.marker_xy_mm[layout.cell_corners]
     fans = [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
-    found = np.concatenate([*fans, _border(layout, corners)])
+    found = np.concatenate([*fans, _border_triangles(layout, corners)])
     found.setflags(write=False)
     return found
 
 
-def _border(layout: Layout, cells_mm: Points) -> Points:
+def _border_triangles(layout: Layout, cells_mm: Points) -> Points:
     """(B, 3, 2) what the outline holds besides the cells, in pieces about as large as these."""
     import shapely
 
@@ -45,7 +45,7 @@ def _border(layout: Layout, cells_mm: Points) -> Points:
 
 
 @lru_cache(maxsize=8)
-def subdivision(parts: int) -> tuple[Points, NDArray[np.int64]]:
+def subdivide_triangle(parts: int) -> tuple[Points, NDArray[np.int64]]:
     """A triangle with each side in ``parts``: barycentric nodes (K, 3), and small triangles (parts^2, 3) of them."""
     i, j = (index.ravel() for index in np.indices((parts + 1, parts + 1)))
     kept = i + j <= parts

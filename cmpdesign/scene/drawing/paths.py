@@ -13,11 +13,11 @@ from cmpdesign.scene.errors import SceneError
 Points = NDArray[np.float64]
 
 CHORD_PX = 0.0004
-MAX_PIECES = 1 << 14
+MAX_SIDE_PIECES = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
-class Segments:
+class PolygonSegments:
     """Segments of closed polygons in the image frame.
 
     Attributes:
@@ -29,14 +29,16 @@ class Segments:
     owner: NDArray[np.int64]
 
 
-def join(parts: list[Segments]) -> Segments:
+def join_segments(parts: list[PolygonSegments]) -> PolygonSegments:
     """All polygons of all parts, renumbered in order."""
     first = np.cumsum([0] + [int(part.owner.max(initial=-1)) + 1 for part in parts[:-1]])
     owner = [part.owner + start for part, start in zip(parts, first, strict=True)]
-    return Segments(np.concatenate([part.xy_px for part in parts]), np.concatenate(owner))
+    return PolygonSegments(np.concatenate([part.xy_px for part in parts]), np.concatenate(owner))
 
 
-def segments(polygons_mm: Points, image_from_layout: Callable[[Points], Points], curved: bool) -> Segments:
+def project_polygons(
+    polygons_mm: Points, image_from_layout: Callable[[Points], Points], curved: bool
+) -> PolygonSegments:
     """Map polygons (K, n, 2) mm to the image; ``curved``: straight sides do not stay straight there.
 
     A curved side is cut into pieces, equal in the layout, until chords are within ``CHORD_PX`` of the curve.
@@ -45,7 +47,7 @@ def segments(polygons_mm: Points, image_from_layout: Callable[[Points], Points],
     end = np.roll(polygons_mm, -1, axis=1).reshape(-1, 2)
     owner = np.repeat(np.arange(len(polygons_mm)), polygons_mm.shape[1])
     if curved:
-        here, pieces = _followed(start, end, image_from_layout)
+        here, pieces = _project_sides(start, end, image_from_layout)
     else:
         here, pieces = image_from_layout(start), np.ones(len(start), dtype=np.int64)
     # Each piece ends, to the last bit, where the next one of its polygon starts.
@@ -53,10 +55,10 @@ def segments(polygons_mm: Points, image_from_layout: Callable[[Points], Points],
     following = np.arange(1, len(here) + 1)
     last = np.cumsum(count) - 1
     following[last] = last - count + 1
-    return Segments(np.concatenate([here, here[following]], axis=1), np.repeat(owner, pieces))
+    return PolygonSegments(np.concatenate([here, here[following]], axis=1), np.repeat(owner, pieces))
 
 
-def _followed(
+def _project_sides(
     start: Points, end: Points, image_from_layout: Callable[[Points], Points]
 ) -> tuple[Points, NDArray[np.int64]]:
     """Where the pieces of all sides (N, 2) start, one side after the other, and how many each side has.
@@ -67,14 +69,14 @@ def _followed(
     rounds = []
     open_sides = np.arange(len(start))
     while len(open_sides):
-        xy, first = _mapped(start[open_sides], end[open_sides], pieces[open_sides], image_from_layout)
+        xy, first = _project_pieces(start[open_sides], end[open_sides], pieces[open_sides], image_from_layout)
         error = _chord_error(xy, first, pieces[open_sides]) / 4
         coarse = error > CHORD_PX
         rounds.append((open_sides[~coarse], first[~coarse], xy))
         open_sides, error = open_sides[coarse], error[coarse]
         more = np.ceil(pieces[open_sides] * np.sqrt(np.minimum(error / CHORD_PX, 64.0)) * 1.05)
         pieces[open_sides] = more.astype(np.int64)
-        if pieces.max(initial=0) > MAX_PIECES:
+        if pieces.max(initial=0) > MAX_SIDE_PIECES:
             raise SceneError(
                 "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
             )
@@ -82,11 +84,13 @@ def _followed(
     here = np.empty((int(pieces.sum()), 2))
     place = np.cumsum(pieces) - pieces
     for sides, first, xy in rounds:
-        here[_ranges(place[sides], pieces[sides])] = xy[_ranges(first, pieces[sides])]
+        here[_concatenated_ranges(place[sides], pieces[sides])] = xy[
+            _concatenated_ranges(first, pieces[sides])
+        ]
     return here, pieces
 
 
-def _mapped(
+def _project_pieces(
     start: Points, end: Points, pieces: NDArray[np.int64], image_from_layout: Callable[[Points], Points]
 ) -> tuple[Points, NDArray[np.int64]]:
     """The ends and middles of every side's pieces in the image, and where each side's first one stands."""
@@ -100,12 +104,12 @@ def _mapped(
 
 def _chord_error(xy: Points, first: NDArray[np.int64], pieces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(N,) px: the largest distance between a piece's middle and its chord's middle."""
-    middle = np.repeat(first, pieces) + 2 * _ranges(np.zeros_like(pieces), pieces) + 1
+    middle = np.repeat(first, pieces) + 2 * _concatenated_ranges(np.zeros_like(pieces), pieces) + 1
     bend = np.linalg.norm(xy[middle] - 0.5 * (xy[middle - 1] + xy[middle + 1]), axis=1)
     return np.asarray(np.maximum.reduceat(bend, np.cumsum(pieces) - pieces))
 
 
-def _ranges(first: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
+def _concatenated_ranges(first: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
     """The numbers first, first + 1, ..., ``count`` of them, for one range after the other."""
     before = np.cumsum(count) - count
     return np.asarray(np.arange(int(count.sum())) + np.repeat(first - before, count))

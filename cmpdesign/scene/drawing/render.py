@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.plain import pitch_mm
-from cmpdesign.scene.drawing.coverage import Engine, coverage
-from cmpdesign.scene.drawing.folds import add_hidden_parts
-from cmpdesign.scene.drawing.paths import join, segments
-from cmpdesign.scene.drawing.view import View, views
+from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
+from cmpdesign.scene.drawing.folds import update_hidden_parts
+from cmpdesign.scene.drawing.paths import join_segments, project_polygons
+from cmpdesign.scene.drawing.view import SceneView, scene_views
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.parts.damage import Blob, Damage, Scratch, bled, missing
-from cmpdesign.scene.parts.light import gain
-from cmpdesign.scene.parts.optics import point_spread
-from cmpdesign.scene.parts.sensor import Sensor, expose
+from cmpdesign.scene.parts.damage import Blob, Damage, Scratch, bleed_polygons, sample_missing_cells
+from cmpdesign.scene.parts.light import light_gain
+from cmpdesign.scene.parts.optics import make_point_spread
+from cmpdesign.scene.parts.sensor import Sensor, expose_sensor
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
 
@@ -26,7 +26,7 @@ Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
 
 # Everything random has a stream of its own, so that one part's change leaves the others as they were.
-BACKGROUND, MISSING, BLEED, NOISE = range(4)
+BACKGROUND_STREAM, MISSING_STREAM, BLEED_STREAM, NOISE_STREAM = range(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,32 +46,32 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     Raises:
         SceneError: the surface folds, a part lies behind a camera or turns away from it, or a value is out of range.
     """
-    seen = _looked(scene, size)
-    gone = missing_cells(scene)
-    behind = _blurred(scene.background.planes(size, _rng(scene, BACKGROUND)), scene.blur_px)
-    parts = [_drawn(scene, view, gone, behind, engine) for view in seen]
-    planes = _assembled(seen, parts, size)
+    seen = _checked_views(scene, size)
+    gone = missing_cell_mask(scene)
+    behind = _blur_planes(scene.background.planes(size, _stream_rng(scene, BACKGROUND_STREAM)), scene.blur_px)
+    parts = [_draw_view(scene, view, gone, behind, engine) for view in seen]
+    planes = _assemble_views(seen, parts, size)
     if scene.light:
-        planes = planes * gain(scene.light, size)
+        planes = planes * light_gain(scene.light, size)
     for glare in scene.damage.glare if scene.damage else ():
         planes = planes + glare.plane(size)
-    image = expose(scene.sensor or Sensor(), planes, _noise_rng(scene))
-    warnings = (*scene.warnings, *(view.warning for view in seen if view.folds))
-    return Rendered(image, _truth(scene, seen, gone), warnings)
+    image = expose_sensor(scene.sensor or Sensor(), planes, _noise_rng(scene))
+    warnings = (*scene.warnings, *(view.warning for view in seen if view.occlusion))
+    return Rendered(image, _make_truth(scene, seen, gone), warnings)
 
 
 def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
     """The truth of ``render`` without its image."""
-    return _truth(scene, _looked(scene, size), missing_cells(scene))
+    return _make_truth(scene, _checked_views(scene, size), missing_cell_mask(scene))
 
 
-def _looked(scene: Scene, size: tuple[int, int]) -> tuple[View, ...]:
+def _checked_views(scene: Scene, size: tuple[int, int]) -> tuple[SceneView, ...]:
     if min(size) < 1:
         raise SceneError(f"size is {size[0]} x {size[1]}; it must be at least 1 x 1 px")
-    return views(scene, size)
+    return scene_views(scene, size)
 
 
-def _assembled(seen: tuple[View, ...], parts: list[Planes], size: tuple[int, int]) -> Planes:
+def _assemble_views(seen: tuple[SceneView, ...], parts: list[Planes], size: tuple[int, int]) -> Planes:
     if len(parts) == 1 and parts[0].shape[1:] == size[::-1]:
         return parts[0]
     planes = np.zeros((3, size[1], size[0]), dtype=np.float32)
@@ -80,38 +80,44 @@ def _assembled(seen: tuple[View, ...], parts: list[Planes], size: tuple[int, int
     return planes
 
 
-def _drawn(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, engine: Engine) -> Planes:
+def _draw_view(
+    scene: Scene, view: SceneView, gone: NDArray[np.bool_], behind: Planes, engine: Engine
+) -> Planes:
     """One view's part of the image: (3, height, width)."""
-    planes = _pattern(scene, view, gone, behind[view.window], engine)
+    planes = _draw_pattern(scene, view, gone, behind[view.window], engine)
     if scene.damage and (scene.damage.blobs or scene.damage.scratches):
-        return _with_dirt(planes, scene.damage, scene.blur_px, view, engine)
+        return _cover_with_dirt(planes, scene.damage, scene.blur_px, view, engine)
     return planes
 
 
-def _rng(scene: Scene, stream: int) -> np.random.Generator:
+def _stream_rng(scene: Scene, stream: int) -> np.random.Generator:
     return np.random.default_rng([scene.seed, stream])
 
 
 def _noise_rng(scene: Scene) -> np.random.Generator:
     """Another stream in every frame of a sequence; all else that is random stays as it is."""
-    return np.random.default_rng([scene.seed, NOISE, scene.frame] if scene.frame else [scene.seed, NOISE])
+    return np.random.default_rng(
+        [scene.seed, NOISE_STREAM, scene.frame] if scene.frame else [scene.seed, NOISE_STREAM]
+    )
 
 
-def missing_cells(scene: Scene) -> NDArray[np.bool_]:
+def missing_cell_mask(scene: Scene) -> NDArray[np.bool_]:
     """(C,) bool: the cells that fell out of this scene's pattern."""
     if scene.damage is None:
         return np.zeros(len(scene.layout.cell_color), dtype=np.bool_)
-    return missing(scene.damage, scene.layout, _rng(scene, MISSING))
+    return sample_missing_cells(scene.damage, scene.layout, _stream_rng(scene, MISSING_STREAM))
 
 
-def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, engine: Engine) -> Planes:
+def _draw_pattern(
+    scene: Scene, view: SceneView, gone: NDArray[np.bool_], behind: Planes, engine: Engine
+) -> Planes:
     """Ground over background, inks over ground: (3, height, width), B, G, R, blurred."""
     layout = scene.layout
     drawn = np.flatnonzero((layout.cell_color != BLACK) & ~gone)
     polygons = layout.marker_xy_mm[layout.cell_corners[drawn]]
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
-        polygons = bled(polygons, bleed_mm, _rng(scene, BLEED))
+        polygons = bleed_polygons(polygons, bleed_mm, _stream_rng(scene, BLEED_STREAM))
     # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
     black = _bgr(scene.ink(BLACK))
     over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
@@ -122,7 +128,7 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
     values[1:, :3] = over_black
     if bleed_mm:
         values[1:, 4] = 1.0
-    covered = _summed(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
+    covered = _draw_polygons(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
 
     inks, ground_share = covered[:3], covered[3]
     if bleed_mm:
@@ -131,7 +137,9 @@ def _pattern(scene: Scene, view: View, gone: NDArray[np.bool_], behind: Planes, 
     return np.asarray(inks + behind + ground_share * (black_plane - behind), dtype=np.float32)
 
 
-def _summed(view: View, polygons_mm: list[Points], values: Points, blur_px: float, engine: Engine) -> Planes:
+def _draw_polygons(
+    view: SceneView, polygons_mm: list[Points], values: Points, blur_px: float, engine: Engine
+) -> Planes:
     """(planes, height, width): what polygons (K, n, 2) of the layout add up to in a view's area, hidden parts left out.
 
     Args:
@@ -139,15 +147,17 @@ def _summed(view: View, polygons_mm: list[Points], values: Points, blur_px: floa
         polygons_mm: counter-clockwise ones.
         values: (polygons, planes) what each adds to each plane.
         blur_px: the optics' blur.
-        engine: see ``coverage``.
+        engine: see ``draw_coverage``.
     """
-    spread, folds = point_spread(blur_px), view.folds
-    seen = join([segments(part, view.area_from_layout, view.curved) for part in polygons_mm])
-    planes = coverage(seen, values, view.area[2:], spread, engine, view.orientation)
+    spread, folds = make_point_spread(blur_px), view.occlusion
+    seen = join_segments([project_polygons(part, view.area_from_layout, view.curved) for part in polygons_mm])
+    planes = draw_coverage(seen, values, view.area[2:], spread, engine, view.orientation)
     if folds is not None:
-        flat = join([segments(part, folds.texels_from_layout, False) for part in polygons_mm])
-        texture = coverage(flat, values, folds.texture_size, point_spread(0.0), engine)
-        add_hidden_parts(planes, folds, texture, blur_px)
+        flat = join_segments(
+            [project_polygons(part, folds.texels_from_layout, False) for part in polygons_mm]
+        )
+        texture = draw_coverage(flat, values, folds.texture_size, make_point_spread(0.0), engine)
+        update_hidden_parts(planes, folds, texture, blur_px)
     return planes
 
 
@@ -155,7 +165,7 @@ def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
     return np.asarray(rgb[::-1], dtype=np.float64)
 
 
-def _blurred(planes: Planes, blur_px: float) -> Planes:
+def _blur_planes(planes: Planes, blur_px: float) -> Planes:
     """The background is a picture, not a shape: an ordinary blur does."""
     if blur_px == 0 or not any(planes.strides[1:]):
         return planes
@@ -164,23 +174,25 @@ def _blurred(planes: Planes, blur_px: float) -> Planes:
     return np.stack([cv2.GaussianBlur(plane, (0, 0), blur_px) for plane in planes])
 
 
-def _with_dirt(planes: Planes, damage: Damage, blur_px: float, view: View, engine: Engine) -> Planes:
+def _cover_with_dirt(
+    planes: Planes, damage: Damage, blur_px: float, view: SceneView, engine: Engine
+) -> Planes:
     """Blobs and scratches over the pattern; where they overlap, they mix."""
     spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
     values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
-    covered = _summed(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
+    covered = _draw_polygons(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
     overlap = np.maximum(covered[3], 1.0)
     return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
 
 
-def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Truth:
+def _make_truth(scene: Scene, seen: tuple[SceneView, ...], gone: NDArray[np.bool_]) -> Truth:
     """Of one view as it is; of a tuple of views with a leading axis."""
     layout, lift = scene.layout, seen[0].xyz_from_layout
     xyz = lift(layout.marker_xy_mm), lift(layout.virtual_xy_mm.reshape(-1, 2))
-    parts = [_seen(scene, view, gone, *xyz) for view in seen]
+    parts = [_view_truth(scene, view, gone, *xyz) for view in seen]
     columns = {name: [part[name] for part in parts] for name in parts[0]}
     several = isinstance(scene.camera, tuple)
-    flat = [view.h for view in seen if view.h is not None]
+    flat = [view.homography for view in seen if view.homography is not None]
     return Truth(
         **{name: np.stack(values) if several else values[0] for name, values in columns.items()},
         mirrored=np.array([view.mirrored for view in seen]) if several else seen[0].mirrored,
@@ -190,20 +202,20 @@ def _truth(scene: Scene, seen: tuple[View, ...], gone: NDArray[np.bool_]) -> Tru
     )
 
 
-def _seen(
-    scene: Scene, view: View, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
+def _view_truth(
+    scene: Scene, view: SceneView, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
 ) -> dict[str, NDArray[Any]]:
     """What one view has its own values of."""
     layout, step_mm = scene.layout, 1e-4 * pitch_mm(scene.layout)
     marker_xy_px = view.project(marker_xyz_mm)
     inside = view.contains(marker_xy_px)
     samples = _cell_samples(scene)
-    away = view.hides(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
-    damaged = gone | ((_covered(scene, view, samples) | away).mean(axis=1) >= 0.5)
+    away = view.is_hidden(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
+    damaged = gone | ((_is_covered(scene, view, samples) | away).mean(axis=1) >= 0.5)
     touching = np.zeros(len(marker_xy_px), dtype=np.bool_)
     touching[layout.cell_corners[(layout.cell_color != BLACK) & ~damaged]] = True
-    hidden = _covered(scene, view, layout.marker_xy_mm[:, None])[:, 0]
-    hidden |= view.hides(layout.marker_xy_mm, step_mm)
+    hidden = _is_covered(scene, view, layout.marker_xy_mm[:, None])[:, 0]
+    hidden |= view.is_hidden(layout.marker_xy_mm, step_mm)
     return {
         "marker_xy_px": marker_xy_px,
         "visible": inside & touching & ~hidden,
@@ -220,7 +232,7 @@ def _cell_samples(scene: Scene) -> Points:
     return np.concatenate([centre, centre + 0.6 * (rim - centre)], axis=1)
 
 
-def _covered(scene: Scene, view: View, xy_mm: Points) -> NDArray[np.bool_]:
+def _is_covered(scene: Scene, view: SceneView, xy_mm: Points) -> NDArray[np.bool_]:
     """Which of the points (N, n, 2) mm lie under dirt or glare."""
     covered = np.zeros(xy_mm.shape[:2], dtype=np.bool_)
     if scene.damage is None:

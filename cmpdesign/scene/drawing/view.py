@@ -9,18 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.scene.camera.pinhole import Area, Pinhole, depth_mm, project_3d
-from cmpdesign.scene.camera.plain import Camera, homography, is_mirrored, pinhole, pitch_mm, project
-from cmpdesign.scene.drawing.folds import Folds, find_folds, hidden
+from cmpdesign.scene.camera.plain import (
+    Camera,
+    camera_homography,
+    is_mirrored,
+    pitch_mm,
+    project_by_homography,
+    to_pinhole,
+)
+from cmpdesign.scene.drawing.folds import Occlusion, find_occlusion, is_hidden
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.parts.surface import determinant, points_to_check, require_no_fold
+from cmpdesign.scene.parts.surface import fold_check_points, jacobian_determinant, require_no_fold
 from cmpdesign.scene.scene import Scene
 
 Points = NDArray[np.float64]
-Map = Callable[[Points], Points]
+PointMap = Callable[[Points], Points]
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SceneView:
     """One view of a scene.
 
     Attributes:
@@ -33,17 +40,17 @@ class View:
         folds: where the surface turns away from the camera; None: nowhere.
     """
 
-    xyz_from_layout: Map
-    project: Map
+    xyz_from_layout: PointMap
+    project: PointMap
     area: Area
     mirrored: bool
-    h: Points | None
+    homography: Points | None
     camera: Pinhole | None = None
-    folds: Folds | None = None
+    occlusion: Occlusion | None = None
 
     @property
     def curved(self) -> bool:
-        return self.h is None
+        return self.homography is None
 
     @property
     def window(self) -> tuple[slice, slice, slice]:
@@ -68,26 +75,26 @@ class View:
     @property
     def orientation(self) -> float | None:
         """Of polygons that are counter-clockwise in the layout; None where all of them face the camera anyway."""
-        return self.sign if self.folds is not None else None
+        return self.sign if self.occlusion is not None else None
 
     @property
     def warning(self) -> str:
         """That a part turns away, how much and where; empty where none does."""
-        if self.folds is None:
+        if self.occlusion is None:
             return ""
-        x, y = self.folds.place_mm
+        x, y = self.occlusion.place_mm
         name = f"view {self.camera.name}: " if self.camera and self.camera.name else ""
         return (
-            f"{name}{100 * self.folds.share:.2g} % of the pattern turn away from the camera, among others at "
+            f"{name}{100 * self.occlusion.share:.2g} % of the pattern turn away from the camera, among others at "
             f"({x:.3g}, {y:.3g}) mm; what they hide is marked as not visible"
         )
 
-    def hides(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
+    def is_hidden(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
         """Which of the points (N, 2) mm of the layout lie behind another part of the surface, or turn away."""
-        if self.folds is None:
+        if self.occlusion is None:
             return np.zeros(len(xy_mm), dtype=np.bool_)
-        facing = self.sign * determinant(self.image_from_layout, xy_mm, step_mm) > 0
-        return hidden(self.folds, self.depth_from_layout(xy_mm), facing)
+        facing = self.sign * jacobian_determinant(self.image_from_layout, xy_mm, step_mm) > 0
+        return is_hidden(self.occlusion, self.depth_from_layout(xy_mm), facing)
 
     def depth_from_layout(self, xy_mm: Points) -> Points:
         """(N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
@@ -103,7 +110,7 @@ class View:
         return np.asarray(inside.all(axis=1))
 
 
-def look(scene: Scene, size: tuple[int, int]) -> View:
+def single_view(scene: Scene, size: tuple[int, int]) -> SceneView:
     """The only view of a scene.
 
     Raises:
@@ -113,35 +120,37 @@ def look(scene: Scene, size: tuple[int, int]) -> View:
         raise SceneError(
             f"the scene has {len(scene.camera)} views, one is needed; take the scene with camera = one of them"
         )
-    return views(scene, size)[0]
+    return scene_views(scene, size)[0]
 
 
-def views(scene: Scene, size: tuple[int, int]) -> tuple[View, ...]:
+def scene_views(scene: Scene, size: tuple[int, int]) -> tuple[SceneView, ...]:
     """All views of a scene in an image of ``size`` (width, height).
 
     Raises:
         SceneError: the surface folds; a part lies behind a camera or turns away from it; views overlap.
     """
     cameras = scene.camera if isinstance(scene.camera, tuple) else (scene.camera,)
-    areas = [_area(camera, size) for camera in cameras]
-    _require_apart(areas, cameras)
-    lift = _lift(scene)
-    return tuple(_view(scene, camera, area, lift, size) for camera, area in zip(cameras, areas, strict=True))
+    areas = [_view_area(camera, size) for camera in cameras]
+    _require_disjoint_areas(areas, cameras)
+    lift = _make_lift(scene)
+    return tuple(
+        _make_view(scene, camera, area, lift, size) for camera, area in zip(cameras, areas, strict=True)
+    )
 
 
-def _area(camera: Camera | Pinhole, size: tuple[int, int]) -> Area:
+def _view_area(camera: Camera | Pinhole, size: tuple[int, int]) -> Area:
     if isinstance(camera, Camera) or camera.area_px is None:
         return (0, 0, *size)
     x, y, width, height = camera.area_px
     if x + width > size[0] or y + height > size[1]:
         raise SceneError(
-            f"area_px {camera.area_px}{_of(camera)} leaves the image of {size[0]} x {size[1]} px; "
+            f"area_px {camera.area_px}{_camera_label(camera)} leaves the image of {size[0]} x {size[1]} px; "
             "make the area smaller or the image larger"
         )
     return camera.area_px
 
 
-def _require_apart(areas: list[Area], cameras: tuple[Camera | Pinhole, ...]) -> None:
+def _require_disjoint_areas(areas: list[Area], cameras: tuple[Camera | Pinhole, ...]) -> None:
     for i, (x, y, width, height) in enumerate(areas):
         for j in range(i):
             other_x, other_y, other_width, other_height = areas[j]
@@ -149,25 +158,26 @@ def _require_apart(areas: list[Area], cameras: tuple[Camera | Pinhole, ...]) -> 
                 min(y + height, other_y + other_height) > max(y, other_y)
             ):
                 raise SceneError(
-                    f"the views {_name(cameras[j], j)} and {_name(cameras[i], i)} share pixels of the image: "
+                    f"the views {_camera_name(cameras[j], j)} and {_camera_name(cameras[i], i)} share "
+                    f"pixels of the image: "
                     f"area_px {areas[j]} and {areas[i]}; give each its own area_px"
                 )
 
 
-def _name(camera: Camera | Pinhole, number: int) -> str:
+def _camera_name(camera: Camera | Pinhole, number: int) -> str:
     return getattr(camera, "name", "") or str(number)
 
 
-def _of(camera: Camera | Pinhole) -> str:
+def _camera_label(camera: Camera | Pinhole) -> str:
     name = getattr(camera, "name", "")
     return f" of view {name}" if name else ""
 
 
 @dataclass(frozen=True, eq=False)
-class _Lift:
+class _SurfaceLift:
     """The surface as it was given, and whether it leads out of the plane."""
 
-    surface: Map | None
+    surface: PointMap | None
     spatial: bool
 
     def __call__(self, xy_mm: Points) -> Points:
@@ -180,30 +190,34 @@ class _Lift:
         return xyz
 
 
-def _lift(scene: Scene) -> _Lift:
+def _make_lift(scene: Scene) -> _SurfaceLift:
     layout, surface = scene.layout, scene.surface
     if surface is None:
-        return _Lift(None, False)
+        return _SurfaceLift(None, False)
     spatial = surface(layout.marker_xy_mm[:1]).shape[1] == 3
     if not spatial:
-        checked = points_to_check(layout.marker_xy_mm, layout.cell_corners)
+        checked = fold_check_points(layout.marker_xy_mm, layout.cell_corners)
         require_no_fold(surface, checked, 1e-4 * pitch_mm(layout))
-    return _Lift(surface, spatial)
+    return _SurfaceLift(surface, spatial)
 
 
-def _view(scene: Scene, camera: Camera | Pinhole, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
+def _make_view(
+    scene: Scene, camera: Camera | Pinhole, area: Area, lift: _SurfaceLift, size: tuple[int, int]
+) -> SceneView:
     if isinstance(camera, Camera) and not lift.spatial:
-        return _planar_view(scene, camera, area, lift, size)
-    at = camera if isinstance(camera, Pinhole) else pinhole(camera, scene.layout, size)
+        return _make_planar_view(scene, camera, area, lift, size)
+    at = camera if isinstance(camera, Pinhole) else to_pinhole(camera, scene.layout, size)
     h = at.homography if lift.surface is None else None
-    view = View(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
+    view = SceneView(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
     if not view.curved:
         return view
-    return replace(view, folds=find_folds(scene.layout, view.depth_from_layout, view.sign, area[2:]))
+    return replace(view, occlusion=find_occlusion(scene.layout, view.depth_from_layout, view.sign, area[2:]))
 
 
-def _planar_view(scene: Scene, camera: Camera, area: Area, lift: _Lift, size: tuple[int, int]) -> View:
-    h = homography(camera, scene.layout, size)
+def _make_planar_view(
+    scene: Scene, camera: Camera, area: Area, lift: _SurfaceLift, size: tuple[int, int]
+) -> SceneView:
+    h = camera_homography(camera, scene.layout, size)
     straight = h if lift.surface is None else None
     mirrored = is_mirrored(camera, scene.layout)
-    return View(lift, lambda xyz_mm: project(h, xyz_mm[:, :2]), area, mirrored, straight)
+    return SceneView(lift, lambda xyz_mm: project_by_homography(h, xyz_mm[:, :2]), area, mirrored, straight)

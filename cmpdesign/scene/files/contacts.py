@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 MOTION = "contact.motion."
 
 
-def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str], folder: Path) -> Iterator[Contact]:
+def solve_contacts(
+    tables: Sequence[Mapping[str, Any]], changing: Sequence[str], folder: Path
+) -> Iterator[Contact]:
     """The contact of every frame.
 
     Args:
@@ -46,7 +48,7 @@ def contacts(tables: Sequence[Mapping[str, Any]], changing: Sequence[str], folde
         else:
             yield from (contact_from(table, folder).solve() for table in tables)
     except ContactError as error:
-        raise SceneError(_told(error)) from None
+        raise SceneError(_contact_message(error)) from None
 
 
 def check_contact(table: Mapping[str, Any], folder: Path) -> None:
@@ -60,9 +62,9 @@ def check_contact(table: Mapping[str, Any], folder: Path) -> None:
     try:
         contact_from(table, folder)
     except ContactError as error:
-        raise SceneError(_told(error)) from None
+        raise SceneError(_contact_message(error)) from None
 
 
-def _told(error: Exception) -> str:
+def _contact_message(error: Exception) -> str:
     text = str(error)
     return text if text.startswith("contact") else f"[contact] {text}"

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.files.video import CODECS, Video
+from cmpdesign.files.video import CODECS, VideoWriter
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
-class Film(Protocol):
+class FrameWriter(Protocol):
     """Takes pictures one after the other; only ``close`` puts them in their place."""
 
     def add(self, picture: Any) -> None: ...
@@ -25,7 +25,7 @@ class Film(Protocol):
     def discard(self) -> None: ...
 
 
-def open_film(path: Path, fps: float, size: tuple[int, int], bits: int) -> Film:
+def open_frame_writer(path: Path, fps: float, size: tuple[int, int], bits: int) -> FrameWriter:
     """The film for a path: a video by its ending, a folder where it has none.
 
     Args:
@@ -39,7 +39,7 @@ def open_film(path: Path, fps: float, size: tuple[int, int], bits: int) -> Film:
         OutputError: the folder holds something already.
     """
     if not path.suffix:
-        return PngFolder(path)
+        return PngFolderWriter(path)
     if path.suffix not in CODECS:
         raise CmpDesignError(
             f"{path}: unknown ending for a sequence; expected {', '.join(CODECS)}, or none for a folder of PNG files"
@@ -50,10 +50,10 @@ def open_film(path: Path, fps: float, size: tuple[int, int], bits: int) -> Film:
         raise CmpDesignError(
             f"{path}: an .mp4 has even sides, the picture {size[0]} x {size[1]} px; write .mkv or a folder"
         )
-    return Video(path, fps)
+    return VideoWriter(path, fps)
 
 
-class PngFolder:
+class PngFolderWriter:
     """frame_000000.png and so on; written beside, then renamed."""
 
     def __init__(self, path: Path) -> None:

@@ -11,19 +11,19 @@ import numpy as np
 
 from cmpdesign.scene.errors import SceneError
 
-Keys = tuple[tuple[float, float | tuple[float, ...]], ...]
+KeyFrames = tuple[tuple[float, float | tuple[float, ...]], ...]
 
 
-def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+def flatten_table(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Nested tables as one, with dotted paths: TOML reads contact.motion.press_mm = ... as tables in tables."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         path = f"{before}.{key}" if before else key
-        flat |= flattened(value, path) if isinstance(value, Mapping) else {path: value}
+        flat |= flatten_table(value, path) if isinstance(value, Mapping) else {path: value}
     return flat
 
 
-def value_at(keys: Keys, time_s: float) -> float | list[float]:
+def interpolate_key_frames(keys: KeyFrames, time_s: float) -> float | list[float]:
     """Between two keys straight, before the first and after the last one constant."""
     times = [key[0] for key in keys]
     rows = np.array([key[1] for key in keys], dtype=np.float64)
@@ -32,7 +32,9 @@ def value_at(keys: Keys, time_s: float) -> float | list[float]:
     return [float(np.interp(time_s, times, column)) for column in rows.T]
 
 
-def with_values(document: Mapping[str, Any], values: Mapping[str, Keys], time_s: float) -> dict[str, Any]:
+def document_at_time(
+    document: Mapping[str, Any], values: Mapping[str, KeyFrames], time_s: float
+) -> dict[str, Any]:
     """The document with every path's value at a time.
 
     Raises:
@@ -43,12 +45,12 @@ def with_values(document: Mapping[str, Any], values: Mapping[str, Keys], time_s:
         *tables, last = path.split(".")
         target: Any = changed
         for depth, name in enumerate(tables):
-            target = _inside(target, name, path, ".".join(tables[:depth]))
-        _put(target, last, value_at(keys, time_s), path)
+            target = _find_table(target, name, path, ".".join(tables[:depth]))
+        _update_value(target, last, interpolate_key_frames(keys, time_s), path)
     return changed
 
 
-def _inside(target: Any, name: str, path: str, at: str) -> Any:
+def _find_table(target: Any, name: str, path: str, at: str) -> Any:
     known = [str(i) for i in range(len(target))] if isinstance(target, list) else list(target)
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
@@ -63,7 +65,7 @@ def _inside(target: Any, name: str, path: str, at: str) -> Any:
     return found
 
 
-def _put(target: Any, name: str, value: float | list[float], path: str) -> None:
+def _update_value(target: Any, name: str, value: float | list[float], path: str) -> None:
     if isinstance(target, list):
         if not (name.isdecimal() and int(name) < len(target)):
             raise SceneError(f"[sequence] values.{path}: there is no {name}, it has 0 to {len(target) - 1}")

@@ -18,7 +18,7 @@ from cmpdesign.patterns.colors import COLORS
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.errors import SceneError
-from cmpdesign.scene.files.key_frames import Keys, flattened, with_values
+from cmpdesign.scene.files.key_frames import KeyFrames, document_at_time, flatten_table
 from cmpdesign.scene.files.tables import (
     BackgroundTable,
     SceneTables,
@@ -30,7 +30,7 @@ from cmpdesign.scene.parts.background import Background, Picture, Plain
 from cmpdesign.scene.parts.surface import composed
 from cmpdesign.scene.scene import Scene
 
-Map = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+PointMap = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class SceneFile:
     size_px: tuple[int, int]
     frames: int = 1
     fps: float | None = None
-    values: Mapping[str, Keys] = field(default_factory=dict)
+    values: Mapping[str, KeyFrames] = field(default_factory=dict)
 
     def time_s(self, frame: int) -> float:
         """When a frame is seen."""
@@ -79,16 +79,16 @@ class SceneFile:
         Raises:
             SceneError: names file, table and key.
         """
-        with _naming(self.path):
+        with _errors_with_path(self.path):
             pressed = self._pressed()
             for frame in range(self.frames):
                 tables = self._tables(frame)
                 contact = next(pressed, None)
-                parts = list(_deformations(tables.surface, self.document))
+                parts = list(_make_deformations(tables.surface, self.document))
                 if contact is not None:
                     parts.append(contact.surface())
                 yield Scene(
-                    **_parts(tables, self),
+                    **_make_parts(tables, self),
                     surface=composed(*parts) if parts else None,
                     seed=tables.seed,
                     frame=frame,
@@ -99,17 +99,17 @@ class SceneFile:
         """The contact of every frame; nothing, and nothing imported, without [contact]."""
         if "contact" not in self.document:
             return
-        from cmpdesign.scene.files.contacts import contacts
+        from cmpdesign.scene.files.contacts import solve_contacts
 
         tables = [self._tables(frame).contact or {} for frame in range(self.frames)]
-        yield from contacts(tables, list(self.values), self.path.parent)
+        yield from solve_contacts(tables, list(self.values), self.path.parent)
 
     def _tables(self, frame: int) -> SceneTables:
-        return read_tables(with_values(self.document, self.values, self.time_s(frame)))
+        return read_tables(document_at_time(self.document, self.values, self.time_s(frame)))
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _errors_with_path(path: Path) -> Iterator[None]:
     """Errors open with the file's name."""
     try:
         yield
@@ -131,33 +131,33 @@ def load_scene(
         SceneError: the file cannot be read, is no TOML, or has a name or value that is not allowed.
     """
     path = Path(path)
-    with _naming(path):
-        document = _document(path)
+    with _errors_with_path(path):
+        document = _read_toml(path)
         given = {"size_px": size_px and list(size_px), "seed": seed}
         document |= {name: value for name, value in given.items() if value is not None}
         sequence = document.pop("sequence", None)
         if isinstance(sequence, dict) and isinstance(sequence.get("values"), dict):
-            sequence = {**sequence, "values": flattened(sequence["values"])}
+            sequence = {**sequence, "values": flatten_table(sequence["values"])}
         tables = read_tables(document if sequence is None else {**document, "sequence": sequence})
         found = SceneFile(path, layout, document, tables.size_px)
         if tables.sequence is not None:
             frames, fps, values = tables.sequence.frames, tables.sequence.fps, tables.sequence.values
             found = replace(found, frames=frames, fps=fps, values=MappingProxyType(values))
         for time_s in sorted({0.0} | {key[0] for keys in found.values.values() for key in keys}):
-            _check(read_tables(with_values(document, found.values, time_s)), found)
+            _check_tables(read_tables(document_at_time(document, found.values, time_s)), found)
     return found
 
 
-def _check(tables: SceneTables, file: SceneFile) -> None:
+def _check_tables(tables: SceneTables, file: SceneFile) -> None:
     """What can be wrong before anything is solved or drawn."""
-    _parts(tables, file)
+    _make_parts(tables, file)
     if tables.contact is not None:
         from cmpdesign.scene.files.contacts import check_contact
 
         check_contact(tables.contact, file.path.parent)
 
 
-def _document(path: Path) -> dict[str, Any]:
+def _read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -168,21 +168,21 @@ def _document(path: Path) -> dict[str, Any]:
         raise SceneError(f"is no valid TOML: {error}") from None
 
 
-def _parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
+def _make_parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
     """All but the surface, which may have to be solved for."""
     return {
         "layout": file.layout,
-        "camera": _camera(tables),
+        "camera": _make_camera(tables),
         "light": tables.light,
-        "background": _background(tables, file.path),
+        "background": _make_background(tables, file.path),
         "optics": tables.optics,
         "sensor": tables.sensor,
         "damage": tables.damage,
-        "inks": {name: _rgb(value, name) for name, value in tables.inks.items()},
+        "inks": {name: _parse_rgb(value, name) for name, value in tables.inks.items()},
     }
 
 
-def _camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
+def _make_camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
     """One [[view]] is a view as any other; several make a tuple, and the truth gets a leading axis."""
     if tables.view is None:
         return tables.camera or Camera()
@@ -195,14 +195,14 @@ def _camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
     return cameras[0] if len(cameras) == 1 else tuple(cameras)
 
 
-def _deformations(table: SurfaceTable | None, document: Mapping[str, Any]) -> Iterator[Map]:
+def _make_deformations(table: SurfaceTable | None, document: Mapping[str, Any]) -> Iterator[PointMap]:
     """In the order in which the file has them."""
     if table is not None:
         for name in document["surface"]:
             yield getattr(table, name)
 
 
-def _background(tables: SceneTables, path: Path) -> Background:
+def _make_background(tables: SceneTables, path: Path) -> Background:
     if tables.background is None:
         return Plain()
     found = read_background(tables.background)
@@ -217,7 +217,7 @@ def _background(tables: SceneTables, path: Path) -> Background:
     return Picture(picture.astype(np.uint8) if picture.dtype == np.uint8 else (picture >> 8).astype(np.uint8))
 
 
-def _rgb(value: tuple[float, float, float] | str, name: str) -> tuple[float, float, float]:
+def _parse_rgb(value: tuple[float, float, float] | str, name: str) -> tuple[float, float, float]:
     if name not in COLORS:
         raise SceneError(f"[inks] {name} is unknown; the inks are {', '.join(COLORS)}")
     if not isinstance(value, str):

@@ -28,8 +28,16 @@ from cmpdesign.scene.parts.surface import Dent, Press, Shear, Twist
 
 Row = tuple[float, float, float]
 RGB = tuple[float, float, float]
-PLACED = ("focal_px", "centre_px", "R_camera_from_layout", "t_camera_from_layout_mm")
-LOOKING = ("distance_mm", "field_of_view_deg", "tilt_deg", "azimuth_deg", "roll_deg", "target_mm", "back")
+POSE_KEYS = ("focal_px", "centre_px", "R_camera_from_layout", "t_camera_from_layout_mm")
+LOOKING_KEYS = (
+    "distance_mm",
+    "field_of_view_deg",
+    "tilt_deg",
+    "azimuth_deg",
+    "roll_deg",
+    "target_mm",
+    "back",
+)
 BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
 # A place may be given as [x, y] or [x, y, z] and a value as a number: all are rows of numbers to the key frames.
 Value = float | tuple[float, ...]
@@ -63,14 +71,14 @@ class ViewTable(Table):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         given = self.model_fields_set
-        looking = [name for name in LOOKING if name in given]
-        placed = [name for name in PLACED if name in given]
+        looking = [name for name in LOOKING_KEYS if name in given]
+        placed = [name for name in POSE_KEYS if name in given]
         if looking and placed:
             raise ValueError(f"{placed[0]} and {looking[0]} place the camera twice; leave one of the two out")
-        needed = LOOKING[:2] if looking else PLACED
+        needed = LOOKING_KEYS[:2] if looking else POSE_KEYS
         for name in needed:
             if name not in given:
-                other = PLACED if looking else LOOKING[:2]
+                other = POSE_KEYS if looking else LOOKING_KEYS[:2]
                 raise ValueError(f"{name} is missing (or give {', '.join(other)} alone)")
         return self
 
@@ -93,7 +101,7 @@ class ViewTable(Table):
                     f"{-1 if odd else 1}; it is -1 where an odd number of mirrors stands between, leave one out"
                 )
             return camera
-        looking = {name: getattr(self, name) for name in (*LOOKING, "distortion", "area_px", "name")}
+        looking = {name: getattr(self, name) for name in (*LOOKING_KEYS, "distortion", "area_px", "name")}
         return Pinhole.looking(size, mirror=bool(self.mirrored), **looking)
 
 
@@ -172,7 +180,7 @@ def read_tables(document: Mapping[str, Any]) -> SceneTables:
     Raises:
         SceneError: names table, key, value and limit; for an unknown name the nearest known one.
     """
-    return cast(SceneTables, _read(SceneTables, document, ""))
+    return cast(SceneTables, _validate_table(SceneTables, document, ""))
 
 
 def read_background(table: Mapping[str, Any]) -> Any:
@@ -185,51 +193,55 @@ def read_background(table: Mapping[str, Any]) -> Any:
     kind = table.get("kind")
     if kind not in kinds:
         raise SceneError(
-            f"[background] kind is {kind!r}{_nearest(str(kind), kinds)}; it is one of {', '.join(kinds)}"
+            f"[background] kind is {kind!r}{_suggest_name(str(kind), kinds)}; it is one of {', '.join(kinds)}"
         )
     if kind == "picture":
-        return _read(BackgroundTable, table, "background")
-    return _read(BACKGROUNDS[str(kind)], {key: table[key] for key in table if key != "kind"}, "background")
+        return _validate_table(BackgroundTable, table, "background")
+    return _validate_table(
+        BACKGROUNDS[str(kind)], {key: table[key] for key in table if key != "kind"}, "background"
+    )
 
 
-def _read(model: type, table: Mapping[str, Any], where: str) -> Any:
+def _validate_table(model: type, table: Mapping[str, Any], where: str) -> Any:
     try:
         # As JSON, a list may become a tuple and a table a dataclass, and yet a text is no number.
         return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         # A value that fits none of several types is reported once for each of them.
-        messages = dict.fromkeys(_message(item, model, where) for item in error.errors())
+        messages = dict.fromkeys(_error_message(item, model, where) for item in error.errors())
         raise SceneError("; ".join(messages)) from None
 
 
-def _message(item: Any, model: type, where: str) -> str:
-    inner = [part for part in item["loc"] if not _names_a_type(part)]
+def _error_message(item: Any, model: type, where: str) -> str:
+    inner = [part for part in item["loc"] if not _is_type_name(part)]
     path: list[int | str] = [where, *inner] if where else inner
     text, kind = item["msg"].removeprefix("Value error, ").removeprefix("Input should be "), item["type"]
     if kind == "value_error":  # a part's own check: its path leads to the part, and the message names the key
-        return f"{_table(path)}{text}"
-    table, key = _table(path[:-1]), str(path[-1])
+        return f"{_table_label(path)}{text}"
+    table, key = _table_label(path[:-1]), str(path[-1])
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        known = _names(model, inner[:-1])
-        return f"{table}{key} is unknown{_nearest(key, known)}; there are {', '.join(known)}"
+        known = _known_names(model, inner[:-1])
+        return f"{table}{key} is unknown{_suggest_name(key, known)}; there are {', '.join(known)}"
     if kind == "too_long":
         found, most = item["ctx"]["actual_length"], item["ctx"]["max_length"]
         return f"{table}{key} has {found} values; it takes {most}"
     if kind in ("missing", "missing_argument"):
         few = isinstance(inner[-1], int)
-        return f"{_table(path[:-2])}{path[-2]} has too few values" if few else f"{table}{key} is missing"
+        return (
+            f"{_table_label(path[:-2])}{path[-2]} has too few values" if few else f"{table}{key} is missing"
+        )
     unit = next((f" in {unit}" for unit in ("mm", "deg", "px") if key.endswith(f"_{unit}")), "")
     text = text.replace("an object", "a table").replace("a valid array", "a list")
     shown = "a table" if isinstance(item["input"], dict) else json.dumps(item["input"])
     return f"{table}{key} is {shown}; it must be {text}{unit}"
 
 
-def _names_a_type(part: int | str) -> bool:
+def _is_type_name(part: int | str) -> bool:
     """Pydantic puts the types that it tried, too, into a place's path."""
     return isinstance(part, str) and (part in ("float", "str") or "[" in part)
 
 
-def _table(path: list[int | str]) -> str:
+def _table_label(path: list[int | str]) -> str:
     """ "[light] leds.0." of the path to a table; nothing at the top."""
     if not path:
         return ""
@@ -238,28 +250,30 @@ def _table(path: list[int | str]) -> str:
     return head + "".join(f"{part}." for part in rest)
 
 
-def _names(model: Any, path: list[int | str]) -> list[str]:
+def _known_names(model: Any, path: list[int | str]) -> list[str]:
     """The names that the table at a path may have."""
     for part in path:
         if not isinstance(part, int):
-            model = _inner(_hints(model)[part])
-    return list(_hints(model))
+            model = _inner_table_class(_type_hints(model)[part])
+    return list(_type_hints(model))
 
 
-def _hints(model: Any) -> dict[str, Any]:
+def _type_hints(model: Any) -> dict[str, Any]:
     if is_dataclass(model):
         hints = get_type_hints(model)
         return {field.name: hints[field.name] for field in fields(model)}
     return {name: field.annotation for name, field in model.model_fields.items()}
 
 
-def _inner(hint: Any) -> Any:
+def _inner_table_class(hint: Any) -> Any:
     """The table's class in "Led | None" or "tuple[Led, ...]"."""
     if get_origin(hint) in (Union, UnionType, tuple):
-        return next(found for found in map(_inner, get_args(hint)) if found not in (type(None), Ellipsis))
+        return next(
+            found for found in map(_inner_table_class, get_args(hint)) if found not in (type(None), Ellipsis)
+        )
     return hint
 
 
-def _nearest(word: str, known: list[str]) -> str:
+def _suggest_name(word: str, known: list[str]) -> str:
     found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     return f" (did you mean {found[0]}?)" if found else ""

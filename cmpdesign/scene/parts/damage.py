@@ -14,7 +14,7 @@ from cmpdesign.scene.errors import STRICT, SceneError
 
 RGB = tuple[float, float, float]
 Points = NDArray[np.float64]
-ROUND = 48  # sides of a blob
+DISC_POINTS = 48  # sides of a blob
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Blob:
 
     def polygon(self) -> Points:
         """(K, 2) mm."""
-        angle = 2 * np.pi * np.arange(ROUND) / ROUND
+        angle = 2 * np.pi * np.arange(DISC_POINTS) / DISC_POINTS
         return np.asarray(self.centre_mm) + self.radius_mm * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
     def covers(self, xy_mm: Points) -> NDArray[np.bool_]:
@@ -127,7 +127,7 @@ class Damage:
             raise SceneError(f"bleed_mm is {self.bleed_mm:g}; it must be 0 mm or more")
 
 
-def missing(damage: Damage, layout: Layout, rng: np.random.Generator) -> NDArray[np.bool_]:
+def sample_missing_cells(damage: Damage, layout: Layout, rng: np.random.Generator) -> NDArray[np.bool_]:
     """(C,) bool: the cells that fell out.
 
     Raises:
@@ -144,7 +144,7 @@ def missing(damage: Damage, layout: Layout, rng: np.random.Generator) -> NDArray
     return gone
 
 
-def bled(polygons_mm: Points, bleed_mm: float, rng: np.random.Generator) -> Points:
+def bleed_polygons(polygons_mm: Points, bleed_mm: float, rng: np.random.Generator) -> Points:
     """Counter-clockwise polygons (K, n, 2), every side moved outward by a random distance to ``bleed_mm``."""
     along = np.roll(polygons_mm, -1, axis=1) - polygons_mm
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)

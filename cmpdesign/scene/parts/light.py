@@ -56,7 +56,7 @@ class Light:
                 raise SceneError(f"an LED's reach is {led.reach:g}; it must be above 0 half diagonals")
 
 
-def gain(light: Light, size: tuple[int, int]) -> NDArray[np.float32]:
+def light_gain(light: Light, size: tuple[int, int]) -> NDArray[np.float32]:
     """(3, height, width) float32, channels B, G, R, never negative.
 
     The fields vary over many pixels, so they multiply the blurred image.

@@ -58,7 +58,7 @@ class PointSpread:
 
 
 @lru_cache(maxsize=64)
-def point_spread(blur_px: float) -> PointSpread:
+def make_point_spread(blur_px: float) -> PointSpread:
     """The splines' weights for a blur; the box alone where the blur is 0."""
     if blur_px == 0:
         return PointSpread(0, 1, np.ones(1, dtype=np.float32))

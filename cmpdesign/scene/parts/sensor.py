@@ -44,7 +44,7 @@ class Sensor:
             )
 
 
-def expose(
+def expose_sensor(
     sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Planes (3, H, W) in 8-bit units, B, G, R -> the image (H, W, 3)."""
@@ -56,16 +56,16 @@ def expose(
     if sensor.gamma != 1.0:
         light = 255 * np.power(np.maximum(light, 0) / 255, np.float32(sensor.gamma), dtype=np.float32)
     if sensor.bits == 16:
-        return _interleaved(np.clip(np.rint(light * 257), 0, 65535).astype(np.uint16))
-    eight = _interleaved(np.clip(np.rint(light), 0, 255).astype(np.uint8))
-    return eight if sensor.jpeg_quality is None else _jpeg(eight, sensor.jpeg_quality)
+        return _interleave_planes(np.clip(np.rint(light * 257), 0, 65535).astype(np.uint16))
+    eight = _interleave_planes(np.clip(np.rint(light), 0, 255).astype(np.uint8))
+    return eight if sensor.jpeg_quality is None else _jpeg_roundtrip(eight, sensor.jpeg_quality)
 
 
-def _interleaved(planes: NDArray[Depth]) -> NDArray[Depth]:
+def _interleave_planes(planes: NDArray[Depth]) -> NDArray[Depth]:
     return np.ascontiguousarray(planes.transpose(1, 2, 0))
 
 
-def _jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+def _jpeg_roundtrip(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     import cv2
 
     _, coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])

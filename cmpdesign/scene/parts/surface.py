@@ -20,7 +20,9 @@ class Deformation(Protocol):
     def __call__(self, xy_mm: Points, /) -> Points: ...
 
 
-def _from_centre(xy_mm: Points, centre_mm: tuple[float, float], radius_mm: float) -> tuple[Points, Points]:
+def _offsets_and_bell(
+    xy_mm: Points, centre_mm: tuple[float, float], radius_mm: float
+) -> tuple[Points, Points]:
     """Offsets (N, 2) from the centre in units of the radius, and the bell exp(-r^2 / 2) as (N, 1)."""
     offset = (xy_mm - np.asarray(centre_mm, dtype=np.float64)) / radius_mm
     return offset, np.exp(-0.5 * np.sum(offset * offset, axis=1, keepdims=True))
@@ -49,7 +51,7 @@ class Press:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        offset, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        offset, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
         return np.asarray(xy_mm + self.depth_mm * np.exp(0.5) * bell * offset)
 
 
@@ -67,7 +69,7 @@ class Twist:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        offset, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        offset, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
         angle = np.radians(self.angle_deg) * bell[:, 0]
         cos, sin = np.cos(angle), np.sin(angle)
         x, y = offset.T
@@ -89,7 +91,7 @@ class Shear:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        _, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        _, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
         return np.asarray(xy_mm + bell * np.asarray(self.shift_mm))
 
 
@@ -111,7 +113,7 @@ class Dent:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        _, bell = _from_centre(xy_mm, self.centre_mm, self.radius_mm)
+        _, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
         return np.concatenate([xy_mm, -self.depth_mm * bell], axis=1)
 
 
@@ -146,7 +148,7 @@ def require_no_fold(surface: Callable[[Points], Points], xy_mm: Points, step_mm:
     Raises:
         SceneError: the map folds or is not finite somewhere; names the place and the determinant.
     """
-    jacobian = determinant(surface, xy_mm, step_mm)
+    jacobian = jacobian_determinant(surface, xy_mm, step_mm)
     folded = ~(jacobian > 0)  # also catches NaN
     if folded.any():
         worst = int(np.argmin(np.where(np.isnan(jacobian), -np.inf, jacobian)))
@@ -157,7 +159,7 @@ def require_no_fold(surface: Callable[[Points], Points], xy_mm: Points, step_mm:
         )
 
 
-def determinant(mapped: Callable[[Points], Points], xy_mm: Points, step_mm: float) -> Points:
+def jacobian_determinant(mapped: Callable[[Points], Points], xy_mm: Points, step_mm: float) -> Points:
     """(N,) the Jacobian determinant of a map of (N, 2) points to (N, 2), by central differences over ``step_mm``."""
     x_step, y_step = np.array([step_mm, 0.0]), np.array([0.0, step_mm])
     along_x = (mapped(xy_mm + x_step) - mapped(xy_mm - x_step)) / (2 * step_mm)
@@ -165,7 +167,7 @@ def determinant(mapped: Callable[[Points], Points], xy_mm: Points, step_mm: floa
     return np.asarray(along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0])
 
 
-def points_to_check(markers_mm: Points, cells: Sequence[NDArray[np.int32]] | NDArray[np.int32]) -> Points:
+def fold_check_points(markers_mm: Points, cells: Sequence[NDArray[np.int32]] | NDArray[np.int32]) -> Points:
     """Markers, cell centroids and cell sides' midpoints (N, 2) mm: close enough together to catch a fold."""
     corners = markers_mm[np.asarray(cells)]
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))

@@ -8,32 +8,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.localmap.affine_maps import lay_slope
-from extractor.numeric.compilation import compiled, lent
-from extractor.numeric.nearest_points import bucketed, nearest
+from extractor.localmap.affine_maps import fill_linear_map
+from extractor.numeric.compilation import compiled, inlined_no_refcount
+from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
-SHARED = 0.3  # of the shorter edge, between the corners of two triangles at one marker
-MAX_ASIDE = 0.35  # of the way between two neighbours' centers, where each one's triangle expects the other
-MAX_TURNED = (
+MAX_CORNER_DISTANCE = 0.3  # of the shorter edge, between the corners of two triangles at one marker
+MAX_PREDICTED_DISTANCE = (
+    0.35  # of the way between two neighbours' centers, where each one's triangle expects the other
+)
+MAX_MAP_DIFFERENCE = (
     0.5  # of a map's size, between two cells' maps of the layout to the image; turned by a third it is 1.7
 )
-UNTURNED = -2
-CLOSE = 1.6  # of an edge, between the centers of neighbours where a triangle is missing to tell
+TURN_NOT_EVALUATED = -2
+MAX_NEIGHBOUR_DISTANCE = (
+    1.6  # of an edge, between the centers of neighbours where a triangle is missing to tell
+)
 # Along ``lattice.SIX`` a cell and its neighbour share this corner of the cell, and that of the neighbour.
-OWN = np.array([1, 2, 2, 0, 0, 1])
-THEIRS = np.array([0, 0, 1, 1, 2, 2])
+OWN_CORNER = np.array([1, 2, 2, 0, 0, 1])
+NEIGHBOUR_CORNER = np.array([0, 0, 1, 1, 2, 2])
 
 
-@lent
-def edge_of(area):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def equilateral_edge(area):  # type: ignore[no-untyped-def]
     """The edge of an equilateral triangle."""
     return np.sqrt(area * 4.0 / np.sqrt(3.0))
 
 
-@lent
-def own_map(center, corner, i, arms, u, turn, step):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def triangle_map(center, corner, i, arms, u, turn, step):  # type: ignore[no-untyped-def]
     """The image step per layout step, row by row, that carries the arms of the layout's cell u onto cell i's triangle,
-    counted from ``turn``."""
+    counted from ``orientation``."""
     ax, ay, bx, by = arms[u, 0, 0], arms[u, 0, 1], arms[u, 1, 0], arms[u, 1, 1]
     area, after = ax * by - ay * bx, (turn + step) % 3
     px, qx = corner[i, turn, 0] - center[i, 0], corner[i, after, 0] - center[i, 0]
@@ -47,17 +51,19 @@ def own_map(center, corner, i, arms, u, turn, step):  # type: ignore[no-untyped-
 
 
 @compiled
-def touching(center, corner, area, whole, cell, seen_as, plan, step):  # type: ignore[no-untyped-def]
+def corner_neighbours(center, corner, area, whole, cell, seen_as, plan, step):  # type: ignore[no-untyped-def]
     """(N, 6) int32, the whole numbered cells that are a whole numbered cell's neighbours and share that corner with it
     by which they are, or -1; close by where a triangle is missing."""
     out = np.full((cell.shape[0], 6), -1, np.int32)
-    touch(np.ones(cell.shape[0], np.bool_), center, corner, area, whole, cell, seen_as, plan, step, out)
+    update_corner_neighbours(
+        np.ones(cell.shape[0], np.bool_), center, corner, area, whole, cell, seen_as, plan, step, out
+    )
     return out
 
 
 @compiled
-def touch(fresh, center, corner, area, whole, cell, seen_as, plan, step, out):  # type: ignore[no-untyped-def]
-    """Write, in place, what ``fresh`` cells (N,), numbered now, add to what ``touching`` gave."""
+def update_corner_neighbours(fresh, center, corner, area, whole, cell, seen_as, plan, step, out):  # type: ignore[no-untyped-def]
+    """Write, in place, what ``fresh`` cells (N,), numbered now, add to what ``corner_neighbours`` gave."""
     for i in range(cell.shape[0]):
         if cell[i] < 0 or not whole[i]:
             continue
@@ -66,53 +72,55 @@ def touch(fresh, center, corner, area, whole, cell, seen_as, plan, step, out):  
             if v < 0 or seen_as[v] < 0 or not whole[seen_as[v]]:
                 continue
             j = seen_as[v]
-            if (fresh[i] or fresh[j]) and _touch(center, corner, area, i, j, cell[i], v, k, plan, step):
+            if (fresh[i] or fresh[j]) and _has_shared_corner(
+                center, corner, area, i, j, cell[i], v, k, plan, step
+            ):
                 out[i, k], out[j, k + 3] = j, i
 
 
-@lent
-def _touch(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _has_shared_corner(center, corner, area, i, j, u, v, k, plan, step):  # type: ignore[no-untyped-def]
     """Whether cells i and j, if they are the layout's u and its neighbour v along k, touch as these do."""
-    edge = edge_of(min(area[i], area[j]))
+    edge = equilateral_edge(min(area[i], area[j]))
     if np.isnan(corner[i, 0, 0]) or np.isnan(corner[j, 0, 0]):
         x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
-        return x * x + y * y < (CLOSE * edge) ** 2
-    limit = (SHARED * edge) ** 2
+        return x * x + y * y < (MAX_NEIGHBOUR_DISTANCE * edge) ** 2
+    limit = (MAX_CORNER_DISTANCE * edge) ** 2
     for a in range(3):
         for b in range(3):
             x, y = corner[j, b, 0] - corner[i, a, 0], corner[j, b, 1] - corner[i, a, 1]
             if x * x + y * y < limit:
-                here, there = (a + 6 - step * OWN[k]) % 3, (b + 6 - step * THEIRS[k]) % 3
-                if _leads(center, corner, i, j, u, v, here, plan, step) and _leads(
-                    center, corner, j, i, v, u, there, plan, step
-                ):
+                here, there = (a + 6 - step * OWN_CORNER[k]) % 3, (b + 6 - step * NEIGHBOUR_CORNER[k]) % 3
+                if _is_neighbour_predicted(
+                    center, corner, i, j, u, v, here, plan, step
+                ) and _is_neighbour_predicted(center, corner, j, i, v, u, there, plan, step):
                     return True
     return False
 
 
-@lent
-def _leads(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _is_neighbour_predicted(center, corner, i, j, u, v, turn, plan, step):  # type: ignore[no-untyped-def]
     """Whether cell i's triangle, counted from its turn, carries the way from u to v in the layout near cell j."""
-    a, b, c, d = own_map(center, corner, i, plan.arms_mm, u, turn, step)
+    a, b, c, d = triangle_map(center, corner, i, plan.corner_vectors_mm, u, turn, step)
     x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
     way_x, way_y = (
         plan.center_mm[v, 0] - plan.center_mm[u, 0],
         plan.center_mm[v, 1] - plan.center_mm[u, 1],
     )
     aside_x, aside_y = a * way_x + b * way_y - x, c * way_x + d * way_y - y
-    return aside_x * aside_x + aside_y * aside_y < MAX_ASIDE**2 * (x * x + y * y)
+    return aside_x * aside_x + aside_y * aside_y < MAX_PREDICTED_DISTANCE**2 * (x * x + y * y)
 
 
-@lent
-def turn_like(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_map_by_similarity(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no-untyped-def]
     """From which corner the triangle of cell i, the layout's u, is counted for its map, written to ``out``, to be like
     the wanted one; -1 where none is, or it has none."""
     if np.isnan(corner[i, 0, 0]) or np.isnan(wanted[0, 0]):
         return -1
     w0, w1, w2, w3 = wanted[0, 0], wanted[0, 1], wanted[1, 0], wanted[1, 1]
-    best, found = MAX_TURNED * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + w3 * w3), -1
+    best, found = MAX_MAP_DIFFERENCE * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + w3 * w3), -1
     for turn in range(3):
-        a, b, c, d = own_map(center, corner, i, arms, u, turn, step)
+        a, b, c, d = triangle_map(center, corner, i, arms, u, turn, step)
         apart = np.sqrt((a - w0) ** 2 + (b - w1) ** 2 + (c - w2) ** 2 + (d - w3) ** 2)
         if apart < best:
             best, found = apart, turn
@@ -120,21 +128,24 @@ def turn_like(center, corner, i, arms, u, step, wanted, out):  # type: ignore[no
     return found
 
 
-@lent
-def turn_beside(center, corner, i, u, seen, plan, step, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_map_by_neighbours(center, corner, i, u, seen, plan, step, out):  # type: ignore[no-untyped-def]
     """From which corner the triangle of cell i, the layout's u, is counted by the cells ``seen`` (U,) around it; its
     map is written to ``out``."""
-    lay_slope(i, center, u, seen, plan.center_mm, plan.beside, out)
-    return turn_like(center, corner, i, plan.arms_mm, u, step, out, out)
+    fill_linear_map(i, center, u, seen, plan.center_mm, plan.beside, out)
+    return fill_map_by_similarity(center, corner, i, plan.corner_vectors_mm, u, step, out, out)
 
 
 @compiled
-def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh, plan, step):  # type: ignore[no-untyped-def]
+def update_numbers_by_contact(  # type: ignore[no-untyped-def]
+    center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh, plan, step
+):
     """Number, in place, the loose whole cells that touch numbered ones, the cells that touch these, and so on.
 
     Args:
         loose: the cells without a number that have a triangle. fresh: the numbered ones to begin at.
-        turn: (N,) from which corner each numbered cell's triangle is counted, -1 unknown, ``UNTURNED`` before it is
+        turn: (N,) from which corner each numbered cell's triangle is counted, -1 unknown, ``TURN_NOT_EVALUATED``
+            before it is
             asked; maps: (N, 2, 2), by it. seen: (U,) the cells of the image by which it is asked.
 
     Returns:
@@ -144,9 +155,9 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh
     begin, end = 0, 0
     if loose.shape[0] > 0:
         for i in fresh:
-            if _beside_free(plan.beside, cell[i], free):
-                if turn[i] == UNTURNED:
-                    turn[i] = turn_beside(center, corner, i, cell[i], seen, plan, step, maps[i])
+            if _has_free_neighbour(plan.beside, cell[i], free):
+                if turn[i] == TURN_NOT_EVALUATED:
+                    turn[i] = fill_map_by_neighbours(center, corner, i, cell[i], seen, plan, step, maps[i])
                 if turn[i] >= 0:
                     queue[end] = i
                     end += 1
@@ -154,7 +165,7 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh
     if end == 0:
         return queue[:0]
     xy = center[loose]
-    grid = bucketed(xy)
+    grid = bucket_grid(xy)
     index, square = np.empty(2, np.int32), np.empty(2)
     while begin < end:
         i = queue[begin]
@@ -167,17 +178,17 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh
             x, y = plan.center_mm[v, 0] - plan.center_mm[u, 0], plan.center_mm[v, 1] - plan.center_mm[u, 1]
             px = center[i, 0] + maps[i, 0, 0] * x + maps[i, 0, 1] * y
             py = center[i, 1] + maps[i, 1, 0] * x + maps[i, 1, 1] * y
-            for n in range(nearest(xy, grid, px, py, index, square)):
+            for n in range(fill_nearest_points(xy, grid, px, py, index, square)):
                 j = loose[index[n]]
                 if cell[j] >= 0 or ink[j] != plan.ink[v]:
                     continue
                 way2 = (center[j, 0] - center[i, 0]) ** 2 + (center[j, 1] - center[i, 1]) ** 2
-                if square[n] > MAX_ASIDE**2 * way2:
+                if square[n] > MAX_PREDICTED_DISTANCE**2 * way2:
                     continue
-                turned = _turn_beside(center, corner, area, i, j, u, v, k, turn[i], plan, step)
+                turned = _turn_at_shared_corner(center, corner, area, i, j, u, v, k, turn[i], plan, step)
                 if turned >= 0:
                     cell[j], free[v], turn[j] = v, False, turned
-                    a, b, c, d = own_map(center, corner, j, plan.arms_mm, v, turned, step)
+                    a, b, c, d = triangle_map(center, corner, j, plan.corner_vectors_mm, v, turned, step)
                     maps[j, 0, 0], maps[j, 0, 1], maps[j, 1, 0], maps[j, 1, 1] = a, b, c, d
                     queue[end] = j
                     end += 1
@@ -185,8 +196,8 @@ def spread(center, corner, area, ink, loose, cell, free, turn, maps, seen, fresh
     return queue[first:end]
 
 
-@lent
-def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _has_free_neighbour(beside, u, free):  # type: ignore[no-untyped-def]
     """Whether a place of the layout beside u is free."""
     for k in range(6):
         v = beside[u, k]
@@ -195,15 +206,18 @@ def _beside_free(beside, u, free):  # type: ignore[no-untyped-def]
     return False
 
 
-@lent
-def _turn_beside(center, corner, area, i, j, u, v, k, turn, plan, step):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _turn_at_shared_corner(center, corner, area, i, j, u, v, k, turn, plan, step):  # type: ignore[no-untyped-def]
     """From which corner cell j's triangle is counted if it is v, the neighbour along k of u, which is cell i counted
-    from ``turn``; -1 where it does not touch as v does."""
-    at, limit = (turn + step * OWN[k]) % 3, (SHARED * edge_of(min(area[i], area[j]))) ** 2
+    from ``orientation``; -1 where it does not touch as v does."""
+    at, limit = (
+        (turn + step * OWN_CORNER[k]) % 3,
+        (MAX_CORNER_DISTANCE * equilateral_edge(min(area[i], area[j]))) ** 2,
+    )
     for c in range(3):
         x, y = corner[j, c, 0] - corner[i, at, 0], corner[j, c, 1] - corner[i, at, 1]
         if x * x + y * y <= limit:
-            turned = (c + 6 - step * THEIRS[k]) % 3
-            if _leads(center, corner, j, i, v, u, turned, plan, step):
+            turned = (c + 6 - step * NEIGHBOUR_CORNER[k]) % 3
+            if _is_neighbour_predicted(center, corner, j, i, v, u, turned, plan, step):
                 return turned
     return -1

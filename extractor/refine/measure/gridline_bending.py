@@ -7,7 +7,8 @@ their gridlines are 0 where the map is quadratic. A gridline then deviates from 
     t (1 - t) (b + s (1 - 2 t)),
 
 t along its chord, b and s of zero mean and a deviation that is a share of these differences. How large a share, from
-``SMOOTH`` to ``FREE``, the gridlines around say: by how much more they are bent than noise explains. Both unknowns are
+``MIN_BEND_SHARE`` to ``MAX_BEND_SHARE``, the gridlines around say: by how much more they are bent than noise
+explains. Both unknowns are
 eliminated from a gridline's sums before the markers are solved, and follow afterwards.
 """
 
@@ -30,8 +31,8 @@ from extractor.refine.synthesis.residual_kernel import (
     CD,
     DD,
     MISFIT,
-    SEEN_A,
-    SEEN_B,
+    READ_AA,
+    READ_BB,
     SHARE_C,
     SHARE_D,
     C,
@@ -40,53 +41,62 @@ from extractor.refine.synthesis.residual_kernel import (
 
 # From the surfaces under balls that press, shear and twist: b and s over the differences around them (RMS) where these
 # are smooth, and at most; and what is left to move a gridline's ends, in deviations of b and s.
-SMOOTH, FREE = 0.01, 0.25
-HIDDEN = 0.08
-MAX_FREE = 0.06  # in units of the gridline's length
+MIN_BEND_SHARE, MAX_BEND_SHARE = 0.01, 0.25
+BEND_TO_END_SHIFT = 0.08
+MAX_BEND_DEVIATION = 0.06  # in units of the gridline's length
 # The noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its scatter.
-OF_NOISE = 2 * 20 * 2.0
-OF_MEDIAN = 2.0  # a mean of squares against their median
-PARDON = 25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
-MAX_PARDON = 0.1
-SEEN, LANES = 6 * (1 + FIRST_RING), 64  # third differences around a marker at most, and markers at once
-SURE = 3.0  # standard deviations that bending must exceed its noise by
+THIRD_DIFFERENCE_NOISE = 2 * 20 * 2.0
+MEAN_OVER_MEDIAN = 2.0  # a mean of squares against their median
+MISFIT_TOLERANCE = (
+    25.0  # five standard deviations of that, squared; and at most, in units of the blur, squared
+)
+MAX_MISFIT_TOLERANCE = 0.1
+MAX_DIFFERENCES, LANES = (
+    6 * (1 + FIRST_RING),
+    64,
+)  # third differences around a marker at most, and markers at once
+MIN_SIGNIFICANCE = 3.0  # standard deviations that bending must exceed its noise by
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
 @inlined
-def _order(low, high):  # type: ignore[no-untyped-def]
+def _update_ordered_pairs(low, high):  # type: ignore[no-untyped-def]
     """Swap what stands the wrong way round."""
     for k in range(low.shape[0]):
         low[k], high[k] = min(low[k], high[k]), max(low[k], high[k])
 
 
 @compiled
-def _sort_lanes(column):  # type: ignore[no-untyped-def]
-    """Sort ``SEEN`` rows of ``LANES`` numbers, each lane by itself: Batcher's odd-even merge sort, which compares the
+def _update_sorted_lanes(column):  # type: ignore[no-untyped-def]
+    """Sort ``MAX_DIFFERENCES`` rows of ``LANES`` numbers, each lane by itself: Batcher's odd-even merge sort, which
+    compares the
     same rows whatever they hold."""
     size = 1
-    while size < SEEN:
+    while size < MAX_DIFFERENCES:
         step = size
         while step >= 1:
-            for low in range(step % size, SEEN - step, 2 * step):
+            for low in range(step % size, MAX_DIFFERENCES - step, 2 * step):
                 high = low + step
                 if low // (2 * size) == high // (2 * size):
-                    end = min(high + step, SEEN)
-                    _order(column[low * LANES : (end - step) * LANES], column[high * LANES : end * LANES])
+                    end = min(high + step, MAX_DIFFERENCES)
+                    _update_ordered_pairs(
+                        column[low * LANES : (end - step) * LANES], column[high * LANES : end * LANES]
+                    )
             step //= 2
         size *= 2
 
 
 @compiled
-def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # type: ignore[no-untyped-def]
-    """(M,) px^2: how rough the markers are around each of ``which`` (M,) bool, from the squared third differences along
+def measure_roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # type: ignore[no-untyped-def]
+    """(M,) px^2: how rough the markers are around each of ``gridlines`` (M,) bool, from the squared third
+    differences along
     the gridlines at it and at its neighbours, less what their noise and the layout itself explain; 0 elsewhere.
 
     Their median: one marker that dirt has moved does not make its gridlines free to follow it.
     """
-    square = _third_differences(xy, maps, edges, ahead, third)
+    square = _squared_third_differences(xy, maps, edges, ahead, third)
     # what is hardly trusted where it bends must not be taken for noise
-    noise = OF_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
+    noise = THIRD_DIFFERENCE_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
     own, known, above = np.full(spokes.shape, np.nan), np.zeros(len(spokes)), np.zeros(len(spokes))
     for m in range(spokes.shape[0]):
         for k in range(spokes.shape[1]):
@@ -94,8 +104,8 @@ def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # 
             if e >= 0 and square[e] >= 0.0:  # not where it is not known
                 own[m, k] = square[e]
                 known[m] += 1.0
-                above[m] += 1.0 if OF_MEDIAN * square[e] > noise else 0.0
-    out, column, marker = np.zeros(len(spokes)), np.zeros(SEEN * LANES), np.empty(LANES, np.int64)
+                above[m] += 1.0 if MEAN_OVER_MEDIAN * square[e] > noise else 0.0
+    out, column, marker = np.zeros(len(spokes)), np.zeros(MAX_DIFFERENCES * LANES), np.empty(LANES, np.int64)
     odd = np.empty(LANES, np.bool_)
     filled = 0
     for m in range(spokes.shape[0]):
@@ -106,21 +116,24 @@ def roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # 
                 count += known[n]
                 over += above[n]
         if which[m] and 2.0 * over > count:
-            _lay_around(m, own, near, column[filled:])
+            _fill_lane(m, own, near, column[filled:])
             marker[filled], odd[filled] = m, count % 2.0 == 1.0
             filled += 1
         if filled == LANES or (filled > 0 and m == spokes.shape[0] - 1):
-            _sort_lanes(column)
+            _update_sorted_lanes(column)
             for k in range(filled):
-                lower, upper = column[(SEEN // 2 - 1) * LANES + k], column[SEEN // 2 * LANES + k]
+                lower, upper = (
+                    column[(MAX_DIFFERENCES // 2 - 1) * LANES + k],
+                    column[MAX_DIFFERENCES // 2 * LANES + k],
+                )
                 middle = upper if odd[k] else 0.5 * (lower + upper)
-                out[marker[k]] = max(OF_MEDIAN * middle - noise, 0.0)
+                out[marker[k]] = max(MEAN_OVER_MEDIAN * middle - noise, 0.0)
             filled = 0
     return out
 
 
 @compiled
-def _lay_around(m, own, near, column):  # type: ignore[no-untyped-def]
+def _fill_lane(m, own, near, column):  # type: ignore[no-untyped-def]
     """Lay the third differences at marker m and around it into a lane."""
     missing = 0
     for k in range(-1, FIRST_RING):
@@ -136,7 +149,7 @@ def _lay_around(m, own, near, column):  # type: ignore[no-untyped-def]
 
 @compiled
 def third_difference(xy, maps, edges, ahead, third, e):  # type: ignore[no-untyped-def]
-    """px, of the four markers along edge e, less the layout's own (``third``)."""
+    """px, of the four markers along edge e, less the layout's own (``third_differences``)."""
     a, b, p, q = edges[e, 0], edges[e, 1], ahead[e, 0], ahead[e, 1]
     u, v = 0.5 * third[e, 0], 0.5 * third[e, 1]
     x = xy[p, 0] - xy[q, 0] + 3.0 * (xy[b, 0] - xy[a, 0])
@@ -147,7 +160,7 @@ def third_difference(xy, maps, edges, ahead, third, e):  # type: ignore[no-untyp
 
 
 @compiled
-def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untyped-def]
+def _squared_third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untyped-def]
     """(E,) squared, px^2, NaN where one of the four markers is not known."""
     out = np.full(edges.shape[0], np.nan)
     for e in range(edges.shape[0]):
@@ -158,7 +171,7 @@ def _third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untype
 
 
 @compiled
-def bending_ones(rough, bend, edges):  # type: ignore[no-untyped-def]
+def bending_gridlines(rough, bend, edges):  # type: ignore[no-untyped-def]
     """(E,) bool, the gridlines that bend (E, 2), or with an end that is rough (M,)."""
     out = np.empty(edges.shape[0], np.bool_)
     for e in range(edges.shape[0]):
@@ -168,7 +181,7 @@ def bending_ones(rough, bend, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
+def estimate_bend_variance(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
     """(E,) px^2, the variance of b and s, by what the gridlines around show, as far as they are in use (E,), and by how
     rough (M,) their ends are."""
     count = rough.shape[0]
@@ -195,23 +208,24 @@ def freedom(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  #
         seen = known[i] + known[j]
         if square > 0.0 and seen > 0.0:
             noise = (of_noise[i] + of_noise[j]) / seen
-            shown = (total[i] + total[j]) / seen - noise * (1.0 + SURE * np.sqrt(2.0 / seen))
-            most = min(FREE**2 * square, (MAX_FREE * lines[e, LENGTH]) ** 2)
-            out[e] = min(max(shown, SMOOTH**2 * square), most)
+            shown = (total[i] + total[j]) / seen - noise * (1.0 + MIN_SIGNIFICANCE * np.sqrt(2.0 / seen))
+            most = min(MAX_BEND_SHARE**2 * square, (MAX_BEND_DEVIATION * lines[e, LENGTH]) ** 2)
+            out[e] = min(max(shown, MIN_BEND_SHARE**2 * square), most)
     return out
 
 
 @compiled
-def eliminate(sums, to_a, to_b, off, bend, loose, variance):  # type: ignore[no-untyped-def]
+def update_without_bending(sums, to_a, to_b, off, bend, loose, variance):  # type: ignore[no-untyped-def]
     """Take what bending explains out of the gridlines' sums and votes, in place; (E, 6) what their bending is: by
     itself, and against a shift of the start and of the end towards the normal.
 
-    ``off`` (E,) is as ``votes`` gives it, 0 where levels do not change; ``loose`` as ``freedom`` does.
+    ``level_shift`` (E,) is as ``votes`` gives it, 0 where levels do not change; ``bend_variance`` as
+    ``estimate_bend_variance`` does.
     """
     kept = np.zeros((sums.shape[0], 6))
     k = np.empty((2, 2))
     for e in range(sums.shape[0]):
-        sums[e, SEEN_A], sums[e, SEEN_B] = sums[e, AA], sums[e, BB]
+        sums[e, READ_AA], sums[e, READ_BB] = sums[e, AA], sums[e, BB]
         if sums[e, AA] == 0.0:
             continue
         c = sums[e, C] - off[e] * sums[e, SHARE_C]
@@ -239,7 +253,7 @@ def eliminate(sums, to_a, to_b, off, bend, loose, variance):  # type: ignore[no-
 
 
 @compiled
-def bent(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
+def bend_after_shift(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
     """(E, 2) b and s after the markers were shifted (M, 2)."""
     out = np.zeros_like(bend)
     for e in range(bend.shape[0]):
@@ -256,20 +270,23 @@ def bent(bend, kept, shift, lines, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hidden_misfit(loose, contrasts, sigma):  # type: ignore[no-untyped-def]
+def bending_misfit(loose, contrasts, sigma):  # type: ignore[no-untyped-def]
     """(E,) the mean squared residual, one channel, that the gridlines' places off the fitted curve may make."""
     out = np.empty(loose.shape[0])
     for e in range(loose.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         # of the squared normal density, over BAND to both sides
         share = strength / (3.0 * sigma * sigma) / (4.0 * BAND * np.sqrt(np.pi))
-        out[e] = min(PARDON * HIDDEN**2 * loose[e], MAX_PARDON * sigma * sigma) * share
+        out[e] = (
+            min(MISFIT_TOLERANCE * BEND_TO_END_SHIFT**2 * loose[e], MAX_MISFIT_TOLERANCE * sigma * sigma)
+            * share
+        )
     return out
 
 
 @compiled
-def around(loose, spokes):  # type: ignore[no-untyped-def]
-    """(M,) px^2, the mean of ``loose`` (E,) over the gridlines at each marker."""
+def mean_at_markers(loose, spokes):  # type: ignore[no-untyped-def]
+    """(M,) px^2, the mean of ``bend_variance`` (E,) over the gridlines at each marker."""
     out = np.zeros(spokes.shape[0])
     for m in range(spokes.shape[0]):
         known = 0

@@ -8,29 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, vectorized
-from extractor.refine.measure.gridline_weights import TRUSTED
+from extractor.refine.measure.gridline_weights import MIN_OFFSET_WEIGHT
 from extractor.refine.measure.matched_filter import HALF, I1, I2, I3, I4, I5
-from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, bow
+from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, sagitta
 from extractor.refine.synthesis.pixel_rows import (
     ALONG,
     ASIDE,
     CHUNK,
     TO,
-    gather,
-    lanes_of,
-    lay_rows,
+    fill_projections,
+    fill_rows,
+    padded_count,
     row_sizes,
 )
 from extractor.refine.synthesis.residual_kernel import C0, C1, C2, C3, C4, C5
 
 BAND = 2.2  # how far from a gridline its pixels count, in units of the blur
 CLEAR_SIGMA = 2.0  # how far the next gridline must be where nothing was drawn, in units of the blur
-MIN_VOTES = 0.08  # of a pixel on the gridline
+MIN_WEIGHT_SUM = 0.08  # of a pixel on the gridline
 OFFSET, VARIANCE = range(2)
-AT_PLACE, PULL, SQUARE = (k * CHUNK for k in range(3))  # of pixels
+STATION, WEIGHTED_RESIDUAL, SQUARED_WEIGHT = (k * CHUNK for k in range(3))  # of pixels
 
 
-class Reading(NamedTuple):
+class GridlineReading(NamedTuple):
     """Along what gridlines, and beside which colors, refinement last compared the image with the pattern.
 
     Attributes:
@@ -49,16 +49,16 @@ class Reading(NamedTuple):
     lines: NDArray[np.float64]
     contrasts: NDArray[np.float64]
     foot: NDArray[np.float64]
-    room: NDArray[np.float64]
-    use: NDArray[np.float64]
-    aside: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    dot_gain_offset: NDArray[np.float64]
     sigma: float
     noise: float
     drawn: bool
 
 
 @compiled
-def foot_of(contrasts, black, off):  # type: ignore[no-untyped-def]
+def foot_levels(contrasts, black, off):  # type: ignore[no-untyped-def]
     """(E,) black (E, 3) and half of a change of the sides' levels (E,), in units of the contrast."""
     out = np.zeros(contrasts.shape[0])
     for e in range(contrasts.shape[0]):
@@ -71,7 +71,7 @@ def foot_of(contrasts, black, off):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _weigh(  # type: ignore[no-untyped-def]
+def _fill_weighted_residuals(  # type: ignore[no-untyped-def]
     rows, lanes, wide, du, dv, inverse, short, length, leave, arrive, step_seen, places, rest, under, votes
 ):
     """Fill in each pixel's place along the gridline in units of those between virtual markers, its weight times what it
@@ -89,26 +89,29 @@ def _weigh(  # type: ignore[no-untyped-def]
             g = g if within else zero
             half = HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
             half = half if within else zero  # the polynomial may be anything beyond
-            out[AT_PLACE + i] = np.floor(t * places - HALF)
-            out[PULL + i], out[SQUARE + i] = g * (own[i] - below[i] - step_seen * half), g * g
+            out[STATION + i] = np.floor(t * places - HALF)
+            out[WEIGHTED_RESIDUAL + i], out[SQUARED_WEIGHT + i] = (
+                g * (own[i] - below[i] - step_seen * half),
+                g * g,
+            )
 
 
 @vectorized
-def _sum_at(votes, count, place):  # type: ignore[no-untyped-def]
+def _sums_at_station(votes, count, place):  # type: ignore[no-untyped-def]
     """The sums of the weighed residuals and of the squared weights of the pixels at a place."""
     zero = np.float32(0.0)
     pull, weight = zero, zero
     for k in range(count):
-        here = votes[AT_PLACE + k] == place
-        pull += votes[PULL + k] if here else zero
-        weight += votes[SQUARE + k] if here else zero
+        here = votes[STATION + k] == place
+        pull += votes[WEIGHTED_RESIDUAL + k] if here else zero
+        weight += votes[SQUARED_WEIGHT + k] if here else zero
     return pull, weight
 
 
 @compiled
-def read_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, noise, drawn, count):  # type: ignore[no-untyped-def]
+def measure_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, noise, drawn, count):  # type: ignore[no-untyped-def]
     """(E, m, 2): how far each gridline lies off towards (-uy, ux) around its virtual markers, beyond what it is seen
-    ``aside`` (E,), px, and the variance.
+    ``dot_gain_offset`` (E,), px, and the variance.
 
     NaN where the gridline has no contrast, is not trusted, leaves the image, or where another one is too near for what
     was not drawn.
@@ -126,7 +129,7 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, 
     sums = np.zeros((count, 2))
     for e in range(lines.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
-        if lines[e, KNOWN] == 0.0 or strength == 0.0 or use[e] < TRUSTED:
+        if lines[e, KNOWN] == 0.0 or strength == 0.0 or use[e] < MIN_OFFSET_WEIGHT:
             continue
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         x0, y0, leave, arrive = lines[e, X], lines[e, Y], lines[e, LEAVE], lines[e, ARRIVE]
@@ -155,17 +158,17 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, 
         sums[:] = 0.0
         for begin in range(first, last + 1, most):
             own = min(most, last + 1 - begin)
-            lay_rows(begin, 1, own, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
-            gather(flat, at, own, wide, step_q, color, np.float32(foot[e]), rest)
+            fill_rows(begin, 1, own, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
+            fill_projections(flat, at, own, wide, step_q, color, np.float32(foot[e]), rest)
             if drawn:
-                gather(shown, at, own, wide, step_q, color, nothing, under)
-            _weigh(rows, lanes_of(own), wide, *steps, *shape, rest, under, votes)
+                fill_projections(shown, at, own, wide, step_q, color, nothing, under)
+            _fill_weighted_residuals(rows, padded_count(own), wide, *steps, *shape, rest, under, votes)
             for j in range(count):
-                pull, weight = _sum_at(votes, lanes_of(own) * wide, np.float32(j))
+                pull, weight = _sums_at_station(votes, padded_count(own) * wide, np.float32(j))
                 sums[j, 0] += pull
                 sums[j, 1] += weight
         for j in range(count):
-            if sums[j, 1] < MIN_VOTES:
+            if sums[j, 1] < MIN_WEIGHT_SUM:
                 continue
             if not drawn:
                 near, far = (j + 0.5) / places, (count - j - 0.5) / places
@@ -176,19 +179,19 @@ def read_offsets(image, model, lines, contrasts, foot, room, use, aside, sigma, 
     return out
 
 
-def measure(
-    image: NDArray[np.uint8], model: NDArray[np.float32], reading: Reading, count: int, scale: int
+def measure_virtual_markers(
+    image: NDArray[np.uint8], model: NDArray[np.float32], reading: GridlineReading, count: int, scale: int
 ) -> NDArray[np.float64]:
     """(E, m, 3): points on the gridlines as they were read, moved to where the image shows them, and their variances
     across, at the full scale of an image that was reduced by ``scale``; NaN where there are none."""
     if count == 0:
         return np.empty((len(reading.lines), 0, 3))
-    offsets = read_offsets(image, model, *reading, count)
-    return np.asarray(_points(reading.lines, offsets, scale))
+    offsets = measure_offsets(image, model, *reading, count)
+    return np.asarray(_virtual_markers(reading.lines, offsets, scale))
 
 
 @compiled
-def _points(lines, offsets, scale):  # type: ignore[no-untyped-def]
+def _virtual_markers(lines, offsets, scale):  # type: ignore[no-untyped-def]
     """(E, m, 3) the measured points and their variance across the gridline."""
     edges, count = offsets.shape[0], offsets.shape[1]
     out = np.full((edges, count, 3), np.nan)
@@ -196,7 +199,7 @@ def _points(lines, offsets, scale):  # type: ignore[no-untyped-def]
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         for j in range(count):
             t = (j + 1.0) / (count + 1.0)
-            off = bow(t, length, lines[e, LEAVE], lines[e, ARRIVE]) + offsets[e, j, OFFSET]
+            off = sagitta(t, length, lines[e, LEAVE], lines[e, ARRIVE]) + offsets[e, j, OFFSET]
             out[e, j, 0] = (lines[e, X] + t * length * ux - off * uy + 0.5) * scale - 0.5
             out[e, j, 1] = (lines[e, Y] + t * length * uy + off * ux + 0.5) * scale - 0.5
             out[e, j, 2] = offsets[e, j, VARIANCE] * scale * scale

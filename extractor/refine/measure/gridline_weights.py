@@ -6,7 +6,7 @@ import numpy as np
 
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY, X, Y
-from extractor.refine.synthesis.ink_levels import monomials
+from extractor.refine.synthesis.ink_levels import fill_monomials
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
@@ -15,29 +15,32 @@ from extractor.refine.synthesis.residual_kernel import (
     BLUR_CURVATURE,
     MISFIT,
     PIXELS,
-    SEEN_A,
-    SEEN_B,
+    READ_AA,
+    READ_BB,
     SHARE_A,
     SHARE_B,
     A,
     B,
 )
 
-SHORTEST = 100  # one in so many gridlines is shorter than what is called a short edge
+SHORTEST_RARITY = 100  # one in so many gridlines is shorter than what is called a short edge
 MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
-PRIOR_BEYOND_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
-WEAK = 0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
-RIM_PX = 0.05  # pattern's rim, unless believed and known so well: there the map through those on one side knows less
-MOSTLY_SOUND = 0.68  # of the gridlines look as the pattern does, where their noise is that of all
-TRUSTED = 0.4  # of a gridline, for its places to be measured
-BELIEVED = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
+PRIOR_HIDDEN_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
+MIN_INFORMATION_SHARE = (
+    0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
+)
+# pattern's rim, unless believed and known so well: there the map through those on one side knows less
+RIM_DEVIATION_PX = 0.05
+MIN_CLEAN_SHARE = 0.68  # of the gridlines look as the pattern does, where their noise is that of all
+MIN_OFFSET_WEIGHT = 0.4  # of a gridline, for its places to be measured
+MIN_MARKER_WEIGHT = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
 # An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
 # normal density and N its integral.
 CONTRAST_TO_BLUR = 1.79
 
 
 @compiled
-def middles(lines):  # type: ignore[no-untyped-def]
+def chord_midpoints(lines):  # type: ignore[no-untyped-def]
     """(E, 2) the middle of each gridline's chord."""
     out = np.empty((lines.shape[0], 2))
     for e in range(lines.shape[0]):
@@ -47,7 +50,7 @@ def middles(lines):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
+def shift_gradients(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
     """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them; and
     the change of the levels of both sides together, times the contrast.
 
@@ -59,7 +62,7 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
     for e in range(count):
         if sums[e, AA] == 0.0:
             continue
-        monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
+        fill_monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
         for channel in range(3):
             change = 0.0
             for k in range(terms.shape[0]):
@@ -74,9 +77,9 @@ def votes(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0
 
 
 @compiled
-def misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
+def gridline_misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
     """(E,) the mean squared residual of gridlines once they are moved, a place; NaN where there are no more than
-    ``least`` places, each of which adds so many ``values``."""
+    ``min_places`` places, each of which adds so many ``values``."""
     out = np.full(sums.shape[0], np.nan)
     for e in range(sums.shape[0]):
         if sums[e, PIXELS] <= least:
@@ -89,9 +92,10 @@ def misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def weighed(sums, misfit, usual, pardon, values, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines whose ``misfit`` (E,) is not more than the ``usual`` one may be by chance, or their
-    ``pardon`` (E,); ``unjudged`` for what was read but has none."""
+def misfit_weights(sums, misfit, usual, pardon, values, unjudged):  # type: ignore[no-untyped-def]
+    """(E,) weights, 1 for gridlines whose ``misfit`` (E,) is not more than the ``median_misfit`` one may be by
+    chance, or their
+    ``pardon`` (E,); ``default_weight`` for what was read but has none."""
     use = np.zeros(sums.shape[0])
     for e in range(sums.shape[0]):
         if np.isfinite(misfit[e]):
@@ -103,38 +107,42 @@ def weighed(sums, misfit, usual, pardon, values, unjudged):  # type: ignore[no-u
 
 
 @compiled
-def usual_misfit(misfit):  # type: ignore[no-untyped-def]
+def median_of_misfits(misfit):  # type: ignore[no-untyped-def]
     """The median of those that were judged; NaN where none was."""
     judged = misfit[np.isfinite(misfit)]
     return max(np.median(judged), MIN_NOISE**2) if judged.shape[0] > 0 else np.nan
 
 
 @compiled
-def _noise_of(misfit, use, usual):  # type: ignore[no-untyped-def]
-    """The noise by the gridlines' misfit (E,), the ``usual`` one, and how far they are in ``use`` (E,); NaN where none
+def _noise_from_misfits(misfit, use, usual):  # type: ignore[no-untyped-def]
+    """The noise by the gridlines' misfit (E,), the ``median_misfit`` one, and how far they are in ``weight`` (E,);
+    NaN where none
     was judged."""
     sound = misfit[use == 1.0]
-    if 0 < sound.shape[0] < MOSTLY_SOUND * np.count_nonzero(np.isfinite(misfit)):  # what is dirty is no noise
+    if (
+        0 < sound.shape[0] < MIN_CLEAN_SHARE * np.count_nonzero(np.isfinite(misfit))
+    ):  # what is dirty is no noise
         return np.sqrt(max(np.median(sound), MIN_NOISE**2))
     return np.sqrt(usual)
 
 
 @compiled
-def trust(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
+def weigh_gridlines(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; their usual misfit, and
     the noise (NaN where nothing was read).
 
-    Each of a gridline's places adds so many ``values``; one with no more than ``least`` places gets ``unjudged``; a
+    Each of a gridline's places adds so many ``values``; one with no more than ``min_places`` places gets
+    ``default_weight``; a
     misfit of less than its ``pardon`` (E,) is always forgiven.
     """
-    misfit = misfits(sums, to_a, to_b, values, least)
-    usual = usual_misfit(misfit)
-    use = weighed(sums, misfit, usual, pardon, values, unjudged)
-    return use, usual, _noise_of(misfit, use, usual)
+    misfit = gridline_misfits(sums, to_a, to_b, values, least)
+    usual = median_of_misfits(misfit)
+    use = misfit_weights(sums, misfit, usual, pardon, values, unjudged)
+    return use, usual, _noise_from_misfits(misfit, use, usual)
 
 
 @compiled
-def _believed(use, spokes, m):  # type: ignore[no-untyped-def]
+def _is_well_weighted(use, spokes, m):  # type: ignore[no-untyped-def]
     """Whether enough of the gridlines that end at a marker are trusted."""
     total, count = 0.0, 0
     for k in range(spokes.shape[1]):
@@ -142,21 +150,22 @@ def _believed(use, spokes, m):  # type: ignore[no-untyped-def]
         if e >= 0:
             total += use[e]
             count += 1
-    return total > BELIEVED * count
+    return total > MIN_MARKER_WEIGHT * count
 
 
 @compiled
-def trusted_markers(use, spokes):  # type: ignore[no-untyped-def]
+def well_weighted_markers(use, spokes):  # type: ignore[no-untyped-def]
     """(M,) bool: enough of the gridlines that end there are trusted."""
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
-        out[m] = _believed(use, spokes, m)
+        out[m] = _is_well_weighted(use, spokes, m)
     return out
 
 
 @compiled
 def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
-    """The lengths in px that all gridlines exceed but for one in ``rare``, and but for one in ``usual``, which are
+    """The lengths in px that all gridlines exceed but for one in ``rare``, and but for one in ``median_misfit``,
+    which are
     fewer; 0 without any."""
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
@@ -174,16 +183,17 @@ def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def usual_edge(xy, edges):  # type: ignore[no-untyped-def]
+def median_edge(xy, edges):  # type: ignore[no-untyped-def]
     """The median length of the gridlines, px; 1 without any."""
     return max(short_edges(xy, edges, 2, 2)[1], 1.0)
 
 
 @compiled
-def widening(sums, aside, use, before, now, sigma):  # type: ignore[no-untyped-def]
+def blur_change(sums, aside, use, before, now, sigma):  # type: ignore[no-untyped-def]
     """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``.
 
-    What lies ``aside`` (E,), px, of where it is drawn looks more blurred, by half the square of that over the blur.
+    What lies ``dot_gain_offset`` (E,), px, of where it is drawn looks more blurred, by half the square of that over
+    the blur.
     """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
@@ -201,13 +211,13 @@ def widening(sums, aside, use, before, now, sigma):  # type: ignore[no-untyped-d
 
 
 @compiled
-def shown(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-def]
+def least_information(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-def]
     """(M,) 1/px^2, the least information about a marker in any direction, were its gridlines' bending known."""
     xx, cross, yy = np.zeros(count), np.zeros(count), np.zeros(count)
     for e in range(edges.shape[0]):
         nx, ny, weight = -lines[e, UY], lines[e, UX], use[e] * lines[e, KNOWN] / variance
         for side in range(2):
-            m, value = edges[e, side], weight * (sums[e, SEEN_A] if side == 0 else sums[e, SEEN_B])
+            m, value = edges[e, side], weight * (sums[e, READ_AA] if side == 0 else sums[e, READ_BB])
             xx[m] += value * nx * nx
             cross[m] += value * nx * ny
             yy[m] += value * ny * ny
@@ -215,7 +225,7 @@ def shown(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-
 
 
 @compiled
-def strides(step, diagonal, beyond):  # type: ignore[no-untyped-def]
+def normalized_step_lengths(step, diagonal, beyond):  # type: ignore[no-untyped-def]
     """(M,) how far each marker stepped in standard deviations with all others known; 0 for those ``beyond``."""
     out = np.zeros(step.shape[0])
     for m in range(step.shape[0]):
@@ -227,25 +237,26 @@ def strides(step, diagonal, beyond):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def moved(xy, shift, least, use, spokes):  # type: ignore[no-untyped-def]
-    """(M, 2) the markers after a step, and the same with NaN where the image hardly shows them (``least``, as ``shown``
+def markers_after_shift(xy, shift, least, use, spokes):  # type: ignore[no-untyped-def]
+    """(M, 2) the markers after a step, and the same with NaN where the image hardly shows them (``min_places``, as
+    ``least_information``
     gives it)."""
     count = xy.shape[0]
     measured, guiding = np.empty((count, 2)), np.empty((count, 2))
-    seen = least[least > 3 * PRIOR_BEYOND_PX**-2]
-    limit = WEAK * np.median(seen) if seen.shape[0] > 0 else np.inf
+    seen = least[least > 3 * PRIOR_HIDDEN_PX**-2]
+    limit = MIN_INFORMATION_SHARE * np.median(seen) if seen.shape[0] > 0 else np.inf
     for m in range(count):
         measured[m, 0], measured[m, 1] = xy[m, 0] + shift[m, 0], xy[m, 1] + shift[m, 1]
         weak = least[m] < limit
-        if weak and spokes[m, spokes.shape[1] - 1] < 0 and least[m] > RIM_PX**-2:
-            weak = not _believed(use, spokes, m)
+        if weak and spokes[m, spokes.shape[1] - 1] < 0 and least[m] > RIM_DEVIATION_PX**-2:
+            weak = not _is_well_weighted(use, spokes, m)
         guiding[m, 0] = np.nan if weak else measured[m, 0]
         guiding[m, 1] = np.nan if weak else measured[m, 1]
     return measured, guiding
 
 
 @compiled
-def box_of(xy, margin, width, height):  # type: ignore[no-untyped-def]
+def pattern_box(xy, margin, width, height):  # type: ignore[no-untyped-def]
     """(4,) x from, y from, x to, y to: the pattern's part of the image."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for m in range(xy.shape[0]):

@@ -42,13 +42,13 @@ REACH_SIGMA = 1.3  # how far a row reaches, in units of the blur
 CLEAR_SIGMA = 2.6  # how far the other gridline of a corner must be for it not to show, in units of the blur
 MAX_REACH = 0.33  # of the cell's height, how far a row may reach at most
 CLIP = np.float32(0.3)  # of the contrast, by which a pixel may lie beyond both colors
-FAR = np.float32(2.6)  # in units of the blur, as far as the polynomials hold
+POLYNOMIAL_RANGE = np.float32(2.6)  # in units of the blur, as far as the polynomials hold
 ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 I1, I2, I3, I4, I5 = (np.float32(c / (2 * k + 3)) for k, c in enumerate((C1, C2, C3, C4, C5)))
 LANES = 8  # rows are laid so many at once
-MOST = 240  # rows side by side; no power of 2, which would lay all columns on one cache line
-COLUMN = MOST + LANES
-FINE = 5  # of the sums move the markers: AA, AB, BB, A, B
+MAX_ROWS = 240  # rows side by side; no power of 2, which would lay all columns on one cache line
+COLUMN = MAX_ROWS + LANES
+DOUBLE_SUMS = 5  # of the sums move the markers: AA, AB, BB, A, B
 # columns of a row: at its first pixel, place along and aside of the chord (px), and what each next one adds; the number
 # of its last pixel, -1 without any; of its gridline length, slopes, weights of the channels, what these give beyond it
 ALONG, ASIDE, ALONG_STEP, ASIDE_STEP, LAST = (k * COLUMN for k in range(5))
@@ -56,11 +56,11 @@ SIZE, SHORT, AT_START, AT_END, RED, GREEN, BLUE, FOOT, COLUMNS = (k * COLUMN for
 FIRST, STEP, END = (
     k * COLUMN for k in range(3)
 )  # in the flat image: its first pixel, from one to the next, its last
-HEIGHT, SINE_A, SINE_B, STRENGTH = range(4)  # columns of a gridline's room
+HEIGHT, SINE_A, SINE_B, SQUARED_CONTRAST = range(4)  # columns of a gridline's room
 
 
 @inlined
-def _lay(first, every, count, p0, q0, up, uq, length, leave, arrive, half, end, steps, color, at, rows):  # type: ignore[no-untyped-def]
+def _fill_rows(first, every, count, p0, q0, up, uq, length, leave, arrive, half, end, steps, color, at, rows):  # type: ignore[no-untyped-def]
     """Lay the rows p = first, first + every ... of a gridline, with the pixels up to ``half`` off it; with none where
     these do not all lie from 0 to ``end`` in q. ``steps`` in p and q lead through the flat image."""
     step_p, step_q = steps
@@ -90,7 +90,7 @@ def _lay(first, every, count, p0, q0, up, uq, length, leave, arrive, half, end, 
 
 
 @compiled
-def _look(flat, at, rows, step, count, seen):  # type: ignore[no-untyped-def]
+def _fill_profile_values(flat, at, rows, step, count, seen):  # type: ignore[no-untyped-def]
     """Fill in what a pixel of every row shows along its color: 1 before and 0 beyond the gridline."""
     one, two = np.uint64(1), np.uint64(2)
     for i in range(count):
@@ -100,7 +100,7 @@ def _look(flat, at, rows, step, count, seen):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _weigh(rows, step, count, inverse, seen, fine, sums):  # type: ignore[no-untyped-def]
+def _accumulate_row_sums(rows, step, count, inverse, seen, fine, sums):  # type: ignore[no-untyped-def]
     """Add a pixel of every row to its sums, per unit of contrast and blur: to ``fine`` ones what moves the markers, so
     that rounding hardly matters."""
     for i in range(count):
@@ -109,7 +109,7 @@ def _weigh(rows, step, count, inverse, seen, fine, sums):  # type: ignore[no-unt
         s = ONE - t
         off = rows[SIZE + i] * (t * s * (rows[AT_START + i] * s - rows[AT_END + i] * t))
         z = (rows[ASIDE + i] + step * rows[ASIDE_STEP + i] - off) * inverse
-        z = min(max(z, -FAR), FAR)
+        z = min(max(z, -POLYNOMIAL_RANGE), POLYNOMIAL_RANGE)
         zz = z * z
         g = keep * (C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))))
         half = HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
@@ -136,8 +136,9 @@ def _weigh(rows, step, count, inverse, seen, fine, sums):  # type: ignore[no-unt
 
 
 @inlined
-def _add_up(fine, sums, begin, end, most, strength, sigma, out, e):  # type: ignore[no-untyped-def]
-    """Write the sums over the rows of a gridline, unless it would have to move by more than ``most`` px: then it is
+def _fill_gridline_sums(fine, sums, begin, end, most, strength, sigma, out, e):  # type: ignore[no-untyped-def]
+    """Write the sums over the rows of a gridline, unless it would have to move by more than
+    ``max_partial_share_in_dirt`` px: then it is
     none."""
     zero = np.float64(0.0)
     aa, ab, bb, a, b, squares, pixels = zero, zero, zero, zero, zero, zero, zero
@@ -158,7 +159,7 @@ def _add_up(fine, sums, begin, end, most, strength, sigma, out, e):  # type: ign
 
 
 @inlined
-def _add_up_bending(sums, begin, end, strength, sigma, out, e):  # type: ignore[no-untyped-def]
+def _fill_bending_sums(sums, begin, end, strength, sigma, out, e):  # type: ignore[no-untyped-def]
     """The same for its bending."""
     zero = np.float64(0.0)
     ac, ad, bc, bd, cc, cd, dd, c, d = zero, zero, zero, zero, zero, zero, zero, zero, zero
@@ -184,36 +185,37 @@ def _add_up_bending(sums, begin, end, strength, sigma, out, e):  # type: ignore[
 
 
 @compiled
-def _filter(flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out):  # type: ignore[no-untyped-def]
-    """Fill in the sums of the gridlines that are held: their numbers ``owner``, and where their rows ``begin``."""
+def _fill_filtered_sums(flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out):  # type: ignore[no-untyped-def]
+    """Fill in the sums of the gridlines that are held: their numbers ``region_map``, and where their rows ``begin``."""
     count, wide = (begin[held] + LANES - 1) // LANES * LANES, 0
     for i in range(count):
         wide = max(wide, int(rows[LAST + i]) + 1)
     fine[:], sums[:], inverse = 0.0, ZERO, np.float32(1.0 / sigma)
     for j in range(wide):
-        _look(flat, at, rows, j, count, seen)
-        _weigh(rows, np.float32(j), count, inverse, seen, fine, sums)
-    columns, others = fine.reshape(FINE, COLUMN), sums.reshape(SUMS, COLUMN)
+        _fill_profile_values(flat, at, rows, j, count, seen)
+        _accumulate_row_sums(rows, np.float32(j), count, inverse, seen, fine, sums)
+    columns, others = fine.reshape(DOUBLE_SUMS, COLUMN), sums.reshape(SUMS, COLUMN)
     for i in range(held):
         e, rows_of = np.uint64(owner[i]), (begin[i], begin[i + 1])
-        most, strength = max(1.0, 0.15 * lines[e, LENGTH]), room[e, STRENGTH]
-        if _add_up(columns, others, *rows_of, most, strength, sigma, out, e) and loose[e]:
-            _add_up_bending(others, *rows_of, strength, sigma, out, e)
+        most, strength = max(1.0, 0.15 * lines[e, LENGTH]), room[e, SQUARED_CONTRAST]
+        if _fill_gridline_sums(columns, others, *rows_of, most, strength, sigma, out, e) and loose[e]:
+            _fill_bending_sums(others, *rows_of, strength, sigma, out, e)
 
 
 @compiled
 def read_profiles(image, lines, weights, room, sigma, loose, most):  # type: ignore[no-untyped-def]
-    """(E, 24) sums as ``read_gridlines`` gives them, from at most ``most`` rows of pixels across each gridline; C and D
-    where it is ``loose`` (E,) bool."""
+    """(E, 24) sums as ``read_gridlines`` gives them, from at most ``max_partial_share_in_dirt`` rows of pixels
+    across each gridline; C and D
+    where it is ``bend_variance`` (E,) bool."""
     out = np.zeros((lines.shape[0], SUMS))
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     # lanes beyond the last row are looked at, too
     at, rows = np.zeros(3 * COLUMN, np.int64), np.zeros(COLUMNS, np.float32)
     seen = np.empty(COLUMN, np.float32)
-    fine, sums = np.empty(FINE * COLUMN), np.empty(SUMS * COLUMN, np.float32)
-    owner, begin, held = np.empty(MOST, np.int64), np.zeros(MOST + 1, np.int64), 0
+    fine, sums = np.empty(DOUBLE_SUMS * COLUMN), np.empty(SUMS * COLUMN, np.float32)
+    owner, begin, held = np.empty(MAX_ROWS, np.int64), np.zeros(MAX_ROWS + 1, np.int64), 0
     for e in range(lines.shape[0]):
-        if lines[e, KNOWN] == 0.0 or room[e, STRENGTH] == 0.0:
+        if lines[e, KNOWN] == 0.0 or room[e, SQUARED_CONTRAST] == 0.0:
             continue
         x0, y0, ux, uy, length = lines[e, X], lines[e, Y], lines[e, UX], lines[e, UY], lines[e, LENGTH]
         # the sharper a corner, the longer the gridline runs close to its neighbour
@@ -229,17 +231,21 @@ def read_profiles(image, lines, weights, room, sigma, loose, most):  # type: ign
         every = max((last - first) // most + 1, 1)
         first += ((last - first) % every) // 2
         first += max(every - 1 - first, 0) // every * every  # within the image
-        count = min((min(last, p_end - 1) - first) // every + 1, MOST)
+        count = min((min(last, p_end - 1) - first) // every + 1, MAX_ROWS)
         if count <= 0:
             continue
-        if begin[held] + count > MOST:
-            _filter(flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out)
+        if begin[held] + count > MAX_ROWS:
+            _fill_filtered_sums(
+                flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out
+            )
             held = 0
         half = min(REACH_SIGMA * sigma, MAX_REACH * room[e, HEIGHT]) / abs(up)
         line = p0, q0, up, uq, length, lines[e, LEAVE], lines[e, ARRIVE]
         color = weights[e, 0], weights[e, 1], weights[e, 2], weights[e, 3]
-        _lay(first, every, count, *line, half, q_end, steps, color, at[begin[held] :], rows[begin[held] :])
+        _fill_rows(
+            first, every, count, *line, half, q_end, steps, color, at[begin[held] :], rows[begin[held] :]
+        )
         owner[held], begin[held + 1] = e, begin[held] + count
         held += 1
-    _filter(flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out)
+    _fill_filtered_sums(flat, at, rows, held, owner, begin, lines, room, sigma, loose, seen, fine, sums, out)
     return out

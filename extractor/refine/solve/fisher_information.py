@@ -1,7 +1,7 @@
 """The Fisher information matrix of the markers, its sparse solution and its inverse's diagonal blocks.
 
 A marker's block joins all gridlines that end there. Along a gridline the weights are 1 - t and t; the sums over its
-pixels are measured. Near a marker the gridlines share their pixels (``meeting``).
+pixels are measured. Near a marker the gridlines share their pixels (``cells_per_marker``).
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from extractor.numeric.compilation import compiled
 from extractor.refine.solve.ring_elimination import (
     LANES,
     MIDDLE,
-    OF_ONE,
-    OF_TAIL,
-    behind,
-    eliminate_ring,
-    lay,
-    others_at,
+    NEIGHBOUR_ROWS,
+    TAIL_ROWS,
+    eliminated_blocks,
+    fill_ring,
+    neighbour_markers,
+    update_without_ring,
 )
-from extractor.refine.solve.shared_pixels import share_pixels
+from extractor.refine.solve.shared_pixels import add_shared_pixels
 from extractor.refine.synthesis.gridlines import KNOWN, UX, UY
 from extractor.refine.synthesis.residual_kernel import AA, AB, BB
 
@@ -31,8 +31,8 @@ PRECISION = 1e-3  # of the solution
 # A marker that moves alone bends the gridlines around it, through the smooth map, as a cardinal cubic does:
 # 1 - 2.5 t^2 + 1.5 t^3 instead of 1 - t, and -t (1 - t)^2 / 2 beyond the next marker. Against the votes 1 - t that
 # is 1.1 (.3667 for 1/3) at the marker itself and .9 (.175 - .025 for 1/6) at its neighbour.
-SMOOTH = 0.1
-HELD = 1e12  # 1/px^2, known about a marker that is held where it is
+SMOOTH_MAP_COUPLING = 0.1
+HELD_INFORMATION = 1e12  # 1/px^2, known about a marker that is held where it is
 
 
 class Information(NamedTuple):
@@ -43,7 +43,7 @@ class Information(NamedTuple):
 
 
 @compiled
-def assemble(  # type: ignore[no-untyped-def]
+def fill_information(  # type: ignore[no-untyped-def]
     sums, weight, overlapping, lines, contrasts, edges, spokes, sigma, variance, prior, diagonal, beside
 ):
     """Fill the matrix's blocks from what was read along the gridlines, in units of the noise's variance.
@@ -59,17 +59,20 @@ def assemble(  # type: ignore[no-untyped-def]
             continue
         nx, ny = -lines[e, UY], lines[e, UX]
         for side in range(2):
-            m, value = edges[e, side], w * (1.0 + SMOOTH) * (sums[e, AA] if side == 0 else sums[e, BB])
+            m, value = (
+                edges[e, side],
+                w * (1.0 + SMOOTH_MAP_COUPLING) * (sums[e, AA] if side == 0 else sums[e, BB]),
+            )
             diagonal[m, 0] += value * nx * nx
             diagonal[m, 1] += value * nx * ny
             diagonal[m, 2] += value * ny * ny
-        value = w * (1.0 - SMOOTH) * sums[e, AB]
+        value = w * (1.0 - SMOOTH_MAP_COUPLING) * sums[e, AB]
         beside[e, 0] += value * nx * nx
         beside[e, 1] += value * nx * ny
         beside[e, 2] += value * ny * nx
         beside[e, 3] += value * ny * ny
     if overlapping:
-        share_pixels(sums, weight, lines, contrasts, edges, spokes, sigma, variance, diagonal, beside)
+        add_shared_pixels(sums, weight, lines, contrasts, edges, spokes, sigma, variance, diagonal, beside)
 
 
 @compiled
@@ -88,7 +91,7 @@ def gradient(to_a, to_b, weight, variance, lines, edges, count):  # type: ignore
 
 
 @compiled
-def multiply(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-def]
+def fill_product(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-def]
     """Write the matrix's product with a vector (M, 2)."""
     for m in range(diagonal.shape[0]):
         x, y = vector[m, 0], vector[m, 1]
@@ -106,7 +109,7 @@ def multiply(diagonal, beside, edges, vector, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
+def solve_shifts(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
     """(M, 2): the shifts, by conjugate gradients preconditioned with the diagonal blocks.
 
     ``diagonal`` must be positive definite; where the whole is not, the descent ends early.
@@ -135,7 +138,7 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
         for m in range(count):
             search[m, 0] = descent[m, 0] + blend * search[m, 0]
             search[m, 1] = descent[m, 1] + blend * search[m, 1]
-        multiply(diagonal, beside, edges, search, product)
+        fill_product(diagonal, beside, edges, search, product)
         curvature = 0.0
         for m in range(count):
             curvature += search[m, 0] * product[m, 0] + search[m, 1] * product[m, 1]
@@ -153,26 +156,26 @@ def solve(diagonal, beside, edges, right):  # type: ignore[no-untyped-def]
 @compiled
 def covariances(diagonal, beside, edges, spokes, weak, which):  # type: ignore[no-untyped-def]
     """(M, 2, 2): diagonal blocks of the inverse, from each marker and its neighbours; NaN where nothing is known, and
-    beyond ``which`` (M,) bool.
+    beyond ``gridlines`` (M,) bool.
 
     The markers beyond the neighbours are eliminated one by one, as if they were not connected to each other, then the
     neighbours. ``weak`` is the information (1/px^2) below which a marker counts as unknown.
     """
     out = np.full((diagonal.shape[0], 2, 2), np.nan)
     asked = np.flatnonzero(which & (diagonal[:, 0] + diagonal[:, 2] > weak))
-    lost, left = behind(diagonal, beside, edges)
-    others = others_at(beside, edges, spokes)
+    lost, left = eliminated_blocks(diagonal, beside, edges)
+    others = neighbour_markers(beside, edges, spokes)
     # rows beyond those of five neighbours are written when the fifth is eliminated, and not read
-    rows, tail = np.empty(6 * OF_ONE * LANES), np.empty(OF_TAIL * LANES)
+    rows, tail = np.empty(6 * NEIGHBOUR_ROWS * LANES), np.empty(TAIL_ROWS * LANES)
     ring, spoke, own = np.empty(6, np.int64), np.empty(6, np.int64), np.empty((6, 3))
     for start in range(0, len(asked), LANES):
         some = asked[start : start + LANES]
         rows[:], tail[:] = 0.0, 0.0
         for k, m in enumerate(some):
-            lay(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail)
+            fill_ring(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail)
             for c in range(3):
                 tail[(MIDDLE + c) * LANES + k] = diagonal[m, c]
-        eliminate_ring(rows, tail)
+        update_without_ring(rows, tail)
         for k, m in enumerate(some):
             at = MIDDLE * LANES + k
             xx, xy, yy = tail[at], tail[at + LANES], tail[at + 2 * LANES]

@@ -3,7 +3,8 @@
 Once around the marker, a neighbour is joined to the next one and to the marker, the first also to the last: while they
 are eliminated in turn, nobody else is ever joined to the one whose turn it is.
 
-``LANES`` markers stand side by side. In ``rows`` every neighbour but the last has ``OF_ONE`` rows of them: its own
+``LANES`` markers stand side by side. In ``rows`` every neighbour but the last has ``NEIGHBOUR_ROWS`` rows of them:
+its own
 block as xx, xy, yy, then the blocks (2, 2) that join it to the next one, to the last one and to the middle. ``tail``
 has the last one's own, to the middle, and the middle's own.
 """
@@ -14,12 +15,12 @@ import numpy as np
 
 from extractor.numeric.compilation import compiled, inlined, vectorized
 
-LANES, OF_ONE, OF_TAIL = 32, 15, 10
+LANES, NEIGHBOUR_ROWS, TAIL_ROWS = 32, 15, 10
 MIDDLE = 7  # its first row in the tail
 
 
 @vectorized
-def _eliminate(rows, tail):  # type: ignore[no-untyped-def]
+def _update_without_first(rows, tail):  # type: ignore[no-untyped-def]
     """Eliminate the first neighbours from those after them, from the last ones and from the middles.
 
     A direction without positive information is left out. All rows lie at constant distances, so that the compiler
@@ -43,7 +44,7 @@ def _eliminate(rows, tail):  # type: ignore[no-untyped-def]
         vd, ve, vf = vd - share * ud, ve - share * ue, vf - share * uf
         fa, fb, fc, fd, fe, ff = first * ua, first * ub, first * uc, first * ud, first * ue, first * uf
         ga, gb, gc, gd, ge, gf = second * va, second * vb, second * vc, second * vd, second * ve, second * vf
-        n = k + OF_ONE * LANES
+        n = k + NEIGHBOUR_ROWS * LANES
         rows[n] -= fa * ua + ga * va
         rows[n + LANES] -= fa * ub + ga * vb
         rows[n + 2 * LANES] -= fb * ub + gb * vb
@@ -68,7 +69,7 @@ def _eliminate(rows, tail):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _eliminate_last(tail):  # type: ignore[no-untyped-def]
+def _update_without_last(tail):  # type: ignore[no-untyped-def]
     """Eliminate the last neighbours from the middles."""
     for k in range(LANES):
         xx, xy, yy = tail[k], tail[k + LANES], tail[k + 2 * LANES]
@@ -84,7 +85,7 @@ def _eliminate_last(tail):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def behind(diagonal, beside, edges):  # type: ignore[no-untyped-def]
+def eliminated_blocks(diagonal, beside, edges):  # type: ignore[no-untyped-def]
     """(E, 2, 3): what the block at each end of an edge loses as xx, xy, yy when the marker at the other is eliminated;
     and (M, 3) the blocks without what all their neighbours take."""
     lost, left = np.empty((edges.shape[0], 2, 3)), diagonal.copy()
@@ -106,7 +107,7 @@ def behind(diagonal, beside, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def others_at(beside, edges, spokes):  # type: ignore[no-untyped-def]
+def neighbour_markers(beside, edges, spokes):  # type: ignore[no-untyped-def]
     """(M, 6): the marker at the other end of each edge, -1 where the edge tells nothing."""
     out = np.full(spokes.shape, -1, np.int32)
     for m in range(spokes.shape[0]):
@@ -118,14 +119,14 @@ def others_at(beside, edges, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _put(rows, at, e, forward, beside):  # type: ignore[no-untyped-def]
+def _fill_block(rows, at, e, forward, beside):  # type: ignore[no-untyped-def]
     """Write edge e's block into four rows, seen from its first marker if ``forward``."""
     rows[at], rows[at + 3 * LANES] = beside[e, 0], beside[e, 3]
     rows[at + LANES], rows[at + 2 * LANES] = beside[e, 1 if forward else 2], beside[e, 2 if forward else 1]
 
 
 @inlined
-def lay(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail):  # type: ignore[no-untyped-def]
+def fill_ring(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail):  # type: ignore[no-untyped-def]
     """Write the neighbours of marker m, and what joins them to each other and to it, into lane k."""
     count = 0
     for i in range(spokes.shape[1]):
@@ -150,22 +151,24 @@ def lay(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows,
             own[i, c] += lost[e, side, c]
             own[j, c] += lost[e, 1 - side, c]
         if j == 0:
-            _put(rows, 7 * LANES + k, e, side == 1, beside)
+            _fill_block(rows, 7 * LANES + k, e, side == 1, beside)
         else:
-            _put(rows, (OF_ONE * i + (7 if j == last else 3)) * LANES + k, e, side == 0, beside)
+            _fill_block(
+                rows, (NEIGHBOUR_ROWS * i + (7 if j == last else 3)) * LANES + k, e, side == 0, beside
+            )
     for i in range(last):
         for c in range(3):
-            rows[(OF_ONE * i + c) * LANES + k] = own[i, c]
-        _put(rows, (OF_ONE * i + 11) * LANES + k, spoke[i], edges[spoke[i], 1] == m, beside)
+            rows[(NEIGHBOUR_ROWS * i + c) * LANES + k] = own[i, c]
+        _fill_block(rows, (NEIGHBOUR_ROWS * i + 11) * LANES + k, spoke[i], edges[spoke[i], 1] == m, beside)
     if count > 0:
         for c in range(3):
             tail[c * LANES + k] = own[last, c]
-        _put(tail, 3 * LANES + k, spoke[last], edges[spoke[last], 1] == m, beside)
+        _fill_block(tail, 3 * LANES + k, spoke[last], edges[spoke[last], 1] == m, beside)
 
 
 @compiled
-def eliminate_ring(rows, tail):  # type: ignore[no-untyped-def]
+def update_without_ring(rows, tail):  # type: ignore[no-untyped-def]
     """What is left of the middles' own blocks, in place."""
     for i in range(5):
-        _eliminate(rows[OF_ONE * i * LANES :], tail)
-    _eliminate_last(tail)
+        _update_without_first(rows[NEIGHBOUR_ROWS * i * LANES :], tail)
+    _update_without_last(tail)

@@ -13,10 +13,10 @@ from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY
 from extractor.refine.synthesis.residual_kernel import AA, BB
 
 MIN_ANGLE = 0.4  # rad; the closed forms are for long gridlines, and two at a smaller angle are not
-ENDS = 0.75  # of a gridline's information is left at least where its ends are blurred
+MIN_END_INFORMATION = 0.75  # of a gridline's information is left at least where its ends are blurred
 # The gridlines at one marker side by side, zero where there are fewer: direction away from it, color, weight, 1 /
 # length; sums over the others of their normals times the overlap: near with near end, theirs near with its far end.
-AX, AY, C0, C1, C2, WEIGHT, SHORT, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(0, 88, 8)
+AX, AY, C0, C1, C2, WEIGHT, INVERSE_LENGTH, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(0, 88, 8)
 
 
 def _closed_forms() -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -53,12 +53,12 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _share(rows, i, ax, ay, c0, c1, c2, weight, short, nx, ny, sigma):  # type: ignore[no-untyped-def]
+def _accumulate_overlaps(rows, i, ax, ay, c0, c1, c2, weight, short, nx, ny, sigma):  # type: ignore[no-untyped-def]
     """Add what gridline i (its normal n) shares with all at its marker to their sums."""
     for k in range(8):
         color = c0 * rows[C0 + k] + c1 * rows[C1 + k] + c2 * rows[C2 + k]
         dot = 0.0 if k == i else color * min(weight, rows[WEIGHT + k])
-        near, far, _ = overlap(ax * rows[AX + k] + ay * rows[AY + k], short, rows[SHORT + k], sigma)
+        near, far, _ = overlap(ax * rows[AX + k] + ay * rows[AY + k], short, rows[INVERSE_LENGTH + k], sigma)
         near, far = dot * near, dot * far
         rows[NEAR_X + k] += near * nx
         rows[NEAR_Y + k] += near * ny
@@ -67,7 +67,7 @@ def _share(rows, i, ax, ay, c0, c1, c2, weight, short, nx, ny, sigma):  # type: 
 
 
 @compiled
-def _gather(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen):  # type: ignore[no-untyped-def]
+def _fill_gridlines_at_marker(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen):  # type: ignore[no-untyped-def]
     """Lay the gridlines at marker m side by side, their numbers into ``seen``; how many."""
     count = 0
     for k in range(spokes.shape[1]):
@@ -83,16 +83,16 @@ def _gather(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen)
         # a gridline that the image's border cuts shares the less the less of it was read
         c0, c1, c2 = contrasts[e, 0], contrasts[e, 1], contrasts[e, 2]
         whole = (c0 * c0 + c1 * c1 + c2 * c2) * lines[e, LENGTH] / (6.0 * np.sqrt(np.pi) * sigma)
-        part = min((sums[e, AA] if out > 0.0 else sums[e, BB]) / max(ENDS * whole, 1e-12), 1.0)
+        part = min((sums[e, AA] if out > 0.0 else sums[e, BB]) / max(MIN_END_INFORMATION * whole, 1e-12), 1.0)
         rows[C0 + count], rows[C1 + count], rows[C2 + count] = part * c0, part * c1, part * c2
-        rows[WEIGHT + count], rows[SHORT + count] = weight[e], 1.0 / lines[e, LENGTH]
+        rows[WEIGHT + count], rows[INVERSE_LENGTH + count] = weight[e], 1.0 / lines[e, LENGTH]
         seen[count] = e
         count += 1
     return count
 
 
 @compiled
-def share_pixels(  # type: ignore[no-untyped-def]
+def add_shared_pixels(  # type: ignore[no-untyped-def]
     sums, weight, lines, contrasts, edges, spokes, sigma, variance, diagonal, beside
 ):
     """Add what gridlines share to the matrix's blocks, in units of the noise's variance."""
@@ -100,12 +100,21 @@ def share_pixels(  # type: ignore[no-untyped-def]
     for m in range(spokes.shape[0]):
         for k in range(88):
             rows[k] = 0.0
-        count = _gather(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen)
+        count = _fill_gridlines_at_marker(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen)
         for i in range(count):
             nx, ny = -lines[seen[i], UY] / variance, lines[seen[i], UX] / variance
             color = rows[C0 + i], rows[C1 + i], rows[C2 + i]
-            _share(
-                rows, i, rows[AX + i], rows[AY + i], *color, rows[WEIGHT + i], rows[SHORT + i], nx, ny, sigma
+            _accumulate_overlaps(
+                rows,
+                i,
+                rows[AX + i],
+                rows[AY + i],
+                *color,
+                rows[WEIGHT + i],
+                rows[INVERSE_LENGTH + i],
+                nx,
+                ny,
+                sigma,
             )
         for i in range(count):
             e = seen[i]

@@ -9,7 +9,7 @@ from extractor.numeric.compilation import compiled
 
 @compiled
 def gridlines_at(which, edges):  # type: ignore[no-untyped-def]
-    """The gridlines with an end at one of ``which`` (M,) bool."""
+    """The gridlines with an end at one of ``gridlines`` (M,) bool."""
     out, count = np.empty(len(edges), np.int64), 0
     for e in range(len(edges)):
         out[count] = e
@@ -18,8 +18,9 @@ def gridlines_at(which, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def alone(which, edges, spokes):  # type: ignore[no-untyped-def]
-    """The markers at the ends of the gridlines ``which`` (n,), as if there were no others: their numbers (m,), these
+def number_subproblem(which, edges, spokes):  # type: ignore[no-untyped-def]
+    """The markers at the ends of the gridlines ``gridlines`` (n,), as if there were no others: their numbers (m,),
+    these
     gridlines' ends among them, and the gridlines around each among these, -1 for those that are not."""
     number, place = np.full(len(spokes), -1, np.int32), np.full(len(edges), -1, np.int32)
     markers, ends, count = np.empty(len(spokes), np.int64), np.empty((len(which), 2), np.int32), 0
@@ -40,7 +41,7 @@ def alone(which, edges, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rows_of(table, which):  # type: ignore[no-untyped-def]
+def selected_rows(table, which):  # type: ignore[no-untyped-def]
     """Some rows of a table of two dimensions."""
     out = np.empty((len(which), table.shape[1]), table.dtype)
     for i in range(len(which)):
@@ -50,7 +51,7 @@ def rows_of(table, which):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def with_rows(table, which, rows):  # type: ignore[no-untyped-def]
+def replaced_table_rows(table, which, rows):  # type: ignore[no-untyped-def]
     """A table of two dimensions with other rows at these numbers (n,)."""
     out = table.copy()
     for i in range(len(which)):

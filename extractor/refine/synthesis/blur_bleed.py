@@ -12,57 +12,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.topology import Topology
-from extractor.numeric.compilation import compiled, lent
-from extractor.refine.synthesis.ink_levels import BLACK, Levels, disc_in, disc_of
+from extractor.numeric.compilation import compiled, inlined_no_refcount
+from extractor.refine.synthesis.ink_levels import BLACK, InkLevels, cell_radii, disc_radius
 
-MAX_SHARE = 0.1  # of a neighbour in a cell's mean that can be made good
-LITTLE = 0.002  # of a neighbour, which makes no difference;
-SAME = 0.0003  # nor does so much more or less
+MAX_BLEED = 0.1  # of a neighbour in a cell's mean that can be made good
+MIN_BLEED = 0.002  # of a neighbour, which makes no difference;
+MIN_BLEED_CHANGE = 0.0003  # nor does so much more or less
 
 
 @compiled
-def bled(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
+def bleed_shares(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
     """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
     blur ``assumed``, NaN where the cell is not known; and the median of that."""
-    inscribed = _inscribed(xy, cells)
+    inscribed = _inscribed_radii(xy, cells)
     out = np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        out[i] = _share(inscribed[i], assumed, sigma)
+        out[i] = _bleed_share(inscribed[i], assumed, sigma)
     return out, np.nanmedian(out)
 
 
 @compiled
-def _inscribed(xy, cells):  # type: ignore[no-untyped-def]
+def _inscribed_radii(xy, cells):  # type: ignore[no-untyped-def]
     """(K,) the radius of each cell's inscribed circle, NaN where the cell is not known."""
     out = np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        out[i] = disc_of(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], 0.0)[0]
+        out[i] = cell_radii(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], 0.0)[0]
     return out
 
 
-@lent
-def _share(inscribed, assumed, sigma):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _bleed_share(inscribed, assumed, sigma):  # type: ignore[no-untyped-def]
     """What a blur makes of each neighbour in the mean of one cell's disc, which is taken with another blur assumed."""
-    radius = disc_in(inscribed, assumed)
+    radius = disc_radius(inscribed, assumed)
     # a disc's pixels have a quarter of its radius squared for their variance in one direction
     return 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
 
 
-def unbled(levels: Levels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float) -> Levels:
-    """The levels that means show in which each neighbour has a ``share`` (K,), ``usual`` where it is not known.
+def remove_bleed(
+    levels: InkLevels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float
+) -> InkLevels:
+    """The levels that means show in which each neighbour has a ``share`` (K,), ``median_misfit`` where it is not known.
 
     A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
     (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
     """
-    cell, slope, black = _unbled(levels.cell, levels.slope, levels.black, color, share, usual)
+    cell, slope, black = _remove_bleed(levels.cell, levels.slope, levels.black, color, share, usual)
     return levels._replace(cell=cell, slope=slope, black=black)
 
 
 @compiled
-def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped-def]
+def _remove_bleed(cell, slope, black, color, share, usual):  # type: ignore[no-untyped-def]
     cell, slope, black = cell.copy(), slope.copy(), black.copy()
     total, own = np.zeros(3), np.empty(cell.shape[0])
-    usual = min(usual, MAX_SHARE)
+    usual = min(usual, MAX_BLEED)
     for ink in range(BLACK):
         for channel in range(3):
             count = 0
@@ -73,7 +75,7 @@ def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped
             if count > 0:
                 total[channel] += np.median(own[:count]) / (1.0 - 6.0 * usual)
     for i in range(cell.shape[0]):
-        bleeding = min(max(share[i] if np.isfinite(share[i]) else usual, -MAX_SHARE), MAX_SHARE)
+        bleeding = min(max(share[i] if np.isfinite(share[i]) else usual, -MAX_BLEED), MAX_BLEED)
         for channel in range(3):
             cell[i, channel] = (cell[i, channel] + bleeding * total[channel]) / (1.0 - 3.0 * bleeding)
             slope[i, channel, 0] /= 1.0 - 3.0 * bleeding
@@ -83,22 +85,24 @@ def _unbled(cell, slope, black, color, share, usual):  # type: ignore[no-untyped
     return cell, slope, black
 
 
-def rebled(levels: Levels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float) -> Levels:
+def adapt_levels_to_blur(
+    levels: InkLevels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float
+) -> InkLevels:
     """The levels that the cells' middles would have shown, had the blur not been ``drawn`` but ``sigma``, px."""
     inks = levels.cell, levels.slope, levels.black
-    differ, cell, slope, black = _rebled(*inks, mesh.cell_color, xy, mesh.cells, drawn, sigma)
+    differ, cell, slope, black = _adapt_levels_to_blur(*inks, mesh.cell_color, xy, mesh.cells, drawn, sigma)
     return levels._replace(cell=cell, slope=slope, black=black) if differ else levels
 
 
 @compiled
-def _rebled(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
+def _adapt_levels_to_blur(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
     """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
-    inscribed = _inscribed(xy, cells)
+    inscribed = _inscribed_radii(xy, cells)
     size = np.nanmedian(inscribed)
-    usual, more = _share(size, 0.0, drawn), _share(size, 0.0, sigma)
-    if max(usual, more) < LITTLE or abs(more - usual) < SAME:
+    usual, more = _bleed_share(size, 0.0, drawn), _bleed_share(size, 0.0, sigma)
+    if max(usual, more) < MIN_BLEED or abs(more - usual) < MIN_BLEED_CHANGE:
         return False, cell, slope, black
-    left, change = 1.0 - 6.0 * min(usual, MAX_SHARE), np.empty(cells.shape[0])
+    left, change = 1.0 - 6.0 * min(usual, MAX_BLEED), np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        change[i] = (_share(inscribed[i], 0.0, sigma) - _share(inscribed[i], 0.0, drawn)) / left
-    return (True, *_unbled(cell, slope, black, color, change, (more - usual) / left))
+        change[i] = (_bleed_share(inscribed[i], 0.0, sigma) - _bleed_share(inscribed[i], 0.0, drawn)) / left
+    return (True, *_remove_bleed(cell, slope, black, color, change, (more - usual) / left))

@@ -13,23 +13,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import lent
-from extractor.numeric.gaussian import REACH, correlated, lay_corner, normal
+from extractor.numeric.compilation import inlined_no_refcount
+from extractor.numeric.gaussian import NORMAL_REACH, fill_corner_terms, normal_cdf, wedge_correlation
 from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, X, Y
-from extractor.refine.synthesis.pixel_rows import LANES, lanes_of
+from extractor.refine.synthesis.pixel_rows import LANES, padded_count
 
 CHUNK = 2128  # pixels of one cell at once, at most
 COLUMN = (
     CHUNK + LANES
 )  # whole lanes are laid out; no power of 2, which would lay all columns on one cache line
 PX, PY = 0, COLUMN  # columns of pixels: their places
-OF_SIDE = 9  # numbers
-NEAR = np.float32(REACH)
+SIDE_COLUMNS = 9  # numbers
+REACH_FLOAT32 = np.float32(NORMAL_REACH)
 STEPS = np.arange(COLUMN, dtype=np.float32)
 
 
-@lent
-def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
     """A cell's side in units of the blur: d = out[0] + out[1] x + out[2] y inside, t from its first corner likewise.
 
     out: 0-2 distance, 3-5 place along, 6 length, 7 and 8 slopes at its first and second corner, positive inwards.
@@ -49,20 +49,20 @@ def _side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-de
         out[7], out[8] = -sense * line[ARRIVE], -sense * line[LEAVE]
 
 
-@lent
-def lay_sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_sides(cell, cell_edges, edges, lines, turn, inverse, side):  # type: ignore[no-untyped-def]
     """Fill in a cell's three sides; how far they can lie off their chords."""
     bulge = 0.0
     for k in range(3):
         e = cell_edges[k]
         forward = edges[e, 0] == cell[k]
-        _side(lines, e, forward, turn if forward else -turn, inverse, side[k])
-        bulge = max(bulge, (0.25 * side[k, 6] + REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
+        _fill_side(lines, e, forward, turn if forward else -turn, inverse, side[k])
+        bulge = max(bulge, (0.25 * side[k, 6] + NORMAL_REACH) * max(abs(side[k, 7]), abs(side[k, 8])))
     return bulge
 
 
-@lent
-def lay_corners(side, sigma, corners):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_corners(side, sigma, corners):  # type: ignore[no-untyped-def]
     """Fill in the corners (3, 9) between the cell's sides and the next ones."""
     for k in range(3):
         one, other = side[k], side[(k + 1) % 3]
@@ -70,14 +70,16 @@ def lay_corners(side, sigma, corners):  # type: ignore[no-untyped-def]
         # sides that bow inwards leave and arrive as their chords do, turned by their slopes
         x, y = one[4] + end * one[1], one[5] + end * one[2]
         cosine = x * (other[4] + start * other[1]) + y * (other[5] + start * other[2])
-        lay_corner(cosine * sigma * sigma / np.sqrt((1.0 + end * end) * (1.0 + start * start)), corners[k])
+        fill_corner_terms(
+            cosine * sigma * sigma / np.sqrt((1.0 + end * end) * (1.0 + start * start)), corners[k]
+        )
 
 
-@lent
-def lay_rows(side, top, count, far, left, right, low, high):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_row_ends(side, top, count, far, left, right, low, high):  # type: ignore[no-untyped-def]
     """Fill in the columns, ``left`` to ``right`` at most, between which rows from ``top`` on lie less than ``far``
     outside of every side."""
-    padded = lanes_of(count)
+    padded = padded_count(count)
     low[:padded], high[:padded] = left, right
     for k in range(3):
         # where a side runs along the rows, it takes all of them or leaves them
@@ -91,18 +93,18 @@ def lay_rows(side, top, count, far, left, right, low, high):  # type: ignore[no-
                 high[i] = min(high[i], x + lean * i)
 
 
-@lent
-def lay_pixels(places, at, count, x, y):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_pixels(places, at, count, x, y):  # type: ignore[no-untyped-def]
     """Lay out ``count`` pixels of a row from (x, y) on; what comes after them may be written over."""
     px, py = np.float32(x), np.float32(y)
     to_x, to_y = np.uint64(PX + at), np.uint64(PY + at)
-    for j in range(lanes_of(count)):
+    for j in range(padded_count(count)):
         k = np.uint64(j)
         places[to_x + k], places[to_y + k] = px + STEPS[k], py
 
 
-@lent
-def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_distances(places, count, side, x0, y0, far, out):  # type: ignore[no-untyped-def]
     """Fill in how far inside of a side the pixels lie; (x0, y0) is what their places count from."""
     zero, one, limit = np.float32(0.0), np.float32(1.0), np.float32(far)
     # what is near is the difference of what is far
@@ -122,28 +124,28 @@ def _from_side(places, count, side, x0, y0, far, out):  # type: ignore[no-untype
         out[k] = d - off - (bend * inside - bent) if d < limit else d
 
 
-@lent
-def _side_share(d):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _half_plane_coverage(d):  # type: ignore[no-untyped-def]
     """The share of a side, by the distance inside it."""
-    return np.float32(1.0) if d >= NEAR else normal(max(d, -NEAR))
+    return np.float32(1.0) if d >= REACH_FLOAT32 else normal_cdf(max(d, -REACH_FLOAT32))
 
 
-@lent
-def _joint(d, other, corner):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _wedge_correlation(d, other, corner):  # type: ignore[no-untyped-def]
     """The share of a wedge beyond the product of its sides' shares."""
-    d, other = max(d, -NEAR), max(other, -NEAR)
-    share = correlated(d * d + other * other, d * other, corner)
-    return share if max(d, other) < NEAR else np.float32(0.0)
+    d, other = max(d, -REACH_FLOAT32), max(other, -REACH_FLOAT32)
+    share = wedge_correlation(d * d + other * other, d * other, corner)
+    return share if max(d, other) < REACH_FLOAT32 else np.float32(0.0)
 
 
-@lent
-def _corner(corners, k):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _corner_terms(corners, k):  # type: ignore[no-untyped-def]
     c = corners[k]
     return c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]
 
 
-@lent
-def _picked(which, one, other):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _selected_corner(which, one, other):  # type: ignore[no-untyped-def]
     """Nine numbers of one corner or of another."""
     a0, a1, a2, b0, b1, b2, w0, w1, w2 = one
     c0, c1, c2, d0, d1, d2, v0, v1, v2 = other
@@ -153,34 +155,42 @@ def _picked(which, one, other):  # type: ignore[no-untyped-def]
     return a0, a1, a2, b0, b1, b2, w0, w1, w2
 
 
-@lent
-def _two_sides(sides, corners, count, shares):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_two_side_coverage(sides, corners, count, shares):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares where two sides at most are near."""
-    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
+    c01, c12, c20 = _corner_terms(corners, 0), _corner_terms(corners, 1), _corner_terms(corners, 2)
     for k in range(count):
         d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
         low, high = min(min(d0, d1), d2), max(max(d0, d1), d2)
         middle = max(min(d0, d1), min(max(d0, d1), d2))
         # the one that is far says which two are near
-        corner = _picked(high == d2, c01, _picked(high == d0, c12, c20))
-        one = _side_share(low)
-        share = one if middle >= NEAR else one * _side_share(middle) + _joint(low, middle, corner)
-        shares[k] = share if low > -NEAR else np.float32(0.0)
+        corner = _selected_corner(high == d2, c01, _selected_corner(high == d0, c12, c20))
+        one = _half_plane_coverage(low)
+        share = (
+            one
+            if middle >= REACH_FLOAT32
+            else one * _half_plane_coverage(middle) + _wedge_correlation(low, middle, corner)
+        )
+        shares[k] = share if low > -REACH_FLOAT32 else np.float32(0.0)
 
 
-@lent
-def _three_sides(sides, corners, count, shares):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_three_side_coverage(sides, corners, count, shares):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares wherever they lie."""
-    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
+    c01, c12, c20 = _corner_terms(corners, 0), _corner_terms(corners, 1), _corner_terms(corners, 2)
     for k in range(count):
         d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
-        s0, s1, s2 = _side_share(d0), _side_share(d1), _side_share(d2)
+        s0, s1, s2 = _half_plane_coverage(d0), _half_plane_coverage(d1), _half_plane_coverage(d2)
         share = np.float32(1.0) - s0 - s1 - s2 + s0 * s1 + s1 * s2 + s2 * s0
-        share += _joint(d0, d1, c01) + _joint(d1, d2, c12) + _joint(d2, d0, c20)
-        shares[k] = max(share, np.float32(0.0)) if min(min(d0, d1), d2) > -NEAR else np.float32(0.0)
+        share += (
+            _wedge_correlation(d0, d1, c01)
+            + _wedge_correlation(d1, d2, c12)
+            + _wedge_correlation(d2, d0, c20)
+        )
+        shares[k] = max(share, np.float32(0.0)) if min(min(d0, d1), d2) > -REACH_FLOAT32 else np.float32(0.0)
 
 
-@lent
+@inlined_no_refcount
 def is_small(side):  # type: ignore[no-untyped-def]
     """Whether all three sides of a cell may be near: by the radius of its inscribed circle."""
     a, b, c = side[0, 6], side[1, 6], side[2, 6]
@@ -188,16 +198,16 @@ def is_small(side):  # type: ignore[no-untyped-def]
     for k in range(3):
         bow = max(bow, 0.25 * side[k, 6] * max(abs(side[k, 7]), abs(side[k, 8])))
     square = (around - 2.0 * a) * (around - 2.0 * b) * (around - 2.0 * c) / (4.0 * around)
-    return square < (REACH + bow) ** 2
+    return square < (NORMAL_REACH + bow) ** 2
 
 
-@lent
-def fill_shares(places, count, x0, y0, side, corners, far, sides, shares):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_coverage(places, count, x0, y0, side, corners, far, sides, shares):  # type: ignore[no-untyped-def]
     """Fill in the shares of a cell in the pixels that are laid out in ``places``, which count from (x0, y0)."""
-    padded = lanes_of(count)
+    padded = padded_count(count)
     for k in range(3):
-        _from_side(places, padded, side[k], x0, y0, far, sides[k * COLUMN :])
+        _fill_distances(places, padded, side[k], x0, y0, far, sides[k * COLUMN :])
     if is_small(side):
-        _three_sides(sides, corners, padded, shares)
+        _fill_three_side_coverage(sides, corners, padded, shares)
     else:
-        _two_sides(sides, corners, padded, shares)
+        _fill_two_side_coverage(sides, corners, padded, shares)

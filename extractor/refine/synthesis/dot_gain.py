@@ -11,32 +11,32 @@ import numpy as np
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.residual_kernel import AA, AB, AC, AD, BB, BC, BD, MISFIT, C, D
 
-FEW, ENOUGH = 40, 250  # gridlines that do not show it, and that do
-LITTLE = 0.1  # of the blur, which drawings, compression and glare may feign
+MIN_GRIDLINES, MAX_GRIDLINES = 40, 250  # gridlines that do not show it, and that do
+MIN_DOT_GAIN = 0.1  # of the blur, which drawings, compression and glare may feign
 MIN_SINE = 0.2  # of a corner: a sharper one is moved no farther
 
 
 @compiled
-def swelling_of(sums, to_a, to_b, contrasts, edge_cells, sigma):  # type: ignore[no-untyped-def]
+def measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma):  # type: ignore[no-untyped-def]
     """By how much the sides of all cells have moved outward, px; 0 where it is little, or few gridlines are seen.
 
     That is the median of what these show, by their sums (E, 24) and votes (E,) for moving their starts and ends.
     ``sigma`` is the blur, px.
     """
     seen, count = np.flatnonzero(sums[:, AA] > 0.0), 0
-    some = seen[:: max(seen.shape[0] // ENOUGH, 1)]
+    some = seen[:: max(seen.shape[0] // MAX_GRIDLINES, 1)]
     off = np.empty(some.shape[0])
     for e in some:
-        outward = _outward(contrasts, edge_cells, e)
+        outward = _outward_sign(contrasts, edge_cells, e)
         if outward != 0.0:
             off[count] = outward * (to_a[e] + to_b[e]) / (sums[e, AA] + 2.0 * sums[e, AB] + sums[e, BB])
             count += 1
-    swelling = np.median(off[:count]) if count > FEW else 0.0
-    return swelling if abs(swelling) > LITTLE * sigma else 0.0
+    swelling = np.median(off[:count]) if count > MIN_GRIDLINES else 0.0
+    return swelling if abs(swelling) > MIN_DOT_GAIN * sigma else 0.0
 
 
 @compiled
-def unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling):  # type: ignore[no-untyped-def]
+def update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, swelling):  # type: ignore[no-untyped-def]
     """(E,) px, by how much gridlines lie off towards their normal for that; it is taken out of their sums and votes, in
     place."""
     aside = np.zeros(sums.shape[0])
@@ -45,7 +45,7 @@ def unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling):  # type: ignor
     for e in range(sums.shape[0]):
         if sums[e, AA] == 0.0:
             continue
-        off = swelling * _outward(contrasts, edge_cells, e)
+        off = swelling * _outward_sign(contrasts, edge_cells, e)
         by_a, by_b = sums[e, AA] + sums[e, AB], sums[e, AB] + sums[e, BB]
         sums[e, MISFIT] -= off * (2.0 * (to_a[e] + to_b[e]) - off * (by_a + by_b))
         to_a[e] -= off * by_a
@@ -57,7 +57,7 @@ def unswollen(sums, to_a, to_b, contrasts, edge_cells, swelling):  # type: ignor
 
 
 @compiled
-def _outward(contrasts, edge_cells, e):  # type: ignore[no-untyped-def]
+def _outward_sign(contrasts, edge_cells, e):  # type: ignore[no-untyped-def]
     """1 where black lies on the side of a gridline's normal, -1 where it lies on the other, 0 where on neither."""
     if edge_cells[e, 0] >= 0 and edge_cells[e, 1] >= 0:
         return 0.0
@@ -65,7 +65,7 @@ def _outward(contrasts, edge_cells, e):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _towards(xy, m, n):  # type: ignore[no-untyped-def]
+def _unit_vector(xy, m, n):  # type: ignore[no-untyped-def]
     """The unit vector from one marker to another."""
     x, y = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
     length = np.sqrt(x * x + y * y)
@@ -73,14 +73,14 @@ def _towards(xy, m, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def shrunk(xy, cells, swelling):  # type: ignore[no-untyped-def]
+def markers_without_dot_gain(xy, cells, swelling):  # type: ignore[no-untyped-def]
     """(M, 2) markers that were put at the means of the corners of swollen cells (K, 3)."""
     inward, count = np.zeros_like(xy), np.zeros(xy.shape[0])
     for i in range(cells.shape[0]):
         for k in range(3):
             m = cells[i, k]
-            ax, ay = _towards(xy, m, cells[i, (k + 1) % 3])
-            bx, by = _towards(xy, m, cells[i, (k + 2) % 3])
+            ax, ay = _unit_vector(xy, m, cells[i, (k + 1) % 3])
+            bx, by = _unit_vector(xy, m, cells[i, (k + 2) % 3])
             sine = abs(ax * by - ay * bx)
             if np.isfinite(sine):
                 inward[m, 0] += swelling * (ax + bx) / max(sine, MIN_SINE)

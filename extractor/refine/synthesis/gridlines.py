@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.localmap.regularised_maps import lay_quadratics
+from extractor.localmap.regularised_maps import fill_quadratic_derivatives
 from extractor.numeric.compilation import compiled, inlined, vectorized
 
 # columns of a gridline
@@ -25,12 +25,12 @@ def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
     Where both rings are whole, the first derivatives are those of a cubic (and the second 0: nothing asks for them);
     elsewhere of a quadratic, bending held towards 0, and without bending where fewer than five neighbours are known.
     """
-    return maps_at(xy, np.isfinite(xy[:, 0]), near, offset, stencil)
+    return local_maps_at(xy, np.isfinite(xy[:, 0]), near, offset, stencil)
 
 
 @compiled
-def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
-    """The same at ``which`` (M,) of the known markers only."""
+def local_maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
+    """The same at ``gridlines`` (M,) of the known markers only."""
     out = np.full((xy.shape[0], 2, 5), np.nan)
     broken, count = np.empty(xy.shape[0], np.int64), 0
     for m in range(xy.shape[0]):
@@ -38,7 +38,9 @@ def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
             continue
         # there are weights where both rings are whole
         whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
-        xu, xv, yu, yv = _cubic(xy, m, near, stencil) if whole else (np.nan, np.nan, np.nan, np.nan)
+        xu, xv, yu, yv = (
+            _cubic_derivatives(xy, m, near, stencil) if whole else (np.nan, np.nan, np.nan, np.nan)
+        )
         if np.isfinite(xu):
             out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
             for k in range(2, 5):
@@ -46,12 +48,12 @@ def maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
         else:
             broken[count] = m
             count += 1
-    lay_quadratics(xy, broken[:count], near, offset, out)
+    fill_quadratic_derivatives(xy, broken[:count], near, offset, out)
     return out
 
 
 @vectorized
-def _cubic(xy, m, near, stencil):  # type: ignore[no-untyped-def]
+def _cubic_derivatives(xy, m, near, stencil):  # type: ignore[no-untyped-def]
     """The first derivatives of x and y at marker m; NaN where a neighbour is unknown."""
     xu, xv, yu, yv = 0.0, 0.0, 0.0, 0.0
     x, y = xy[m, 0], xy[m, 1]
@@ -66,7 +68,7 @@ def _cubic(xy, m, near, stencil):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
+def extrapolate_markers(xy, maps, near, offset):  # type: ignore[no-untyped-def]
     """``xy`` with unknown markers beside known ones put where their neighbours' maps say; which ones, (M,) bool."""
     out = xy.copy()
     put = np.zeros(xy.shape[0], np.bool_)
@@ -91,8 +93,9 @@ def extrapolate(xy, maps, near, offset):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def continued(xy, near, offset, stencil, rings):  # type: ignore[no-untyped-def]
-    """``xy`` with the unknown markers of so many rings around known ones put where ``extrapolate`` puts them, by maps
+def extrapolate_rings(xy, near, offset, stencil, rings):  # type: ignore[no-untyped-def]
+    """``xy`` with the unknown markers of so many rings around known ones put where ``extrapolate_markers`` puts
+    them, by maps
     that are laid only beside them."""
     for _ in range(rings):
         asked = np.zeros(xy.shape[0], np.bool_)
@@ -103,7 +106,7 @@ def continued(xy, near, offset, stencil, rings):  # type: ignore[no-untyped-def]
                     asked[n] = True
         if not np.any(asked):
             break
-        xy = extrapolate(xy, maps_at(xy, asked, near, offset, stencil), near, offset)[0]
+        xy = extrapolate_markers(xy, local_maps_at(xy, asked, near, offset, stencil), near, offset)[0]
     return xy
 
 
@@ -150,7 +153,7 @@ def _slope(maps, m, along, e, ux, uy):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def bow(t, length, leave, arrive):  # type: ignore[no-untyped-def]
+def sagitta(t, length, leave, arrive):  # type: ignore[no-untyped-def]
     """How far the gridline lies off its chord at the fraction t; straight on beyond its ends."""
     if t <= 0.0:
         return length * leave * t

@@ -14,21 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, vectorized
-from extractor.numeric.dense_systems import cholesky_solve
+from extractor.numeric.dense_systems import update_to_cholesky_solution
 
 INKS = 5  # red, green, blue, black, white
 BLACK, WHITE = 3, 4
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
-DISC = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
-DISC_BEFORE = 0.47  # where nothing is drawn yet, and the neighbours' ink reaches into it
+DISC_SHARE = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
+FIRST_DISC_SHARE = 0.47  # where nothing is drawn yet, and the neighbours' ink reaches into it
 CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
 MIN_RADIUS_PX = 0.75
-ROUNDS = 2  # of the robust fit
-TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
+FIT_ROUNDS = 2  # of the robust fit
+OUTLIER_TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
 
-class Levels(NamedTuple):
+class InkLevels(NamedTuple):
     """Attributes:
     cell: (K, 3) level of the drawn cells over the black beneath, at their centroids.
     slope: (K, 3, 2) its change per px along x and y.
@@ -39,11 +39,11 @@ class Levels(NamedTuple):
     cell: NDArray[np.float64]
     slope: NDArray[np.float64]
     black: NDArray[np.float64]
-    strange: NDArray[np.bool_]
+    is_outlier: NDArray[np.bool_]
 
 
 @compiled
-def monomials(x, y, out):  # type: ignore[no-untyped-def]
+def fill_monomials(x, y, out):  # type: ignore[no-untyped-def]
     """Write the ten terms at (x, y)."""
     out[0], out[1], out[2] = 1.0, x, y
     out[3], out[4], out[5] = x * x, x * y, y * y
@@ -51,20 +51,20 @@ def monomials(x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def disc_of(a, b, c, sigma):  # type: ignore[no-untyped-def]
+def cell_radii(a, b, c, sigma):  # type: ignore[no-untyped-def]
     """The radius of a cell's inscribed circle, and of the disc about its centroid that its level is taken from."""
     area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
     around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
     around += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
     around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
     inscribed = area / max(around, 1e-9)
-    return inscribed, disc_in(inscribed, sigma)
+    return inscribed, disc_radius(inscribed, sigma)
 
 
 @compiled
-def disc_in(inscribed, sigma):  # type: ignore[no-untyped-def]
+def disc_radius(inscribed, sigma):  # type: ignore[no-untyped-def]
     """The radius of that disc, by the inscribed circle's."""
-    most = DISC if sigma == 0.0 else DISC_BEFORE
+    most = DISC_SHARE if sigma == 0.0 else FIRST_DISC_SHARE
     return max(min(most * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
 
 
@@ -84,7 +84,7 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
         cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
         if not (cx >= 0.0 and cy >= 0.0 and cx <= width - 1.0 and cy <= height - 1.0):
             continue
-        _, radius = disc_of(a, b, c, sigma)
+        _, radius = cell_radii(a, b, c, sigma)
         count, s0, s1, s2 = 0, 0.0, 0.0, 0.0
         for y in range(max(int(np.ceil(cy - radius)), 0), min(int(cy + radius), height - 1) + 1):
             half = np.sqrt(max(radius * radius - (y - cy) ** 2, 0.0))
@@ -106,7 +106,7 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _normal_equations(terms, values, weight, gram, right):  # type: ignore[no-untyped-def]
+def _fill_normal_equations(terms, values, weight, gram, right):  # type: ignore[no-untyped-def]
     """Fill in the sums over all cells of weight times term times term (its lower triangle), and times value."""
     weighted = np.empty(weight.shape[0])
     for j in range(TERMS):
@@ -125,21 +125,21 @@ def _normal_equations(terms, values, weight, gram, right):  # type: ignore[no-un
 
 
 @compiled
-def _fit(terms, values, weight, count, gram, right):  # type: ignore[no-untyped-def]
+def _fill_polynomial_fit(terms, values, weight, count, gram, right):  # type: ignore[no-untyped-def]
     """Write the weighted least squares polynomial with the first ``count`` terms, a little held towards 0, into
     ``right`` (3, 10)."""
-    _normal_equations(terms, values, weight, gram, right)
+    _fill_normal_equations(terms, values, weight, gram, right)
     right[:, count:] = 0.0
     if not gram[0, 0] > 0.0:
         right[:] = 0.0
         return
     for j in range(1, count):
         gram[j, j] += 1e-6 * gram[0, 0]
-    cholesky_solve(gram, right, count)
+    update_to_cholesky_solution(gram, right, count)
 
 
 @vectorized
-def _misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
+def _fill_misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
     """Mean squared distance of each cell's level from the polynomial."""
     rest = np.empty(out.shape[0])
     out[:] = 0.0
@@ -154,7 +154,7 @@ def _misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _field(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
+def _robust_polynomial(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
     """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange.
 
     ``terms`` (10, n) and ``values`` (4, n) are columns a cell; the fourth value is the number of pixels.
@@ -164,25 +164,25 @@ def _field(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
     for i in range(n):
         weight[i] = values[3, i] / (1.0 + 0.1 * values[3, i])
     start, gram, field = weight.copy(), np.empty((TERMS, TERMS)), np.empty((3, TERMS))
-    _fit(terms, values, weight, count, gram, field)
+    _fill_polynomial_fit(terms, values, weight, count, gram, field)
     for _ in range(rounds):
-        _misfits(terms, values, field, misfit)
+        _fill_misfits(terms, values, field, misfit)
         # 0.79 is the median of a chi-square of 3 degrees over 3
         spread = np.median(misfit) / 0.79
         for i in range(n):
             weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * spread + 1e-9)) ** 2
-        _fit(terms, values, weight, count, gram, field)
-    _misfits(terms, values, field, misfit)
+        _fill_polynomial_fit(terms, values, weight, count, gram, field)
+    _fill_misfits(terms, values, field, misfit)
     spread = np.median(misfit) / 0.79
     expected = noise * noise / np.median(values[3])
     strange = np.zeros(n, np.bool_)
     for i in range(n):
-        strange[i] = misfit[i] > TOLERANCE**2 * (spread + noise * noise / values[3, i]) + 4.0
+        strange[i] = misfit[i] > OUTLIER_TOLERANCE**2 * (spread + noise * noise / values[3, i]) + 4.0
     return field, max(spread * n / max(n - count, 1) - 1.15 * expected, 0.0), strange
 
 
 @compiled
-def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
+def _fill_levels(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
     """Fill in the cells' levels over black and their slopes."""
     terms = np.empty(TERMS)
     for i in range(own.shape[0]):
@@ -190,7 +190,7 @@ def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, sca
         if not np.isfinite(x):
             # a corner is unknown; its cell may be drawn in the next step, when it has been put
             x, y = 0.0, 0.0
-        monomials(x, y, terms)
+        fill_monomials(x, y, terms)
         c = color[i]
         known = own[i, 3] > 0.0
         keep = 0.0
@@ -219,7 +219,7 @@ def _shrunk(own, place, color, noise, fields, spreads, strange, cell, slope, sca
 
 
 @compiled
-def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
+def _ink_samples(values, place, color, ink):  # type: ignore[no-untyped-def]
     """Terms (10, n), values (4, n) and numbers (n,) of an ink's cells that can be seen."""
     n = 0
     for i in range(values.shape[0]):
@@ -229,14 +229,14 @@ def _gather(values, place, color, ink):  # type: ignore[no-untyped-def]
     n = 0
     for i in range(values.shape[0]):
         if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
-            monomials(place[i, 0], place[i, 1], terms[:, n])
+            fill_monomials(place[i, 0], place[i, 1], terms[:, n])
             own[:, n], number[n] = values[i], i
             n += 1
     return terms, own, number
 
 
 @compiled
-def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
+def _cell_centroids(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
         a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
@@ -246,8 +246,8 @@ def _places(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """``Levels``, one by one, from the cells' own ones.
+def smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
+    """``InkLevels``, one by one, from the cells' own ones.
 
     Args:
         drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
@@ -258,12 +258,15 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
     """
     fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
     strange = np.zeros(drawn.shape[0], np.bool_)
-    place, place_black = _places(xy, cells, x0, y0, scale), _places(xy, black_cells, x0, y0, scale)
+    place, place_black = (
+        _cell_centroids(xy, cells, x0, y0, scale),
+        _cell_centroids(xy, black_cells, x0, y0, scale),
+    )
     for ink in range(INKS):
         if ink == BLACK:
-            terms, own, number = _gather(black, place_black, color, ink)
+            terms, own, number = _ink_samples(black, place_black, color, ink)
         else:
-            terms, own, number = _gather(drawn, place, color, ink)
+            terms, own, number = _ink_samples(drawn, place, color, ink)
         n = number.shape[0]
         if n == 0:
             continue
@@ -272,7 +275,7 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
             if n >= CELLS_FOR_TERMS[k][0]:
                 count = CELLS_FOR_TERMS[k][1]
                 break
-        field, spread, odd = _field(terms, own, noise, count, ROUNDS)
+        field, spread, odd = _robust_polynomial(terms, own, noise, count, FIT_ROUNDS)
         fields[ink], spreads[ink] = field, spread
         if ink == WHITE:  # alone of its kind
             spreads[ink] = 1e9
@@ -280,7 +283,7 @@ def smoothed(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):
             for i in range(n):
                 strange[number[i]] = odd[i]
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
-    _shrunk(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
+    _fill_levels(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
     return cell, slope, fields[BLACK], strange
 
 
@@ -296,11 +299,11 @@ def level_change(before, now):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def black_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
+def black_levels_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
     """(K, 3): the black's polynomial at the points (K, 2) px."""
     out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
     for i in range(xy.shape[0]):
-        monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
+        fill_monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
         for channel in range(3):
             for k in range(TERMS):
                 out[i, channel] += terms[k] * black[channel, k]

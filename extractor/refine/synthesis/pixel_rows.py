@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import lent, lent_vectorized
+from extractor.numeric.compilation import inlined_no_refcount, vectorized_no_refcount
 
 CHUNK = 2128  # pixels of one gridline at once, at most; no power of 2, which would lay all columns on one cache line
 LANES = 16  # rows are handled so many at once
@@ -18,22 +18,23 @@ LANES = 16  # rows are handled so many at once
 ALONG, ASIDE, FROM, TO = (k * CHUNK for k in range(4))
 
 
-@lent
+@inlined_no_refcount
 def row_sizes(half, most):  # type: ignore[no-untyped-def]
-    """How many pixels of a row may lie within its band, ``half`` to both sides, ``most`` at most; and how many rows of
+    """How many pixels of a row may lie within its band, ``half`` to both sides, ``max_partial_share_in_dirt`` at
+    most; and how many rows of
     them fit into a chunk."""
     wide = max(min(int(2.0 * half) + 1, most, CHUNK // LANES), 1)
     return wide, CHUNK // (wide * LANES) * LANES
 
 
-@lent
-def lanes_of(count):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def padded_count(count):  # type: ignore[no-untyped-def]
     """So many rows, filled up to whole lanes."""
     return (count + LANES - 1) // LANES * LANES
 
 
-@lent_vectorized
-def lay_rows(  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def fill_rows(  # type: ignore[no-untyped-def]
     first,
     every,
     count,
@@ -60,7 +61,7 @@ def lay_rows(  # type: ignore[no-untyped-def]
     """
     sense = 1.0 if step_q > step_p else -1.0
     lean, per_length, bulge, top = uq / up, 1.0 / (up * length), sense * length / up, high + 1.0 - wide
-    for i in range(lanes_of(count)):
+    for i in range(padded_count(count)):
         p = first + i * every
         f = p - p0
         t = f * per_length
@@ -77,27 +78,27 @@ def lay_rows(  # type: ignore[no-untyped-def]
         rows[TO + i] = -1.0 if i >= count else stop - base
 
 
-@lent
-def gather(flat, at, count, wide, step, color, beneath, rest):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_projections(flat, at, count, wide, step, color, beneath, rest):  # type: ignore[no-untyped-def]
     """Fill in what the pixels of ``count`` rows show along ``color``, less ``beneath``."""
     c0, c1, c2 = color
     one, two = np.uint64(1), np.uint64(2)
     for j in range(wide):
-        own = rest[j * lanes_of(count) :]
+        own = rest[j * padded_count(count) :]
         for i in range(count):
             k = np.uint64(at[i] + j * step)
             shown = c0 * np.float32(flat[k]) + c1 * np.float32(flat[k + one]) + c2 * np.float32(flat[k + two])
             own[i] = shown - beneath
 
 
-@lent
-def gather_squares(flat, at, count, wide, step, color, beneath, rest, squares):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def fill_projections_and_squares(flat, at, count, wide, step, color, beneath, rest, squares):  # type: ignore[no-untyped-def]
     """The same where a color lies ``beneath``, and the squared distances from that color."""
     c0, c1, c2 = color
     b0, b1, b2 = beneath
     one, two = np.uint64(1), np.uint64(2)
     for j in range(wide):
-        own, square = rest[j * lanes_of(count) :], squares[j * lanes_of(count) :]
+        own, square = rest[j * padded_count(count) :], squares[j * padded_count(count) :]
         for i in range(count):
             k = np.uint64(at[i] + j * step)
             r0, r1, r2 = flat[k] - b0, flat[k + one] - b1, flat[k + two] - b2

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.compilation import compiled, lent, lent_vectorized
+from extractor.numeric.compilation import compiled, inlined_no_refcount, vectorized_no_refcount
 from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
 from extractor.refine.synthesis.pixel_rows import (
     ALONG,
@@ -16,9 +16,9 @@ from extractor.refine.synthesis.pixel_rows import (
     CHUNK,
     FROM,
     TO,
-    gather_squares,
-    lanes_of,
-    lay_rows,
+    fill_projections_and_squares,
+    fill_rows,
+    padded_count,
     row_sizes,
 )
 
@@ -27,7 +27,7 @@ BAND = 2.2  # how far from a gridline its pixels vote, in units of the blur
 # columns of what is read along a gridline: sums over its pixels
 AA, AB, BB, A, B, SHARE_A, SHARE_B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(11)
 AC, AD, BC, BD, CC, CD, DD, C, D, SHARE_C, SHARE_D = range(11, 22)
-SEEN_A, SEEN_B = 22, 23  # AA and BB as they were read, where bending is eliminated from them
+READ_AA, READ_BB = 22, 23  # AA and BB as they were read, where bending is eliminated from them
 SUMS = 24
 KEEP, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # weights of pixels
 
@@ -47,14 +47,14 @@ END_BELL = 0.3989
 
 
 @compiled
-def clear(model, box):  # type: ignore[no-untyped-def]
+def fill_zeros(model, box):  # type: ignore[no-untyped-def]
     """Zeros inside the box (x from, y from, x to, y to)."""
     for y in range(box[1], box[3]):
         model[y, box[0] : box[2]] = np.float32(0.0)
 
 
 @compiled
-def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignore[no-untyped-def]
+def update_known_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignore[no-untyped-def]
     """(E, 3): level at the gridline's middle on the side of (uy, -ux) less that on the side of (-uy, ux)."""
     out = np.zeros((lines.shape[0], 3))
     for e in range(lines.shape[0]):
@@ -82,8 +82,8 @@ def edge_contrasts(lines, xy, cells, edge_cells, levels, slopes):  # type: ignor
     return out
 
 
-@lent
-def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _pixel_weights(along, aside, inverse, short, slack, length, leave, arrive):  # type: ignore[no-untyped-def]
     """A pixel's distance from the gridline in units of the blur, the normal density there, and the derivatives of the
     gridline's place by those of its start and end."""
     one, half = np.float32(1.0), np.float32(0.5)
@@ -107,8 +107,8 @@ def _weights(along, aside, inverse, short, slack, length, leave, arrive):  # typ
     return z, g, whole - to_b, to_b
 
 
-@lent
-def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _fill_weights(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leave, arrive, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 where they lie beyond the band.
 
     They are polynomials close to the derivative of the drawing, the normal density by its distance and the blurred
@@ -121,7 +121,7 @@ def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leav
             along, aside = rows[ALONG + i] + step * du, rows[ASIDE + i] + step * dv
             within = (step >= rows[FROM + i]) & (step <= rows[TO + i])
             keep = one if within & (along >= -reach) & (along <= length + reach) else zero
-            z, g, to_a, to_b = _weights(along, aside, inverse, short, slack, length, leave, arrive)
+            z, g, to_a, to_b = _pixel_weights(along, aside, inverse, short, slack, length, leave, arrive)
             ga, gb = keep * g * to_a, keep * g * to_b
             gc = ga * to_b
             out[KEEP + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
@@ -129,8 +129,8 @@ def _weigh(rows, lanes, wide, du, dv, reach, inverse, short, slack, length, leav
             out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
 
 
-@lent_vectorized
-def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _accumulate_sums(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums."""
     zero = np.float32(0.0)
     blur, curvature, misfit, pixels, wa, wb = zero, zero, zero, zero, zero, zero
@@ -163,8 +163,8 @@ def _vote(rest, squares, weights, count, sums):  # type: ignore[no-untyped-def]
     sums[PIXELS] += pixels
 
 
-@lent_vectorized
-def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _accumulate_bending_sums(rest, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for a gridline's bending, with weights t (1 - t) and t (1 - t) (1 - 2 t)."""
     zero = np.float32(0.0)
     ac, ad, bc, bd, cc, cd = zero, zero, zero, zero, zero, zero
@@ -196,7 +196,7 @@ def _vote_bending(rest, weights, count, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _area(lines, reach, box):  # type: ignore[no-untyped-def]
+def _band_box(lines, reach, box):  # type: ignore[no-untyped-def]
     """The part of the box (x from, y from, x to, y to) that the bands along known gridlines lie in."""
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for e in range(lines.shape[0]):
@@ -217,8 +217,8 @@ def _area(lines, reach, box):  # type: ignore[no-untyped-def]
     )
 
 
-@lent_vectorized
-def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
+@vectorized_no_refcount
+def _fill_residual(image, model, area, residual):  # type: ignore[no-untyped-def]
     """Write image - model within the area into the flat ``residual``."""
     width = 3 * (area[2] - area[0])
     for y in range(area[1], area[3]):
@@ -230,30 +230,31 @@ def _subtract(image, model, area, residual):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def read_gridlines(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
+def accumulate_residual_sums(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
     """(E, 24) sums over the pixels near each gridline; the columns are named above.
 
     AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
     residual (image - model - black, the last at the gridline's middle); SHARE: derivative times the share of a side,
     per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
-    likewise are for the bending of the gridlines that are ``loose`` (E,) bool, 0 elsewhere. ``residual`` is room for
+    likewise are for the bending of the gridlines that are ``bend_variance`` (E,) bool, 0 elsewhere. ``residual`` is
+    room for
     the pixels in the box.
     """
     out = np.zeros((lines.shape[0], SUMS))
-    area = _area(lines, BAND * sigma, box)
-    _subtract(image, model, area, residual)
+    area = _band_box(lines, BAND * sigma, box)
+    _fill_residual(image, model, area, residual)
     at, rows, weights = (
         np.empty(CHUNK, np.int64),
         np.empty(4 * CHUNK, np.float32),
         np.empty(6 * CHUNK, np.float32),
     )
     room = at, rows, weights, np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
-    _read(residual, lines, contrasts, black, sigma, area, loose, room, out)
+    _accumulate_gridline_sums(residual, lines, contrasts, black, sigma, area, loose, room, out)
     return out
 
 
-@lent
-def _read(residual, lines, contrasts, black, sigma, area, loose, room, out):  # type: ignore[no-untyped-def]
+@inlined_no_refcount
+def _accumulate_gridline_sums(residual, lines, contrasts, black, sigma, area, loose, room, out):  # type: ignore[no-untyped-def]
     """Fill in the sums (E, 24) from the residual within the area."""
     at, rows, weights, rest, squares = room
     inverse, reach = 1.0 / sigma, BAND * sigma
@@ -287,13 +288,13 @@ def _read(residual, lines, contrasts, black, sigma, area, loose, room, out):  # 
         line = (p0, q0, up, uq, length, leave, arrive, half)
         for begin in range(first, last + 1, most):
             count = min(most, last + 1 - begin)
-            lanes = lanes_of(count)
-            lay_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
-            gather_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
-            _weigh(rows, lanes, wide, *steps, *small, *shape, weights)
-            _vote(rest, squares, weights, lanes * wide, sums)
+            lanes = padded_count(count)
+            fill_rows(begin, 1, count, *line, 0, q_end - 1, wide, step_p, step_q, at, rows)
+            fill_projections_and_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
+            _fill_weights(rows, lanes, wide, *steps, *small, *shape, weights)
+            _accumulate_sums(rest, squares, weights, lanes * wide, sums)
             if loose[e]:
-                _vote_bending(rest, weights, lanes * wide, sums)
+                _accumulate_bending_sums(rest, weights, lanes * wide, sums)
         for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
             sums[k] *= strength * inverse * inverse
         for k in (A, B, BLUR, C, D):

@@ -15,7 +15,7 @@ from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import load_truth, load_truths, render, standard_layout
-from cmpdesign.scene.files.film import open_film
+from cmpdesign.scene.files.film import open_frame_writer
 from tests.support.scene_texts import MOVING, SIZE, scene_writer
 
 
@@ -94,7 +94,7 @@ def test_an_interrupted_sequence_leaves_nothing(run: Callable[..., tuple[int, st
 
 
 def test_films_write_beside(tmp_path: Path) -> None:
-    film = open_film(tmp_path / "f", 5, (8, 8), 16)
+    film = open_frame_writer(tmp_path / "f", 5, (8, 8), 16)
     film.add(np.full((8, 8, 3), 40_000, np.uint16))
     assert not (tmp_path / "f").exists()
     film.close()
@@ -102,6 +102,6 @@ def test_films_write_beside(tmp_path: Path) -> None:
     assert picture.dtype == np.uint16 and picture[0, 0, 0] == 40_000
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be written"):
-        open_film(tmp_path / "file" / "f", 5, (8, 8), 8).add(np.zeros((8, 8, 3), np.uint8))
+        open_frame_writer(tmp_path / "file" / "f", 5, (8, 8), 8).add(np.zeros((8, 8, 3), np.uint8))
     with pytest.raises(CmpDesignError, match="unknown ending"):
-        open_film(tmp_path / "x.gif", 5, (8, 8), 8)
+        open_frame_writer(tmp_path / "x.gif", 5, (8, 8), 8)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from cmpdesign.contact import Elastomer
-from cmpdesign.contact.layer.green import green
-from cmpdesign.contact.layer.operator import Operator
+from cmpdesign.contact.layer.green import green_kernels
+from cmpdesign.contact.layer.operator import ComplianceOperator
 
 Array = NDArray[np.float64]
 HALF_WIDTH = 3.6  # of the block, in thicknesses; by there the layer is at rest
@@ -79,7 +79,7 @@ def test_surface_moves_as_finite_elements_say(nu: float, limit: float) -> None:
     """In all three directions, under a load across the surface and along it, over the largest displacement."""
     elastomer = Elastomer(1.0, 1.0, nu)
     cells, step = 121, 0.05
-    operator = Operator(green(elastomer, step, cells), (cells, cells))
+    operator = ComplianceOperator(green_kernels(elastomer, step, cells), (cells, cells))
     x = step * (np.arange(cells) - cells // 2)
     columns, rows = np.array([60, 66, 72, 78, 84, 92, 100]), np.array([60, 70, 60, 66, 72, 60, 64])
     for axis, expected in finite_elements(elastomer, np.stack([x[columns], x[rows]])).items():

@@ -14,7 +14,7 @@ import cmpdesign
 from cmpdesign.design.design import Design, design_schema, design_schema_text, load_design
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.build import build_layout
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 
 
 def refusal(**fields: object) -> str:
@@ -165,7 +165,7 @@ def test_the_shipped_schema_is_current() -> None:
 def test_the_schema_is_valid_and_knows_the_patterns() -> None:
     schema = design_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["properties"]["pattern"]["enum"] == list(patterns())
+    assert schema["properties"]["pattern"]["enum"] == list(registered_patterns())
     assert json.loads(design_schema_text()) == schema
 
 

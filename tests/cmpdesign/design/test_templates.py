@@ -13,15 +13,15 @@ from cmpdesign.design.templates import find_design, templates
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.checks import check_design
-from cmpdesign.layout.report import report
-from cmpdesign.patterns import patterns
+from cmpdesign.layout.report import design_report
+from cmpdesign.patterns import registered_patterns
 
 NAMES = list(templates())
 
 
 def test_every_pattern_and_three_sensors_have_a_template() -> None:
-    assert set(patterns()) | {"tac3d", "gelsight-mini", "digit"} <= set(NAMES)
-    for name in patterns():
+    assert set(registered_patterns()) | {"tac3d", "gelsight-mini", "digit"} <= set(NAMES)
+    for name in registered_patterns():
         assert load_design(name).pattern == name
 
 
@@ -42,7 +42,7 @@ def test_a_template_follows_the_schema_it_names(name: str) -> None:
 
 
 def test_tac3d_has_the_article_s_figures() -> None:
-    figures = report(load_design("tac3d"), build_layout(load_design("tac3d")))
+    figures = design_report(load_design("tac3d"), build_layout(load_design("tac3d")))
     assert (figures.markers, figures.virtual_markers, figures.points) == (331, 4650, 4981)
     assert figures.shortest_edge_mm == pytest.approx(1.5, abs=1e-6)
 

@@ -7,14 +7,14 @@ import pytest
 
 from cmpdesign.evaluate import angles
 from cmpdesign.evaluate.measures.cells import (
-    bent,
-    drawn,
-    number_holds,
-    recognised,
-    regular,
-    shape_holds,
-    tracked,
-    turned,
+    bend_corner,
+    draw_cell,
+    find_cell_corners,
+    is_numbering_kept,
+    is_shape_recognised,
+    match_corners_by_direction,
+    regular_cell,
+    turn_cell,
 )
 
 
@@ -24,42 +24,42 @@ def inner_angle_deg(corners: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other)) % 360)
 
 
-@pytest.mark.parametrize("sides", angles.SIDES)
+@pytest.mark.parametrize("sides", angles.CELL_SIDES)
 @pytest.mark.parametrize("change_deg", [0, 20, 59, 75])
 def test_bending_opens_the_first_corner_by_that_much(sides: int, change_deg: float) -> None:
-    at_rest = regular(sides, 100)
+    at_rest = regular_cell(sides, 100)
     assert inner_angle_deg(at_rest) == pytest.approx(180 - 360 / sides)
-    assert inner_angle_deg(bent(at_rest, change_deg)) == pytest.approx(180 - 360 / sides + change_deg)
+    assert inner_angle_deg(bend_corner(at_rest, change_deg)) == pytest.approx(180 - 360 / sides + change_deg)
 
 
-@pytest.mark.parametrize("sides", angles.SIDES)
+@pytest.mark.parametrize("sides", angles.CELL_SIDES)
 def test_a_cell_at_rest_is_recognised_where_it_lies(sides: int) -> None:
-    corners = turned(regular(sides, 60), 7)
-    picture, origin = drawn(corners)
-    found = recognised(picture, sides)
+    corners = turn_cell(regular_cell(sides, 60), 7)
+    picture, origin = draw_cell(corners)
+    found = find_cell_corners(picture, sides)
     assert found is not None
     nearest = np.linalg.norm(found[:, None] - origin - corners, axis=2).min(axis=0)
     assert nearest.max() < 3.5
 
 
-@pytest.mark.parametrize("sides", angles.SIDES)
+@pytest.mark.parametrize("sides", angles.CELL_SIDES)
 def test_the_shape_is_lost_before_the_formulas_limit_and_not_long_before(sides: int) -> None:
     limit = angles.change_limit_deg(sides)
-    assert shape_holds(sides, 400, limit - 8)
-    assert not shape_holds(sides, 400, limit + 1)
+    assert is_shape_recognised(sides, 400, limit - 8)
+    assert not is_shape_recognised(sides, 400, limit + 1)
 
 
-@pytest.mark.parametrize("sides", angles.SIDES)
+@pytest.mark.parametrize("sides", angles.CELL_SIDES)
 def test_the_number_is_lost_at_the_formulas_limit(sides: int) -> None:
     limit = angles.turn_limit_deg(sides)
-    assert number_holds(sides, 100, limit - 2) and number_holds(sides, 100, -(limit - 2))
-    assert not number_holds(sides, 100, limit + 2)
+    assert is_numbering_kept(sides, 100, limit - 2) and is_numbering_kept(sides, 100, -(limit - 2))
+    assert not is_numbering_kept(sides, 100, limit + 2)
 
 
 def test_the_nearest_direction_decides() -> None:
-    at_rest = regular(4, 10)
-    assert tracked(turned(at_rest, 44), at_rest).tolist() == [0, 1, 2, 3]
-    assert tracked(turned(at_rest, 46), at_rest).tolist() == [1, 2, 3, 0]
+    at_rest = regular_cell(4, 10)
+    assert match_corners_by_direction(turn_cell(at_rest, 44), at_rest).tolist() == [0, 1, 2, 3]
+    assert match_corners_by_direction(turn_cell(at_rest, 46), at_rest).tolist() == [1, 2, 3, 0]
 
 
 def test_the_first_angle_lost_is_the_first() -> None:

@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.evaluate.measures.cube import POSITIONS_MM, SIDE_MM
-from cmpdesign.evaluate.reliability import METHODS, holds, judged
-from cmpdesign.evaluate.simulated.conditions import draw, middle
-from cmpdesign.evaluate.simulated.contacts import Load, surface
-from cmpdesign.evaluate.simulated.instrument import instrument
+from cmpdesign.evaluate.measures.cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
+from cmpdesign.evaluate.reliability import METHODS, is_successful, judge_places
+from cmpdesign.evaluate.simulated.conditions import mean_conditions, sample_conditions
+from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface
+from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 from cmpdesign.evaluate.simulated.sensor import SensorError, load_sensor, parse_sensor
 from tests.support.sensors import small_sensor_text
 
@@ -150,7 +150,7 @@ def test_designs(sensor_file: Path, tmp_path: Path) -> None:
 
 
 def test_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmpdesign.evaluate.angles.EDGES_PX", (30,))
+    monkeypatch.setattr("cmpdesign.evaluate.angles.EDGE_LENGTHS_PX", (30,))
     evaluate("angles", "-o", tmp_path, "--workers", 1)
     cells = report(tmp_path)["cells"]
     assert [cells[f"n{n}"]["shape_change_deg"]["formula"] for n in (3, 4, 6)] == [120, 90, 60]
@@ -161,18 +161,20 @@ def test_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_ten_places_are_4_mm_apart_and_the_cube_lies_on_both_patterns() -> None:
-    assert len(set(POSITIONS_MM)) == 10
-    for place in POSITIONS_MM:
-        assert any(sorted(np.abs(np.subtract(place, other))) == [0, 4] for other in POSITIONS_MM)
-    reach = np.abs(POSITIONS_MM).max(axis=0) + SIDE_MM / 2
+    assert len(set(CUBE_POSITIONS_MM)) == 10
+    for place in CUBE_POSITIONS_MM:
+        assert any(sorted(np.abs(np.subtract(place, other))) == [0, 4] for other in CUBE_POSITIONS_MM)
+    reach = np.abs(CUBE_POSITIONS_MM).max(axis=0) + CUBE_SIDE_MM / 2
     for method in ("square", "multicolor"):
-        layout = instrument(load_sensor().text, method).layout
+        layout = instrument_for_method(load_sensor().text, method).layout
         assert (reach < np.abs(layout.marker_xy_mm[layout.present]).max(axis=0)).all()
 
 
 def test_a_contact_moves_with_its_place() -> None:
     text = small_sensor_text()
-    here, there = (surface(text, Load("ball", 1.0), centre) for centre in ((0.0, 0.0), (2.0, -1.5)))
+    here, there = (
+        place_surface(text, ContactLoad("ball", 1.0), centre) for centre in ((0.0, 0.0), (2.0, -1.5))
+    )
     points = np.random.default_rng(0).uniform(-5, 5, (50, 2))
     assert there(points + [2.0, -1.5]) == pytest.approx(here(points) + [2.0, -1.5, 0.0])
     assert here.displacement_mm(np.zeros((1, 2)))[0, 2] == pytest.approx(-1.0, abs=0.02)
@@ -181,36 +183,40 @@ def test_a_contact_moves_with_its_place() -> None:
 def test_conditions_stay_in_their_ranges() -> None:
     ranges = load_sensor().table.conditions
     for seed in range(50):
-        drawn = draw(ranges, np.random.default_rng(seed), 15.0)
+        drawn = sample_conditions(ranges, np.random.default_rng(seed), 15.0)
         assert ranges.blur_px[0] <= drawn.blur_px <= ranges.blur_px[1]
         assert ranges.noise[0] <= drawn.noise <= ranges.noise[1]
         assert len(drawn.light.leds) <= ranges.lamps[1]
         assert drawn.damage is None or len(drawn.damage.blobs) <= ranges.specks[1]
-    assert middle(ranges).damage is None and middle(ranges).blur_px == pytest.approx(1.2)
+    assert mean_conditions(ranges).damage is None and mean_conditions(ranges).blur_px == pytest.approx(1.2)
 
 
 def test_what_counts_as_successful() -> None:
     """All markers right; one lost; one wrong far away from the contact."""
-    one = instrument(small_sensor_text(), "square")
-    pressed = surface(small_sensor_text(), Load("large_ball", 2.0), (0.0, 0.0))
-    truth = one.picture(middle(one.sensor.table.conditions), 0, pressed).truth
+    one = instrument_for_method(small_sensor_text(), "square")
+    pressed = place_surface(small_sensor_text(), ContactLoad("large_ball", 2.0), (0.0, 0.0))
+    truth = one.picture(mean_conditions(one.sensor.table.conditions), 0, pressed).truth
     places = np.array(truth.marker_xy_px)
     area = np.linalg.norm(pressed.displacement_mm(one.layout.marker_xy_mm), axis=1).argsort()
-    right = judged(one, pressed, truth, places)
-    assert right["right"] == right["needed"] and all(holds(name, right) for name in ("strict", "area_95"))
+    right = judge_places(one, pressed, truth, places)
+    assert right["right"] == right["needed"] and all(
+        is_successful(name, right) for name in ("strict", "area_95")
+    )
     lost = places.copy()
     lost[0, area[-1]] = np.nan
-    found = judged(one, pressed, truth, lost)
-    assert not holds("strict", found) and holds("area_95", found) and found["wrong"] == 0
+    found = judge_places(one, pressed, truth, lost)
+    assert not is_successful("strict", found) and is_successful("area_95", found) and found["wrong"] == 0
     wrong = places.copy()
     wrong[1, area[0]] += 10
-    found = judged(one, pressed, truth, wrong)
-    assert found["wrong"] == 1 and not any(holds(name, found) for name in ("strict", "area_95", "no_wrong"))
+    found = judge_places(one, pressed, truth, wrong)
+    assert found["wrong"] == 1 and not any(
+        is_successful(name, found) for name in ("strict", "area_95", "no_wrong")
+    )
 
 
 def test_rest_poses_are_those_of_the_sensor() -> None:
     for method in ("square", "multicolor"):
-        one = instrument(small_sensor_text(), method)
+        one = instrument_for_method(small_sensor_text(), method)
         for view, known in zip(one.reconstructor.poses.views, one.sensor.rig.views, strict=True):
             assert np.abs(view.position_mm - known.position_mm).max() < 0.2
 

@@ -8,8 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmpdesign.evaluate.article import change_percent
-from cmpdesign.evaluate.measures.edges import circumscribed_square_mm, edge_points, mean_extent_mm, response
-from cmpdesign.evaluate.report.statistics import Share, number, spread, wilson
+from cmpdesign.evaluate.measures.edges import (
+    circumscribed_square_mm,
+    edge_points,
+    mean_extent_mm,
+    shear_response,
+)
+from cmpdesign.evaluate.report.statistics import (
+    SuccessShare,
+    round_for_json,
+    sample_statistics,
+    wilson_interval,
+)
 
 
 @pytest.mark.parametrize(
@@ -24,31 +34,33 @@ from cmpdesign.evaluate.report.statistics import Share, number, spread, wilson
     ],
 )
 def test_wilsons_interval(successful: int, trials: int, low: float, high: float) -> None:
-    assert wilson(successful, trials) == pytest.approx((low, high), abs=5e-5)
+    assert wilson_interval(successful, trials) == pytest.approx((low, high), abs=5e-5)
 
 
 @given(st.integers(1, 2000), st.data())
 def test_wilsons_interval_holds_the_share_and_is_symmetric(trials: int, data: st.DataObject) -> None:
     successful = data.draw(st.integers(0, trials))
-    low, high = wilson(successful, trials)
+    low, high = wilson_interval(successful, trials)
     assert 0 <= low <= successful / trials <= high <= 1
-    mirrored = wilson(trials - successful, trials)
+    mirrored = wilson_interval(trials - successful, trials)
     assert (1 - mirrored[1], 1 - mirrored[0]) == pytest.approx((low, high), abs=1e-12)
 
 
 def test_nothing_tried_says_nothing() -> None:
-    assert wilson(0, 0) == (0.0, 1.0)
-    assert Share(0, 0).to_json()["share"] is None
+    assert wilson_interval(0, 0) == (0.0, 1.0)
+    assert SuccessShare(0, 0).to_json()["share"] is None
     with pytest.raises(ValueError, match="3 of 2"):
-        Share(2, 3)
+        SuccessShare(2, 3)
 
 
 def test_a_spread_leaves_out_what_is_missing() -> None:
-    found = spread([1.0, 3.0, None, float("nan")])  # type: ignore[list-item]
+    found = sample_statistics([1.0, 3.0, None, float("nan")])  # type: ignore[list-item]
     assert (found.count, found.mean, found.low, found.high) == (2, 2.0, 1.0, 3.0)
     assert found.deviation == pytest.approx(np.sqrt(2))
-    assert spread([]).to_json() == dict.fromkeys(spread([]).to_json(), None) | {"count": 0}
-    assert number(float("nan")) is None and number(1.23456789) == 1.234568
+    assert sample_statistics([]).to_json() == dict.fromkeys(sample_statistics([]).to_json(), None) | {
+        "count": 0
+    }
+    assert round_for_json(float("nan")) is None and round_for_json(1.23456789) == 1.234568
 
 
 def lattice(step_x: float, step_y: float, offset: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -95,7 +107,7 @@ def test_lost_markers_are_no_edge_points_and_none_give_no_square() -> None:
     chosen = edge_points(points, moved, (0.0, 0.0, -1.0))
     assert np.ptp(chosen.xy_mm[:, 0]) == pytest.approx(9.0)
     nothing = edge_points(points, np.full_like(moved, np.nan), (0.0, 0.0, -1.0))
-    assert circumscribed_square_mm(nothing.xy_mm) is None and response(nothing, 1.0) is None
+    assert circumscribed_square_mm(nothing.xy_mm) is None and shear_response(nothing, 1.0) is None
     assert mean_extent_mm(nothing.xy_mm) is None
 
 
@@ -104,7 +116,7 @@ def test_the_response_is_the_mean_share_of_the_shear() -> None:
     moved = np.zeros_like(points)
     moved[:, 1] = np.where(points[:, 0] < 0, 1.6, np.where(points[:, 0] == 0, 1.0, 0.7))
     chosen = edge_points(points, moved, (0.0, 1.0, 0.0))
-    assert response(chosen, 2.0) == pytest.approx((12 * 1.6 + 1.0) / 13 / 2)
+    assert shear_response(chosen, 2.0) == pytest.approx((12 * 1.6 + 1.0) / 13 / 2)
 
 
 def test_changes_are_in_percent_of_the_square_pattern() -> None:

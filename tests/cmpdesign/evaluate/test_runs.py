@@ -11,8 +11,8 @@ import pytest
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.evaluate import journal
-from cmpdesign.evaluate.journal import NAME, Journal, fingerprint
-from cmpdesign.evaluate.runner import Options, Trial, rng, run
+from cmpdesign.evaluate.journal import JOURNAL_NAME, Journal, fingerprint
+from cmpdesign.evaluate.runner import RunOptions, Trial, run_trials, trial_rng
 
 CONDITIONS = {"experiment": "test", "seed": 3}
 TRIALS = [Trial(f"draw-{i}", {"seed": 3, "index": i}) for i in range(6)]
@@ -20,7 +20,7 @@ TRIALS = [Trial(f"draw-{i}", {"seed": 3, "index": i}) for i in range(6)]
 
 def drawn(values: Mapping[str, Any]) -> dict[str, Any]:
     """A trial that is nothing but its random numbers."""
-    return {"value": float(rng(values["seed"], "draw", values["index"]).normal())}
+    return {"value": float(trial_rng(values["seed"], "draw", values["index"]).normal())}
 
 
 def interrupted(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,14 +31,14 @@ def interrupted(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def all_of(folder: Path, work: Any = drawn, trials: list[Trial] = TRIALS, workers: int = 1) -> list[Any]:
     with Journal(folder, CONDITIONS) as kept:
-        return run(work, trials, kept, workers=workers, title="test", show=False)
+        return run_trials(work, trials, kept, workers=workers, title="test", show=False)
 
 
 def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
     whole = all_of(tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
         all_of(tmp_path / "cut", interrupted)
-    assert len((tmp_path / "cut" / NAME).read_text().splitlines()) == 4
+    assert len((tmp_path / "cut" / JOURNAL_NAME).read_text().splitlines()) == 4
     tried = []
 
     def watched(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
         return drawn(values)
 
     assert all_of(tmp_path / "cut", watched) == whole and tried == [3, 4, 5]
-    assert (tmp_path / "cut" / NAME).read_bytes() == (tmp_path / "whole" / NAME).read_bytes()
+    assert (tmp_path / "cut" / JOURNAL_NAME).read_bytes() == (tmp_path / "whole" / JOURNAL_NAME).read_bytes()
 
 
 def test_neither_order_nor_processes_matter(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_neither_order_nor_processes_matter(tmp_path: Path) -> None:
 @pytest.mark.parametrize("cut", range(1, 60, 7))
 def test_a_line_that_a_crash_cut_short_is_dropped(tmp_path: Path, cut: int) -> None:
     whole = all_of(tmp_path)
-    path = tmp_path / NAME
+    path = tmp_path / JOURNAL_NAME
     data = path.read_bytes()
     path.write_bytes(data[:-cut])
     assert all_of(tmp_path) == whole
@@ -67,29 +67,29 @@ def test_a_line_that_a_crash_cut_short_is_dropped(tmp_path: Path, cut: int) -> N
 
 
 def test_a_torn_first_line_starts_anew(tmp_path: Path) -> None:
-    (tmp_path / NAME).write_text('{"journal": 1, "finger')
+    (tmp_path / JOURNAL_NAME).write_text('{"journal": 1, "finger')
     assert len(all_of(tmp_path)) == len(TRIALS)
 
 
 def test_another_run_is_refused_and_left_alone(tmp_path: Path) -> None:
     all_of(tmp_path)
-    before = (tmp_path / NAME).read_bytes()
+    before = (tmp_path / JOURNAL_NAME).read_bytes()
     with pytest.raises(CmpDesignError, match="other conditions"):
         Journal(tmp_path, {**CONDITIONS, "seed": 4})
-    assert (tmp_path / NAME).read_bytes() == before
-    (tmp_path / NAME).write_text("not a journal\n")
+    assert (tmp_path / JOURNAL_NAME).read_bytes() == before
+    (tmp_path / JOURNAL_NAME).write_text("not a journal\n")
     with pytest.raises(CmpDesignError, match="is not the journal"):
         Journal(tmp_path, CONDITIONS)
 
 
 def test_a_run_of_other_code_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     all_of(tmp_path, trials=TRIALS[:2])
-    before = (tmp_path / NAME).read_bytes()
+    before = (tmp_path / JOURNAL_NAME).read_bytes()
     monkeypatch.setattr(journal, "code_digest", lambda: "0" * 64)
     with pytest.raises(CmpDesignError, match=r"begun by other code.*another folder, or remove"):
         Journal(tmp_path, CONDITIONS)
-    assert (tmp_path / NAME).read_bytes() == before
-    (tmp_path / NAME).unlink()
+    assert (tmp_path / JOURNAL_NAME).read_bytes() == before
+    (tmp_path / JOURNAL_NAME).unlink()
     assert len(all_of(tmp_path)) == len(TRIALS)
 
 
@@ -100,7 +100,7 @@ def test_the_code_digest_knows_every_file(tmp_path: Path, monkeypatch: pytest.Mo
     (package / "__init__.py").write_text("")
     (package / "inner" / "one.py").write_text("LIMIT = 1\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(journal, "SOURCES", ("measured_code",))
+    monkeypatch.setattr(journal, "HASHED_PACKAGES", ("measured_code",))
     digest = journal.code_digest.__wrapped__
     found = [digest(), digest()]
     (package / "inner" / "one.py").write_text("LIMIT = 2\n")
@@ -132,17 +132,17 @@ def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path) -> None:
 def test_more_trials_reuse_those_done(tmp_path: Path) -> None:
     first = all_of(tmp_path, trials=TRIALS[:2])
     assert all_of(tmp_path)[:2] == first
-    documents = [json.loads(line) for line in (tmp_path / NAME).read_text().splitlines()]
+    documents = [json.loads(line) for line in (tmp_path / JOURNAL_NAME).read_text().splitlines()]
     assert [document.get("trial") for document in documents[1:]] == [trial.key for trial in TRIALS]
 
 
 def test_bad_options_name_the_value() -> None:
     with pytest.raises(CmpDesignError, match="workers is 0"):
-        Options(1, workers=0)
+        RunOptions(1, workers=0)
     with pytest.raises(CmpDesignError, match="trials is 0"):
-        Options(0)
+        RunOptions(0)
     with pytest.raises(CmpDesignError, match="seed is -1"):
-        Options(1, -1)
+        RunOptions(1, -1)
 
 
 def test_two_trials_of_one_name_are_refused(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmpdesign.evaluate.square.contours import SquareReader, joined
+from cmpdesign.evaluate.square.contours import SquareReader, join_corners
 from cmpdesign.evaluate.square.quads import find_quads
 from cmpdesign.evaluate.square.saddles import SaddleReader
 from cmpdesign.layout.layout import Layout
@@ -105,6 +105,6 @@ def test_quads_are_squares_with_their_corners_put_back() -> None:
 def test_corners_join_across_quads_and_never_within_one() -> None:
     square = np.array([[0.0, 0], [20, 0], [20, 20], [0, 20]])
     touching = square + [21.0, 20.5]
-    nodes, places = joined(np.stack([square, touching]))
+    nodes, places = join_corners(np.stack([square, touching]))
     assert nodes[0, 2] == nodes[1, 0] and len(places) == 7
     assert places[nodes[0, 2]] == pytest.approx([20.5, 20.25])

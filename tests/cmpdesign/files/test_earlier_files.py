@@ -9,18 +9,18 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.files.earlier_files import LIST_NAME, remove, stale_files, with_lists
+from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
 
 
 def build(output: Path, files: dict[str, str | bytes]) -> list[str]:
     """As the command does it; what was removed, by name."""
-    listed = with_lists(files, ["mold/", "mesh/"])
-    stale = stale_files(output, listed)
+    listed = files_with_lists(files, ["mold/", "mesh/"])
+    stale = find_stale_files(output, listed)
     for name, content in listed.items():
         path = output / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return [str(path.relative_to(output)) for path in remove(stale)]
+    return [str(path.relative_to(output)) for path in remove_files(stale)]
 
 
 FIRST: dict[str, str | bytes] = {
@@ -69,7 +69,7 @@ def test_nothing_outside_the_folder_is_touched(name: str, tmp_path: Path) -> Non
 
 
 def with_digest(content: str) -> str:
-    document = json.loads(with_lists({"x/y": content}, ["x/"])["x/" + LIST_NAME])
+    document = json.loads(files_with_lists({"x/y": content}, ["x/"])["x/" + LIST_NAME])
     return str(document["sha256"]["y"])
 
 

@@ -17,7 +17,7 @@ from cmpdesign.files.atomic import write_file, write_folder
 from cmpdesign.files.layout_json import layout_to_json, write_layout
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.colors import COLORS
 
 
@@ -25,7 +25,7 @@ def layout(pattern: str = "honeycomb", layers: int = 3) -> Layout:
     return build_layout(Design(pattern=pattern, layers=layers, pitch_mm=1.1, rotation_deg=7))
 
 
-@pytest.mark.parametrize("pattern", list(patterns()))
+@pytest.mark.parametrize("pattern", list(registered_patterns()))
 def test_every_column_reads_back_exactly(pattern: str) -> None:
     built = layout(pattern)
     document = json.loads(layout_to_json(built))

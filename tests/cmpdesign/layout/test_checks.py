@@ -12,7 +12,7 @@ from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.checks import Finding, check_design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_angles_deg, cell_areas_mm2, cell_widths_mm, edge_lengths_mm
-from cmpdesign.layout.report import report, report_to_json
+from cmpdesign.layout.report import design_report, report_to_json
 
 
 def findings(**fields: object) -> list[Finding]:
@@ -86,7 +86,7 @@ def built(**fields: object) -> tuple[Design, Layout]:
 
 
 def test_report_figures_by_hand() -> None:
-    figures = report(*built(name="mine"))
+    figures = design_report(*built(name="mine"))
     assert (figures.markers, figures.present_markers, figures.edges) == (331, 331, 930)
     assert figures.cells == {"red": 100, "green": 100, "blue": 100, "black": 299, "white": 1}
     assert (figures.virtual_markers, figures.points) == (4650, 4981)
@@ -96,7 +96,9 @@ def test_report_figures_by_hand() -> None:
 
 def test_the_report_file_carries_figures_and_findings() -> None:
     document = json.loads(
-        report_to_json(report(*built(pitch_mm=0.1, clip="circle", clip_diameter_mm=1.7, border_mm=0.1)))
+        report_to_json(
+            design_report(*built(pitch_mm=0.1, clip="circle", clip_diameter_mm=1.7, border_mm=0.1))
+        )
     )
     assert (document["format"], document["version"]) == ("cmp-report", 1)
     assert document["present_markers"] < document["markers"]

@@ -17,13 +17,13 @@ from cmpdesign.errors import DesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_areas_mm2
-from cmpdesign.layout.outline import rotation
-from cmpdesign.patterns import patterns
+from cmpdesign.layout.outline import rotation_matrix
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.colors import BLACK, BLUE, GREEN, RED, WHITE
 from cmpdesign.patterns.numbering import axial_from_layer
 
-NAMES = list(patterns())
-TRIANGULAR = [name for name, pattern in patterns().items() if pattern.graph.name == "triangular"]
+NAMES = list(registered_patterns())
+TRIANGULAR = [name for name, pattern in registered_patterns().items() if pattern.graph.name == "triangular"]
 
 
 def layout(pattern: str = "honeycomb", layers: int = 4, **more: object) -> Layout:
@@ -169,9 +169,9 @@ def test_rotation_is_counter_clockwise_about_marker_0(pattern: str, angle_deg: f
 
 
 def test_quarter_turns_are_exact() -> None:
-    np.testing.assert_array_equal(rotation(90), [(0, -1), (1, 0)])
-    np.testing.assert_array_equal(rotation(-90), [(0, 1), (-1, 0)])
-    np.testing.assert_array_equal(rotation(180), [(-1, 0), (0, -1)])
+    np.testing.assert_array_equal(rotation_matrix(90), [(0, -1), (1, 0)])
+    np.testing.assert_array_equal(rotation_matrix(-90), [(0, 1), (-1, 0)])
+    np.testing.assert_array_equal(rotation_matrix(180), [(-1, 0), (0, -1)])
 
 
 @pytest.mark.parametrize("pattern", NAMES)
@@ -223,7 +223,7 @@ def test_the_overall_size_of_a_honeycomb_by_hand() -> None:
 def test_overall_size_and_layers_give_the_largest_pitch(
     pattern: str, width_mm: float, height_mm: float | None, layers: int, angle_deg: float
 ) -> None:
-    more = {"aspect": 0.7} if "aspect" in patterns()[pattern].options else {}
+    more = {"aspect": 0.7} if "aspect" in registered_patterns()[pattern].options else {}
     sizes = {"width_mm": width_mm, "height_mm": height_mm, "rotation_deg": angle_deg}
     built = build_layout(Design(pattern=pattern, layers=layers, **sizes, **more))
     width, height = built.size_mm

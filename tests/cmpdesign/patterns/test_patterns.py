@@ -13,19 +13,19 @@ from shapely import union_all
 from shapely.geometry import Polygon
 
 from cmpdesign.design.design import ASPECT_MAX, ASPECT_MIN
-from cmpdesign.patterns import Pattern, Shape, patterns, register
-from cmpdesign.patterns.graphs import TRIANGULAR, Graph
+from cmpdesign.patterns import Pattern, PatternShape, register_pattern, registered_patterns
+from cmpdesign.patterns.graphs import TRIANGULAR_GRAPHS, GraphFamily
 
-ALL = list(patterns().values())
+ALL = list(registered_patterns().values())
 SHAPES = st.builds(
-    Shape,
+    PatternShape,
     layers=st.integers(1, 40),
     aspect=st.floats(ASPECT_MIN, ASPECT_MAX),
     spacing=st.sampled_from(["angle", "arc"]),
 )
 
 
-def positions(pattern: Pattern, shape: Shape) -> np.ndarray:
+def positions(pattern: Pattern, shape: PatternShape) -> np.ndarray:
     mesh = pattern.graph.mesh(shape.layers)
     return pattern.positions(mesh.layer, mesh.index, shape)
 
@@ -35,7 +35,7 @@ def areas(xy: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2
 
 
-def rim_area(pattern: Pattern, shape: Shape) -> float:
+def rim_area(pattern: Pattern, shape: PatternShape) -> float:
     return float(
         areas(
             pattern.positions(*pattern.graph.rim(shape.layers), shape),
@@ -45,7 +45,7 @@ def rim_area(pattern: Pattern, shape: Shape) -> float:
 
 
 def test_the_four_patterns_are_registered() -> None:
-    assert {"honeycomb", "round", "elliptical", "square"} <= set(patterns())
+    assert {"honeycomb", "round", "elliptical", "square"} <= set(registered_patterns())
 
 
 @pytest.mark.parametrize("pattern", ALL, ids=lambda p: p.name)
@@ -57,7 +57,7 @@ def test_a_pattern_says_what_it_is_and_draws_itself(pattern: Pattern) -> None:
 @pytest.mark.parametrize("pattern", ALL, ids=lambda p: p.name)
 @settings(max_examples=60, deadline=None)
 @given(shape=SHAPES)
-def test_no_cell_is_inverted_and_none_overlap(pattern: Pattern, shape: Shape) -> None:
+def test_no_cell_is_inverted_and_none_overlap(pattern: Pattern, shape: PatternShape) -> None:
     xy = positions(pattern, shape)
     np.testing.assert_array_equal(xy[0], (0, 0))
     area = areas(xy, pattern.graph.mesh(shape.layers).corners)
@@ -73,7 +73,7 @@ def test_no_cell_is_inverted_and_none_overlap(pattern: Pattern, shape: Shape) ->
 def test_the_union_of_the_cells_has_the_sum_of_their_areas(
     pattern: Pattern, spacing: str, aspect: float
 ) -> None:
-    shape = Shape(4, aspect, spacing)
+    shape = PatternShape(4, aspect, spacing)
     xy, corners = positions(pattern, shape), pattern.graph.mesh(4).corners
     union = union_all([Polygon(xy[cell]) for cell in corners], grid_size=1e-10)
     assert union.area == pytest.approx(areas(xy, corners).sum(), rel=1e-7)
@@ -82,7 +82,7 @@ def test_the_union_of_the_cells_has_the_sum_of_their_areas(
 @pytest.mark.parametrize("pattern", ALL, ids=lambda p: p.name)
 @given(shape=SHAPES)
 @settings(max_examples=25, deadline=None)
-def test_the_rim_is_convex_and_counter_clockwise(pattern: Pattern, shape: Shape) -> None:
+def test_the_rim_is_convex_and_counter_clockwise(pattern: Pattern, shape: PatternShape) -> None:
     rim = pattern.positions(*pattern.graph.rim(shape.layers), shape)
     side = np.roll(rim, -1, axis=0) - rim
     turn = side[:, 0] * np.roll(side[:, 1], -1) - side[:, 1] * np.roll(side[:, 0], -1)
@@ -94,14 +94,17 @@ def test_the_rim_is_convex_and_counter_clockwise(pattern: Pattern, shape: Shape)
 
 
 def test_honeycomb_edges_are_one_pitch_long() -> None:
-    xy, corners = positions(patterns()["honeycomb"], Shape(7)), patterns()["honeycomb"].graph.mesh(7).corners
+    xy, corners = (
+        positions(registered_patterns()["honeycomb"], PatternShape(7)),
+        registered_patterns()["honeycomb"].graph.mesh(7).corners,
+    )
     sides = xy[corners] - xy[np.roll(corners, 1, axis=1)]
     np.testing.assert_allclose(np.hypot(sides[..., 0], sides[..., 1]), 1, atol=1e-13)
 
 
 def test_round_markers_lie_on_circles_at_equal_angles() -> None:
-    mesh = TRIANGULAR.mesh(5)
-    xy = positions(patterns()["round"], Shape(5))
+    mesh = TRIANGULAR_GRAPHS.mesh(5)
+    xy = positions(registered_patterns()["round"], PatternShape(5))
     np.testing.assert_allclose(np.hypot(*xy.T), mesh.layer, atol=1e-13)
     for layer in range(1, 6):
         angle = np.degrees(np.unwrap(np.arctan2(*xy[mesh.layer == layer].T[::-1])))
@@ -109,22 +112,26 @@ def test_round_markers_lie_on_circles_at_equal_angles() -> None:
 
 
 def test_an_ellipse_with_aspect_1_is_round_in_both_spacings() -> None:
-    expected = positions(patterns()["round"], Shape(6))
+    expected = positions(registered_patterns()["round"], PatternShape(6))
     for spacing in ("angle", "arc"):
         np.testing.assert_allclose(
-            positions(patterns()["elliptical"], Shape(6, 1.0, spacing)), expected, atol=1e-12
+            positions(registered_patterns()["elliptical"], PatternShape(6, 1.0, spacing)),
+            expected,
+            atol=1e-12,
         )
 
 
 def test_equal_parameter_angles_are_the_round_pattern_stretched() -> None:
-    stretched = positions(patterns()["round"], Shape(6)) * (1, 0.4)
-    np.testing.assert_allclose(positions(patterns()["elliptical"], Shape(6, 0.4)), stretched, atol=1e-12)
+    stretched = positions(registered_patterns()["round"], PatternShape(6)) * (1, 0.4)
+    np.testing.assert_allclose(
+        positions(registered_patterns()["elliptical"], PatternShape(6, 0.4)), stretched, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("aspect", [ASPECT_MIN, 0.7, 1.6, ASPECT_MAX])
 def test_equal_arc_length_by_numerical_integration(aspect: float) -> None:
-    mesh = TRIANGULAR.mesh(3)
-    xy = positions(patterns()["elliptical"], Shape(3, aspect, "arc"))[mesh.layer == 3] / 3
+    mesh = TRIANGULAR_GRAPHS.mesh(3)
+    xy = positions(registered_patterns()["elliptical"], PatternShape(3, aspect, "arc"))[mesh.layer == 3] / 3
     np.testing.assert_allclose(xy[:, 0] ** 2 + (xy[:, 1] / aspect) ** 2, 1, atol=1e-12)
     angle = np.unwrap(np.arctan2(xy[:, 1] / aspect, xy[:, 0]))
 
@@ -138,6 +145,6 @@ def test_equal_arc_length_by_numerical_integration(aspect: float) -> None:
 
 
 def test_a_name_is_taken_once() -> None:
-    graph: Graph = TRIANGULAR
+    graph: GraphFamily = TRIANGULAR_GRAPHS
     with pytest.raises(ValueError, match="registered twice"):
-        register("honeycomb", graph)(patterns()["honeycomb"].positions)
+        register_pattern("honeycomb", graph)(registered_patterns()["honeycomb"].positions)

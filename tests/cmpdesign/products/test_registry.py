@@ -14,10 +14,17 @@ from cmpdesign.design.design import Design, load_design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.layout.layout import Layout
-from cmpdesign.layout.report import report
+from cmpdesign.layout.report import design_report
 from cmpdesign.products import registry as products
 from cmpdesign.products.drawing.preview import draw_preview
-from cmpdesign.products.registry import PRODUCTS, USUAL, Made, Product, chosen_products, make_products
+from cmpdesign.products.registry import (
+    PRODUCTS,
+    USUAL_NAMES,
+    Product,
+    ProductFiles,
+    chosen_products,
+    make_products,
+)
 from tests.support.layouts import small_layout
 
 FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
@@ -27,23 +34,23 @@ FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
 def with_ruler(monkeypatch: pytest.MonkeyPatch) -> None:
     """A product as another module would add it: one line in the registry, one function."""
 
-    def ruler(design: Design, layout: Layout) -> Made:
-        return Made({"ruler/ruler.txt": design.pattern}, {"ticks": len(layout.edges)}, (FINDING,))
+    def ruler(design: Design, layout: Layout) -> ProductFiles:
+        return ProductFiles({"ruler/ruler.txt": design.pattern}, {"ticks": len(layout.edges)}, (FINDING,))
 
     module = ModuleType("ruler")
     module.ruler = ruler  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "ruler", module)
-    monkeypatch.setattr(products, "PRODUCTS", {"ruler": Product("ruler:ruler", "ruler/"), **PRODUCTS})
+    monkeypatch.setattr(products, "PRODUCT_COLUMNS", {"ruler": Product("ruler:ruler", "ruler/"), **PRODUCTS})
 
 
 def make(only: str) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
     design, layout = load_design("honeycomb", {"layers": "2"}), small_layout()
-    return make_products(chosen_products(only), design, layout, report(design, layout))
+    return make_products(chosen_products(only), design, layout, design_report(design, layout))
 
 
 def test_usual_products_are_files_of_their_names() -> None:
-    files, findings = make(USUAL)
-    assert list(files) == [PRODUCTS[name].where for name in USUAL.split(",")]
+    files, findings = make(USUAL_NAMES)
+    assert list(files) == [PRODUCTS[name].where for name in USUAL_NAMES.split(",")]
     assert findings == ()
 
 
@@ -58,9 +65,9 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
     """Beside and below the pattern's drawing, which stays as it is; the preview comes with them, unasked."""
     tall, wide = np.zeros((400, 200, 3), np.uint8), np.full((200, 400, 3), (0, 0, 255), np.uint8)
     module = ModuleType("camera")
-    module.make = lambda design, layout: Made({"a.txt": ""}, pictures={"tall": tall, "wide": wide})  # type: ignore[attr-defined]
+    module.make = lambda design, layout: ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "camera", module)
-    monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
+    monkeypatch.setattr(products, "PRODUCT_COLUMNS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
     files, _ = make("camera")
     assert set(files) == {"a.txt", "preview.png"}
     data = files["preview.png"]

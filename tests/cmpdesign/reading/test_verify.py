@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.reading.verify import judge, verify
+from cmpdesign.reading.verify import judge_markers, verify
 from extractor import Extractor, Reason
 from tests.support.verdicts import LAYERS, markers_at, picture, reference
 
@@ -28,7 +28,7 @@ def turned(sixths: int) -> NDArray[np.int64]:
 @pytest.mark.parametrize("pitch_px", [12, 24])
 def test_the_truth_is_verified(pitch_px: float, noise: float, light: str) -> None:
     rendered = picture(pitch_px, light, noise)
-    verdict = judge(reference(), rendered.image, markers_at(rendered.truth.marker_xy_px))
+    verdict = judge_markers(reference(), rendered.image, markers_at(rendered.truth.marker_xy_px))
     assert verdict.verified and verdict.reason is None and verdict.contradictions == ()
     assert (verdict.present, verdict.measured, verdict.share) == (61, 61, 1.0)
 
@@ -42,7 +42,9 @@ def test_what_the_extractor_finds_is_verified() -> None:
 @pytest.mark.parametrize("sixths", [1, 2, 3, 4, 5])
 def test_a_turned_numbering_is_found_out(sixths: int) -> None:
     rendered = picture()
-    verdict = judge(reference(), rendered.image, markers_at(rendered.truth.marker_xy_px[turned(sixths)]))
+    verdict = judge_markers(
+        reference(), rendered.image, markers_at(rendered.truth.marker_xy_px[turned(sixths)])
+    )
     assert not verdict.verified
     assert str(verdict.reason).startswith("colors contradict the layout: cell ")
 
@@ -51,7 +53,7 @@ def test_a_shifted_layer_is_found_out() -> None:
     xy_px = picture().truth.marker_xy_px.copy()
     outer = np.flatnonzero(reference().layer == LAYERS)
     xy_px[outer] = np.roll(xy_px[outer], 1, axis=0)
-    verdict = judge(reference(), picture().image, markers_at(xy_px))
+    verdict = judge_markers(reference(), picture().image, markers_at(xy_px))
     assert "colors contradict the layout" in str(verdict.reason)
 
 
@@ -63,14 +65,16 @@ def test_one_cell_of_another_color_is_found_out() -> None:
     middle = rendered.truth.marker_xy_px[reference().cell_corners[red]].mean(axis=0).round().astype(int)
     patch = image[middle[1] - 4 : middle[1] + 5, middle[0] - 4 : middle[0] + 5]
     patch[:] = patch[..., ::-1]
-    verdict = judge(reference(), image, markers_at(rendered.truth.marker_xy_px))
+    verdict = judge_markers(reference(), image, markers_at(rendered.truth.marker_xy_px))
     assert verdict.contradictions == (red,)
     assert verdict.reason == f"colors contradict the layout: cell {red}, which should be red"
 
 
 def test_the_other_side_is_found_out() -> None:
     rendered = picture(mirrored=True)
-    verdict = judge(reference(), rendered.image, markers_at(rendered.truth.marker_xy_px, mirrored=True))
+    verdict = judge_markers(
+        reference(), rendered.image, markers_at(rendered.truth.marker_xy_px, mirrored=True)
+    )
     assert verdict.reason == "the pattern is seen from the back, but designed to be seen from the front"
     assert verify(Extractor(reference()), reference(), rendered.image).reason == verdict.reason
 
@@ -79,7 +83,7 @@ def test_the_other_side_is_found_out() -> None:
 def test_too_few_markers(lost: int, verified: bool) -> None:
     xy_px = picture().truth.marker_xy_px.copy()
     xy_px[-lost:] = np.nan
-    verdict = judge(reference(), picture().image, markers_at(xy_px), min_share=55 / 61)
+    verdict = judge_markers(reference(), picture().image, markers_at(xy_px), min_share=55 / 61)
     assert verdict.verified is verified and verdict.lost == lost
     if not verified:
         assert verdict.reason == "54 of 61 markers measured (88.5%), expected at least 90.2%"
@@ -89,7 +93,7 @@ def test_repaired_markers_do_not_count_as_measured() -> None:
     markers = markers_at(picture().truth.marker_xy_px)
     status = markers.status.copy()
     status[:10], status[10:15] = 2, 3
-    verdict = judge(reference(), picture().image, replace(markers, status=status))
+    verdict = judge_markers(reference(), picture().image, replace(markers, status=status))
     assert (verdict.measured, verdict.repaired, verdict.fitted, verdict.lost) == (46, 10, 5, 0)
     assert not verdict.verified
 
@@ -97,7 +101,7 @@ def test_repaired_markers_do_not_count_as_measured() -> None:
 @pytest.mark.parametrize("reason", [None, *Reason])
 def test_nothing_found_has_a_sentence(reason: Reason | None) -> None:
     nothing = markers_at(np.full((61, 2), np.nan), mirrored=None, reason=reason)
-    verdict = judge(reference(), picture().image, nothing, min_share=0)
+    verdict = judge_markers(reference(), picture().image, nothing, min_share=0)
     assert not verdict.verified and verdict.lost == 61 and verdict.mirrored is None
     assert verdict.reason and "_" not in verdict.reason
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.support.scanlines import Window, edge_shifts, error, reference
+from benchmarks.support.scanlines import ImageWindow, fit_edge_offsets, measure_render_error, reference_image
 from cmpdesign.scene import (
     Camera,
     Dent,
@@ -21,10 +21,10 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.drawing.view import views
+from cmpdesign.scene.drawing.view import scene_views
 
 SIZE = (200, 160)
-WINDOW = Window(70, 50, 60, 60)
+WINDOW = ImageWindow(70, 50, 60, 60)
 LENS = (-0.2, 0.05, 0.001, -0.002, 0.0)
 
 
@@ -45,7 +45,7 @@ def scene(kind: str) -> Scene:
 def test_its_error_is_a_few_ten_thousandths_of_a_pixel(
     kind: str, blur_px: float, grey_rms: float, grey_largest: float
 ) -> None:
-    found = error(kind, scene(kind), blur_px, WINDOW, SIZE)
+    found = measure_render_error(kind, scene(kind), blur_px, WINDOW, SIZE)
     assert found.edges > 12
     assert found.edge_rms_px < 2e-4 and found.edge_largest_px < 5e-4
     assert found.grey_rms < grey_rms and found.grey_largest < grey_largest
@@ -55,10 +55,10 @@ def test_the_comparison_sees_a_hundredth_of_a_pixel() -> None:
     flat = scene("flat")
     moved = replace(flat, camera=Camera(20, 7.3, centre_px=(99.5 + 0.01, 79.5)))
     clean = replace(flat, sensor=Sensor(bits=16), optics=Optics(1.0))
-    view = views(clean, SIZE)[0]
-    here = reference(clean, view, WINDOW)
+    view = scene_views(clean, SIZE)[0]
+    here = reference_image(clean, view, WINDOW)
     drawn = render(replace(moved, sensor=Sensor(bits=16), optics=Optics(1.0)), size=SIZE).image
     there = drawn[50:110, 70:130]
     assert np.abs(there / 257 - here).max() > 0.3
-    shifts = edge_shifts(there / 257 - here, here, clean.layout, view, WINDOW)
+    shifts = fit_edge_offsets(there / 257 - here, here, clean.layout, view, WINDOW)
     assert 0.004 < np.sqrt((shifts**2).mean()) < 0.01

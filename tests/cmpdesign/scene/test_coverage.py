@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.special import erf, ndtr
 
-from cmpdesign.scene.drawing.coverage import Engine, coverage
-from cmpdesign.scene.drawing.paths import CHORD_PX, Segments, join, segments
-from cmpdesign.scene.parts.optics import box_gaussian, point_spread
+from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
+from cmpdesign.scene.drawing.paths import CHORD_PX, PolygonSegments, join_segments, project_polygons
+from cmpdesign.scene.parts.optics import box_gaussian, make_point_spread
 
 WIDTH, HEIGHT = SIZE = (23, 17)
 Points = NDArray[np.float64]
@@ -22,13 +22,13 @@ coordinates = st.floats(-60, 80, allow_nan=False)
 corners = st.lists(st.tuples(coordinates, coordinates), min_size=3, max_size=3)
 
 
-def closed(points: Points) -> Segments:
+def closed(points: Points) -> PolygonSegments:
     sides = np.concatenate([points, np.roll(points, -1, axis=0)], axis=1)
-    return Segments(sides, np.zeros(len(points), dtype=np.int64))
+    return PolygonSegments(sides, np.zeros(len(points), dtype=np.int64))
 
 
 def one(points: Points, blur_px: float, engine: Engine, size: tuple[int, int] = SIZE) -> Points:
-    return coverage(closed(points), np.ones((1, 1)), size, point_spread(blur_px), engine)[0].astype(
+    return draw_coverage(closed(points), np.ones((1, 1)), size, make_point_spread(blur_px), engine)[0].astype(
         np.float64
     )
 
@@ -129,8 +129,8 @@ def test_either_orientation_counts_as_covered() -> None:
 
 def test_neighbours_fill_their_common_edge() -> None:
     square = np.array([[-50.0, -50.0], [80, -50], [80, 80], [-50, 80]])
-    halves = join([closed(square[[0, 1, 2]]), closed(square[[0, 2, 3]])])
-    image = coverage(halves, np.ones((2, 1)), SIZE, point_spread(1.0))
+    halves = join_segments([closed(square[[0, 1, 2]]), closed(square[[0, 2, 3]])])
+    image = draw_coverage(halves, np.ones((2, 1)), SIZE, make_point_spread(1.0))
     np.testing.assert_allclose(image, 1.0, atol=2e-6)
 
 
@@ -150,7 +150,7 @@ def test_chords_stay_on_the_curve() -> None:
         )
 
     polygon = np.array([[[-60.0, -35.0], [55.0, -20.0], [10.0, 48.0]]])
-    curve = segments(polygon, swirl, curved=True)
+    curve = project_polygons(polygon, swirl, curved=True)
     chords = shapely.LineString(np.vstack([curve.xy_px[:, :2], curve.xy_px[-1:, 2:]]))
     t = np.linspace(0, 1, 4001)[:, None]
     ends = zip(polygon[0], np.roll(polygon[0], -1, axis=0), strict=True)

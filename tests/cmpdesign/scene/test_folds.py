@@ -24,9 +24,9 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
-from cmpdesign.scene.drawing.folds import add_hidden_parts
-from cmpdesign.scene.drawing.patches import patches, subdivision
-from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.drawing.folds import update_hidden_parts
+from cmpdesign.scene.drawing.patches import ground_patches, subdivide_triangle
+from cmpdesign.scene.drawing.view import single_view
 
 SIZE = (200, 160)
 WINDOW = (slice(50, 110), slice(75, 140))  # rows and columns around the dent
@@ -44,14 +44,14 @@ def steep() -> Scene:
 
 def depth_buffer(scene: Scene) -> tuple[NDArray[np.float64], Points]:
     """The nearest of many points in every sub-pixel: image (H, W, 3) BGR, and depth of the finer image."""
-    layout, view = scene.layout, look(scene, SIZE)
-    ground = patches(layout)
+    layout, view = scene.layout, single_view(scene, SIZE)
+    ground = ground_patches(layout)
     near = np.linalg.norm(ground.mean(axis=1) - (0.3, 0.4), axis=1) < 1.6
     count = SIZE[0] * FINER * SIZE[1] * FINER
     depth, color = np.full(count, np.inf), np.full((count, 3), 20.0)
     inks = np.array([scene.ink(int(c))[::-1] for c in layout.cell_color] + [scene.ink(BLACK)[::-1]])
     for number, (corners, dense) in enumerate(zip(ground, near, strict=True)):
-        at, _ = subdivision(300 if dense else 100)
+        at, _ = subdivide_triangle(300 if dense else 100)
         x, y, away = view.depth_from_layout(at @ corners).T
         column, row = (np.floor((v + 0.5) * FINER).astype(int) for v in (x, y))
         inside = (column >= 0) & (column < SIZE[0] * FINER) & (row >= 0) & (row < SIZE[1] * FINER)
@@ -70,14 +70,14 @@ def test_the_nearest_part_is_drawn(steep: Scene, monkeypatch: pytest.MonkeyPatch
     error = np.abs(drawn.image[WINDOW] - expected[WINDOW]).mean(axis=2)
     assert error.max() < 100 and error.mean() < 2.0  # the buffer's own edges are a third of a pixel wide
     # Without the correction it is wrong there, so the comparison can fail.
-    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "add_hidden_parts", lambda *_: None)
+    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "update_hidden_parts", lambda *_: None)
     signed = np.abs(render(steep, size=SIZE).image[WINDOW] - expected[WINDOW]).mean(axis=2)
     assert (signed > 100).mean() > 0.003
 
 
 def test_hidden_markers_are_not_visible(steep: Scene) -> None:
     _, nearest = depth_buffer(steep)
-    layout, view = steep.layout, look(steep, SIZE)
+    layout, view = steep.layout, single_view(steep, SIZE)
     truth = render(steep, size=SIZE).truth
     flat = render(replace(steep, surface=None), size=SIZE).truth
     hidden = np.flatnonzero(flat.visible & ~truth.visible)
@@ -94,7 +94,7 @@ def test_hidden_markers_are_not_visible(steep: Scene) -> None:
 def test_nothing_changes_beside_the_fold(steep: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     blurred = replace(steep, optics=Optics(1.0))
     with_it = render(blurred, size=SIZE).image.astype(int)
-    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "add_hidden_parts", lambda *_: None)
+    monkeypatch.setattr(sys.modules["cmpdesign.scene.drawing.render"], "update_hidden_parts", lambda *_: None)
     changed = np.abs(with_it - render(blurred, size=SIZE).image).max(axis=2) > 0
     assert 20 < changed.sum() < 0.03 * changed.size
     rows, columns = np.nonzero(changed)
@@ -103,7 +103,7 @@ def test_nothing_changes_beside_the_fold(steep: Scene, monkeypatch: pytest.Monke
 
 
 def test_a_blur_spreads_what_was_corrected_without_loss(steep: Scene) -> None:
-    folds = look(steep, SIZE).folds
+    folds = single_view(steep, SIZE).occlusion
     assert folds is not None
     width, height = folds.texture_size
     texture = np.zeros((1, height, width), np.float32)
@@ -111,7 +111,7 @@ def test_a_blur_spreads_what_was_corrected_without_loss(steep: Scene) -> None:
     sums = []
     for blur_px in (0.0, 0.7, 1.5):
         planes = np.zeros((1, SIZE[1], SIZE[0]), np.float32)
-        add_hidden_parts(planes, folds, texture, blur_px)
+        update_hidden_parts(planes, folds, texture, blur_px)
         sums.append(planes.sum())
     assert abs(sums[0]) > 1
     np.testing.assert_allclose(sums, sums[0], rtol=2e-3)
@@ -127,7 +127,7 @@ def test_dirt_and_bleeding_inks_are_hidden_like_all_else(steep: Scene) -> None:
         replace(steep, damage=Damage(blobs=(Blob((0.3, 0.4), 0.25, (255, 0, 255)),))), size=SIZE
     ).image
     away = np.abs(dirty - plain).max(axis=2) > 1
-    x, y = look(steep, SIZE).image_from_layout(np.array([[0.3, 0.4]]))[0]
+    x, y = single_view(steep, SIZE).image_from_layout(np.array([[0.3, 0.4]]))[0]
     rows, columns = np.nonzero(away)
     assert 20 < away.sum() < 600 and np.hypot(rows - y, columns - x).max() < 25
     bled = render(replace(steep, damage=Damage(bleed_mm=0.02)), size=SIZE).image
@@ -144,7 +144,7 @@ def test_too_much_is_refused(steep: Scene) -> None:
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "square"])
 def test_patches_fill_the_outline_and_face_the_front(pattern: str) -> None:
     layout: Layout = standard_layout(pattern, 3)
-    ground = patches(layout)
+    ground = ground_patches(layout)
     a, b = (ground[:, i] - ground[:, 0] for i in (1, 2))
     areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     assert (areas > 0).all()
@@ -156,7 +156,7 @@ def test_patches_fill_the_outline_and_face_the_front(pattern: str) -> None:
 
 @pytest.mark.parametrize("parts", [1, 2, 5])
 def test_a_subdivision_fills_its_triangle(parts: int) -> None:
-    at, small = subdivision(parts)
+    at, small = subdivide_triangle(parts)
     assert len(small) == parts**2 and len(at) == (parts + 1) * (parts + 2) // 2
     corners = (at @ np.array([[0.0, 0], [1, 0], [0, 1]]))[small]
     a, b = (corners[:, i] - corners[:, 0] for i in (1, 2))

@@ -40,7 +40,7 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.camera.plain import project
+from cmpdesign.scene.camera.plain import project_by_homography
 from cmpdesign.scene.standard import INKS
 
 SIZE = (320, 280)
@@ -185,7 +185,9 @@ def test_the_homography_maps_layout_to_image(small: Scene) -> None:
     tilted = replace(small, camera=Camera(30, 20, tilt_deg=50, tilt_axis_deg=33, focal_px=500))
     truth = render(tilted, size=SIZE).truth
     assert truth.H is not None and truth.H[2, 2] == 1
-    np.testing.assert_allclose(project(truth.H, small.layout.marker_xy_mm), truth.marker_xy_px, atol=1e-9)
+    np.testing.assert_allclose(
+        project_by_homography(truth.H, small.layout.marker_xy_mm), truth.marker_xy_px, atol=1e-9
+    )
     edge_px = np.linalg.norm(np.diff(truth.marker_xy_px[small.layout.edges], axis=1)[:, 0], axis=1)
     assert edge_px.max() / edge_px.min() > 1.4
     assert render(replace(tilted, surface=composed(Press(1, 0.1))), size=SIZE).truth.H is None

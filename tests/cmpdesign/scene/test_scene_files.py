@@ -36,7 +36,7 @@ from cmpdesign.scene import (
     save_truths,
     standard_layout,
 )
-from cmpdesign.scene.files.key_frames import flattened, value_at, with_values
+from cmpdesign.scene.files.key_frames import document_at_time, flatten_table, interpolate_key_frames
 from tests.support.scene_texts import MOVING, SIZE, scene_writer
 
 ROOT = Path(__file__).parents[3]
@@ -222,16 +222,16 @@ def test_files_that_are_none(layout: Layout, tmp_path: Path) -> None:
 
 def test_values_go_straight_between_their_keys() -> None:
     keys = ((1.0, 2.0), (3.0, 4.0), (4.0, 0.0))
-    assert [value_at(keys, t) for t in (0, 1, 2, 3, 3.5, 4, 9)] == [2, 2, 3, 4, 2, 0, 0]
-    assert value_at(((0.0, (0.0, 4.0)), (2.0, (1.0, 0.0))), 1.0) == [0.5, 2.0]
+    assert [interpolate_key_frames(keys, t) for t in (0, 1, 2, 3, 3.5, 4, 9)] == [2, 2, 3, 4, 2, 0, 0]
+    assert interpolate_key_frames(((0.0, (0.0, 4.0)), (2.0, (1.0, 0.0))), 1.0) == [0.5, 2.0]
     document = {"a": {"b": [{"c": 1}, {"c": 2}]}}
-    assert with_values(document, {"a.b.1.c": keys}, 2.0) == {"a": {"b": [{"c": 1}, {"c": 3.0}]}}
+    assert document_at_time(document, {"a.b.1.c": keys}, 2.0) == {"a": {"b": [{"c": 1}, {"c": 3.0}]}}
     assert document["a"]["b"][1]["c"] == 2
-    assert flattened({"a": {"b": 1, "c": {"d": 2}}, "e.f": 3}) == {"a.b": 1, "a.c.d": 2, "e.f": 3}
+    assert flatten_table({"a": {"b": 1, "c": {"d": 2}}, "e.f": 3}) == {"a.b": 1, "a.c.d": 2, "e.f": 3}
     with pytest.raises(SceneError, match="there is no 2 in a"):
-        with_values({"a": [[1, 2], [3, 4]]}, {"a.2.0": keys}, 0)
+        document_at_time({"a": [[1, 2], [3, 4]]}, {"a.2.0": keys}, 0)
     with pytest.raises(SceneError, match="there is no 5, it has 0 to 1"):
-        with_values({"a": [1, 2]}, {"a.5": keys}, 0)
+        document_at_time({"a": [1, 2]}, {"a.5": keys}, 0)
 
 
 def test_a_sequence_moves_and_only_its_noise_is_new(written) -> None:  # type: ignore[no-untyped-def]
@@ -363,8 +363,8 @@ def test_what_is_absent_is_not_called(written, monkeypatch: pytest.MonkeyPatch) 
 
         monkeypatch.setattr(module, name, noted)
     found = sys.modules["cmpdesign.scene.drawing.view"]
-    monkeypatch.setattr(found, "find_folds", lambda *_: called.append("find_folds"))
-    monkeypatch.setattr("cmpdesign.scene.parts.sensor._jpeg", lambda *_: called.append("jpeg"))
+    monkeypatch.setattr(found, "find_occlusion", lambda *_: called.append("find_folds"))
+    monkeypatch.setattr("cmpdesign.scene.parts.sensor._jpeg_roundtrip", lambda *_: called.append("jpeg"))
     file = written("size_px = [96, 80]\n[camera]\npitch_px = 16")
     render(file.scene(), size=SIZE)
     assert set(called) == {"point_spread"}  # of the pixel itself

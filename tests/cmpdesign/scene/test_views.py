@@ -29,9 +29,9 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
-from cmpdesign.scene.camera.pinhole import distorted, project_3d
-from cmpdesign.scene.camera.plain import homography, pinhole
-from cmpdesign.scene.drawing.view import look
+from cmpdesign.scene.camera.pinhole import distort_points, project_3d
+from cmpdesign.scene.camera.plain import camera_homography, to_pinhole
+from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.standard import INKS
 
 SIZE = (320, 240)
@@ -89,11 +89,13 @@ def test_a_view_without_distortion_is_its_homography(layout: Layout) -> None:
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_the_plain_camera_stands_somewhere_in_space(layout: Layout, mirrored: bool) -> None:
     camera = Camera(25, 31, 40, 77, (140, 130), 410, mirrored)
-    in_space = pinhole(camera, layout, SIZE)
+    in_space = to_pinhole(camera, layout, SIZE)
     assert np.linalg.det(in_space.R_camera_from_layout) == pytest.approx(1)
     assert (in_space.position_mm[2] < 0) == mirrored == in_space.mirrored
     assert in_space.homography is not None
-    np.testing.assert_allclose(in_space.homography, homography(camera, layout, SIZE), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        in_space.homography, camera_homography(camera, layout, SIZE), rtol=1e-9, atol=1e-9
+    )
 
 
 def test_what_it_looks_at_lies_in_its_middle() -> None:
@@ -218,7 +220,7 @@ def test_the_lens_turns_back_where_it_says() -> None:
     camera = steep(distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
     assert camera.reach == pytest.approx(np.sqrt(1 / 0.9))
     r = np.linspace(0, camera.reach * 0.999, 200)
-    assert (np.diff(distorted(camera, np.column_stack([r, 0 * r]))[:, 0]) > 0).all()
+    assert (np.diff(distort_points(camera, np.column_stack([r, 0 * r]))[:, 0]) > 0).all()
     assert steep(distortion=(0.1, 0.1, 0, 0, 0.1)).reach == np.inf
 
 
@@ -249,4 +251,4 @@ def test_bad_views_are_named(layout: Layout, make: object, message: str) -> None
 
 def test_only_one_view_is_looked_at(layout: Layout) -> None:
     with pytest.raises(SceneError, match="2 views, one is needed"):
-        look(Scene(layout, halves()), SIZE)
+        single_view(Scene(layout, halves()), SIZE)

@@ -37,7 +37,7 @@ def segmentation_of(hsv: Image, label: Image) -> Segmentation:
 
 
 def everywhere(image: Image) -> Target:
-    return Target(mask=np.ones((-(-image.shape[0] // 8), -(-image.shape[1] // 8)), np.uint8), shrink=8)
+    return Target(mask=np.ones((-(-image.shape[0] // 8), -(-image.shape[1] // 8)), np.uint8), tile_px=8)
 
 
 def test_nominal_hues_are_the_palettes() -> None:
@@ -133,7 +133,7 @@ def test_the_target_holds_the_pattern_and_leaves_out_what_lies_apart() -> None:
     image = np.zeros((700, 700, 3), np.uint8)
     image[: seen.image.shape[0], : seen.image.shape[1]] = seen.image
     target = find_target(to_colors(image))
-    at = np.rint(seen.truth.marker_xy_px).astype(int) // target.shrink
+    at = np.rint(seen.truth.marker_xy_px).astype(int) // target.tile_px
     assert target.mask[at[:, 1], at[:, 0]].all()
     assert not target.mask[60:, 60:].any()
 
@@ -206,7 +206,7 @@ def test_in_a_crowd_what_is_convex_is_left(seed: int) -> None:
     segmentation = segmentation_of(np.zeros((*label.shape, 3), np.uint8), label)
     assert set(find_seeds(segmentation, crowd=3).ink.tolist()) == {1, 2, 3}
     seeds = find_seeds(segmentation, crowd=2)
-    assert seeds.crowded and seeds.ink.tolist() == [1]
+    assert seeds.cluttered and seeds.ink.tolist() == [1]
     stats = cv2.connectedComponentsWithStats((label == 1).astype(np.uint8), connectivity=4)[2]
     assert seeds.area_px[0] == stats[1:, cv2.CC_STAT_AREA].max()  # the tip may touch by a corner only
 
@@ -252,7 +252,7 @@ def assert_grown_as_plainly(hsv: Image, label: Image) -> None:
         if taken[seed[1], seed[0]]:
             continue
         expected = plain_growing(hsv, label, (seed[0], seed[1]), ink, taken)
-        np.testing.assert_array_equal(regions.owner == number + 1, expected)
+        np.testing.assert_array_equal(regions.region_map == number + 1, expected)
         taken |= expected
 
 
@@ -263,7 +263,7 @@ def test_growing_is_eq_3_on_a_picture() -> None:
     assert found is not None
     assert_grown_as_plainly(found.hsv, found.label)
     seeds = find_seeds(found)
-    owner = grow(found, seeds).owner
+    owner = grow(found, seeds).region_map
     nothing = np.zeros(owner.shape, bool)
     for number, (seed, ink) in enumerate(zip(seeds.xy.tolist(), seeds.ink.tolist(), strict=True)):
         final = plain_growing(found.hsv, found.label, (seed[0], seed[1]), ink, nothing, again=True)
@@ -295,7 +295,7 @@ def test_black_neither_divides_nor_grows() -> None:
     label[8:12, 8:12] = 1
     with np.errstate(all="raise"):
         regions = grow(segmentation_of(hsv, label), find_seeds(segmentation_of(hsv, label)))
-    assert (regions.owner > 0).sum() == 1 and regions.moments[0, 0] == 1
+    assert (regions.region_map > 0).sum() == 1 and regions.moments[0, 0] == 1
 
 
 def test_hue_wraps_while_growing() -> None:
@@ -305,9 +305,9 @@ def test_hue_wraps_while_growing() -> None:
     label[20:40, 40:80] = 1
     seeds = find_seeds(segmentation_of(hsv, label))
     assert seeds.xy[0, 0] < 64
-    np.testing.assert_array_equal(grow(segmentation_of(hsv, label), seeds).owner, label)
+    np.testing.assert_array_equal(grow(segmentation_of(hsv, label), seeds).region_map, label)
     hsv[20:40, 64:80, 0] = 178 - 90  # the opposite hue stays out
-    assert not grow(segmentation_of(hsv, label), seeds).owner[:, 64:].any()
+    assert not grow(segmentation_of(hsv, label), seeds).region_map[:, 64:].any()
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
@@ -322,8 +322,8 @@ def test_no_region_leaks_into_another_cell(pattern: str) -> None:
     corners = seen.truth.marker_xy_px[layout.cell_corners]
     middle = corners.mean(axis=1, keepdims=True)
     seen_cells = set()
-    for number in np.unique(regions.owner[regions.owner > 0]):
-        y, x = np.nonzero(regions.owner == number)
+    for number in np.unique(regions.region_map[regions.region_map > 0]):
+        y, x = np.nonzero(regions.region_map == number)
         if len(x) < 30:
             continue
         cell = int(np.hypot(*(middle[:, 0] - (x.mean(), y.mean())).T).argmin())
@@ -346,7 +346,7 @@ def test_moments_are_the_regions() -> None:
     assert found is not None
     regions = grow(found, find_seeds(found))
     for number in range(0, len(regions.ink), 5):
-        y, x = np.nonzero(regions.owner == number + 1)
+        y, x = np.nonzero(regions.region_map == number + 1)
         u, v = (x - regions.seed[number, 0]).astype(float), (y - regions.seed[number, 1]).astype(float)
         terms = (u**0, u, v, u * u, u * v, v * v, u**3, u * u * v, u * v * v, v**3)
         np.testing.assert_allclose(regions.moments[number], [term.sum() for term in terms], atol=1e-6)

@@ -41,7 +41,7 @@ def region_of(mask: NDArray[np.bool_]) -> Regions:
     u, v = (x - seed[0]).astype(float), (y - seed[1]).astype(float)
     terms = (u**0, u, v, u * u, u * v, v * v, u**3, u * u * v, u * v * v, v**3)
     return Regions(
-        owner=mask.astype(np.int32),
+        region_map=mask.astype(np.int32),
         ink=np.array([1], np.uint8),
         seed=seed[None].astype(np.int32),
         moments=np.array([[term.sum() for term in terms]]),

@@ -13,16 +13,16 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.scene.standard import standard_layout
 from extractor import Status, parse_layout
 from extractor.cells.cells import Cells
-from extractor.complete.consistency_filter import _drop_slid, _slid
-from extractor.complete.repair import Repaired, repair
+from extractor.complete.consistency_filter import _shifted_rim_markers, _update_shifted_markers
+from extractor.complete.repair import RepairedMarkers, repair_markers
 from extractor.layout.lattice_tables import Lattice, lattice_of
-from extractor.layout.neighbour_tables import MIN_QUADRATIC
+from extractor.layout.neighbour_tables import MIN_QUADRATIC_NEIGHBOURS
 from extractor.layout.topology import Topology, topology_of
-from extractor.localmap.neighbour_prediction import MIN_CUBIC, cubic_variance
+from extractor.localmap.neighbour_prediction import MIN_CUBIC_NEIGHBOURS, cubic_variance
 from extractor.numbering.lattice_walk import Numbering
-from extractor.numbering.marker_places import Places, place
-from extractor.refine.estimate import Refined
-from extractor.refine.measure.gridline_weights import RIM_PX, moved
+from extractor.numbering.marker_places import InitialMarkers, merge_corners
+from extractor.refine.estimate import RefinedMarkers
+from extractor.refine.measure.gridline_weights import RIM_DEVIATION_PX, markers_after_shift
 
 Array = NDArray[np.float64]
 LAYERS, EDGE_PX, SIZE = 6, 20.0, (400, 400)
@@ -51,17 +51,17 @@ def twisted(amount: float) -> Array:
     return EDGE_PX * turned * [1.0, -1.0] + 200.0
 
 
-def repaired(xy: Array, lost: list[int], agreed: bool = True) -> Repaired:
+def repaired(xy: Array, lost: list[int], agreed: bool = True) -> RepairedMarkers:
     """What repair makes of markers measured to a hundredth of a pixel but for the lost ones; do triangles agree?"""
     count = len(xy)
     seen = xy + np.random.default_rng(0).normal(0.0, 0.01, xy.shape)
     cov = np.tile(1e-4 * np.eye(2), (count, 1, 1))
     seen[lost], cov[lost] = np.nan, np.nan
     free = np.zeros(count)
-    refined = Refined(seen, cov, np.ones(count, np.bool_), free, 1.0, 2.0, None, np.empty((0, 0, 3)))
+    refined = RefinedMarkers(seen, cov, np.ones(count, np.bool_), free, 1.0, 2.0, None, np.empty((0, 0, 3)))
     vouched = np.full(count, agreed)
-    places = Places(seen, np.full(count, EDGE_PX), np.empty((0, 3), np.int32), vouched, vouched)
-    return repair(refined, places, lattice(), SIZE)
+    places = InitialMarkers(seen, np.full(count, EDGE_PX), np.empty((0, 3), np.int32), vouched, vouched)
+    return repair_markers(refined, places, lattice(), SIZE)
 
 
 # -- repair
@@ -91,7 +91,7 @@ def test_too_few_neighbours_say_nothing_of_a_cubic() -> None:
     xy, wanted = twisted(0.5), np.zeros(len(layout().marker_xy_mm), np.bool_)
     wanted[0] = True
     around = lattice().neighbours[0]
-    xy[around[MIN_CUBIC:]] = np.nan
+    xy[around[MIN_CUBIC_NEIGHBOURS:]] = np.nan
     assert np.isfinite(cubic_variance(xy, wanted, lattice().marker_mm, lattice().neighbours)[0])
     xy[around[0]] = np.nan
     assert np.isinf(cubic_variance(xy, wanted, lattice().marker_mm, lattice().neighbours)[0])
@@ -124,8 +124,10 @@ def test_only_from_a_guess_a_corner_of_the_rim_may_slide(agreed: bool, off_px: f
     xy[corner, 0] += off_px
     all_agree = np.full(len(flat), agreed)
     edge, table = np.full(len(flat), EDGE_PX), lattice()
-    slid = _slid(xy, cov, np.ones(len(flat)), flat, edge, table.rim)
-    _drop_slid(xy, cov, slid, flat, edge, all_agree, table.neighbours, table.inner, table.marker_mm)
+    slid = _shifted_rim_markers(xy, cov, np.ones(len(flat)), flat, edge, table.rim)
+    _update_shifted_markers(
+        xy, cov, slid, flat, edge, all_agree, table.neighbours, table.inward_neighbours, table.marker_mm
+    )
     if kept:
         assert xy[corner, 0] == flat[corner, 0] + off_px
         assert np.sqrt(cov[corner, 0, 0]) == pytest.approx(0.5 * off_px, rel=0.01)
@@ -146,7 +148,7 @@ def test_one_corner_of_a_triangle_is_believed_where_the_markers_around_say_the_s
     x, y = lattice().marker_mm.T
     xy = EDGE_PX * np.stack([x + 0.05 * x**2, 0.05 * y**2 - y], axis=1) + 200.0
     ids = lattice().corner_ids[:, [0, 2, 1]]  # clockwise in the image
-    alone = lattice().meeting[ids] == 1
+    alone = lattice().cells_per_marker[ids] == 1
     at_rim = np.flatnonzero(alone.sum(axis=1) == 1)[::5]
     center, corner = xy[ids].mean(axis=1), xy[ids].copy()
     center[at_rim, 0] += 0.3 * EDGE_PX
@@ -154,8 +156,10 @@ def test_one_corner_of_a_triangle_is_believed_where_the_markers_around_say_the_s
     cells = Cells(center, lattice().ink, np.full(len(ids), 170.0), corner)
     numbering = Numbering(np.arange(len(ids), dtype=np.int32), False, np.full(2, 200.0), 0)
     tips = ids[at_rim][alone[at_rim]]
-    away = np.hypot(*(place(cells, numbering, lattice(), SIZE).xy_px[tips] - xy[tips]).T) / EDGE_PX
-    amid = (lattice().neighbours[tips] >= 0).sum(axis=1) >= MIN_QUADRATIC  # a side, not where two meet
+    away = np.hypot(*(merge_corners(cells, numbering, lattice(), SIZE).xy_px[tips] - xy[tips]).T) / EDGE_PX
+    amid = (lattice().neighbours[tips] >= 0).sum(
+        axis=1
+    ) >= MIN_QUADRATIC_NEIGHBOURS  # a side, not where two meet
     assert amid.sum() >= 3
     assert (np.isclose(away, tip_off, atol=1e-6) if believed else away > 0.25)[amid].all()
 
@@ -166,10 +170,10 @@ def test_one_corner_of_a_triangle_is_believed_where_the_markers_around_say_the_s
 @pytest.mark.parametrize(
     ("where", "known_px", "trusted", "guides"),
     [
-        ("rim", 0.5 * RIM_PX, 1.0, True),
-        ("rim", 0.5 * RIM_PX, 0.1, False),  # dirt lies on its gridlines
-        ("rim", 2.0 * RIM_PX, 1.0, False),
-        ("inside", 0.5 * RIM_PX, 1.0, False),  # the map through those all around knows better
+        ("rim", 0.5 * RIM_DEVIATION_PX, 1.0, True),
+        ("rim", 0.5 * RIM_DEVIATION_PX, 0.1, False),  # dirt lies on its gridlines
+        ("rim", 2.0 * RIM_DEVIATION_PX, 1.0, False),
+        ("inside", 0.5 * RIM_DEVIATION_PX, 1.0, False),  # the map through those all around knows better
     ],
 )
 def test_what_the_image_shows_well_is_drawn_there_at_the_rim(
@@ -181,7 +185,7 @@ def test_what_the_image_shows_well_is_drawn_there_at_the_rim(
     least, use = np.full(len(xy), 0.001**-2.0), np.ones(len(mesh().edges))
     least[marker] = known_px**-2
     use[mesh().spokes[marker][mesh().spokes[marker] >= 0]] = trusted
-    measured, guiding = moved(xy, np.full(xy.shape, 0.25), least, use, mesh().spokes)
+    measured, guiding = markers_after_shift(xy, np.full(xy.shape, 0.25), least, use, mesh().spokes)
     np.testing.assert_array_equal(measured, xy + 0.25)
     assert np.isfinite(guiding[np.arange(len(xy)) != marker]).all()
     assert np.isfinite(guiding[marker]).all() == guides

@@ -15,7 +15,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Blob, Damage, Press, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
 from extractor import Extractor, Status, parse_layout
-from extractor.complete.uncertain_markers import VAGUE, blend, vague_ones
+from extractor.complete.uncertain_markers import UNCERTAIN_DEVIATION, find_uncertain_markers, update_by_fusion
 
 Array = NDArray[Any]
 
@@ -37,7 +37,7 @@ def test_blending_adds_information(
     before = turn @ np.diag([wide**2, (flat * wide) ** 2]) @ turn.T
     start, place = np.array([100.0, 50.0]), np.array([100.0 + x, 50.0 + y])
     xy, cov = start.copy(), before.copy()
-    blend(xy, cov, place, variance)
+    update_by_fusion(xy, cov, place, variance)
     own = np.linalg.inv(before)
     expected = np.linalg.inv(own + np.eye(2) / variance)
     np.testing.assert_allclose(cov, expected, rtol=1e-6, atol=1e-12)
@@ -47,16 +47,18 @@ def test_blending_adds_information(
 def test_others_that_know_nothing_and_others_that_know_all() -> None:
     for variance, moved in ((1e9, 0.0), (1e-9, 1.0)):
         xy, cov = np.zeros(2), np.diag([0.3, 0.1])
-        blend(xy, cov, np.array([1.0, -1.0]), variance)
+        update_by_fusion(xy, cov, np.array([1.0, -1.0]), variance)
         np.testing.assert_allclose(xy, [moved, -moved], atol=1e-6)
         np.testing.assert_allclose(cov, (1.0 - moved) * np.diag([0.3, 0.1]), atol=1e-6)
 
 
 def test_vague_is_what_its_covariance_says_in_units_of_its_edges() -> None:
-    cov = np.stack([np.eye(2) * 0.5 * (VAGUE * 20.0 * share) ** 2 for share in (0.9, 1.1, np.nan)])
-    vague, some = vague_ones(cov, np.full(3, 20.0))
+    cov = np.stack(
+        [np.eye(2) * 0.5 * (UNCERTAIN_DEVIATION * 20.0 * share) ** 2 for share in (0.9, 1.1, np.nan)]
+    )
+    vague, some = find_uncertain_markers(cov, np.full(3, 20.0))
     assert vague.tolist() == [False, True, False] and some
-    assert not vague_ones(cov, np.full(3, 40.0))[1]
+    assert not find_uncertain_markers(cov, np.full(3, 40.0))[1]
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
@@ -71,7 +73,8 @@ def test_under_dirt_others_help(pattern: str, monkeypatch: pytest.MonkeyPatch) -
     extractor = Extractor(parse_layout(layout_to_json(layout)))
     blended = extractor.extract(seen.image)
     monkeypatch.setattr(
-        "extractor.complete.repair.vague_ones", lambda cov, edge: (np.zeros(len(edge), np.bool_), False)
+        "extractor.complete.repair.find_uncertain_markers",
+        lambda cov, edge: (np.zeros(len(edge), np.bool_), False),
     )
     alone = extractor.extract(seen.image)
     both = (blended.status == Status.MEASURED) & (alone.status == Status.MEASURED)

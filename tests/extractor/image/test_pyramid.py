@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from extractor.image.pyramid import Sights
+from extractor.image.pyramid import Pyramid
 
 
 @pytest.mark.parametrize("scale", [1, 2, 3, 4, 7, 17])
@@ -16,4 +16,4 @@ def test_a_reduced_image_is_of_means(scale: int, size: tuple[int, int]) -> None:
     height, width = size[0] // scale, size[1] // scale
     whole = image[: height * scale, : width * scale].reshape(height, scale, width, scale, 3)
     sums = whole.astype(np.int64).sum(axis=(1, 3))
-    np.testing.assert_array_equal(Sights(image).at(scale).image, (2 * sums + scale**2) // (2 * scale**2))
+    np.testing.assert_array_equal(Pyramid(image).at(scale).image, (2 * sums + scale**2) // (2 * scale**2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from extractor import parse_layout
-from extractor.layout.lattice import axial, layer_of, marker_id
+from extractor.layout.lattice import axial_coordinates, layer_of, marker_id
 from extractor.layout.lattice_tables import cells_at, lattice_of
 from tests.support.layouts import small_layout, small_text
 
@@ -37,13 +37,13 @@ def test_ids_are_the_walks_order() -> None:
 
 def test_axial_is_the_way_back() -> None:
     places = np.array(walked(60), np.int32)
-    np.testing.assert_array_equal(axial(places[:, 2], places[:, 3]), places[:, :2])
+    np.testing.assert_array_equal(axial_coordinates(places[:, 2], places[:, 3]), places[:, :2])
 
 
 def test_the_lattice_is_where_a_honeycomb_is() -> None:
     """Positions of a honeycomb of pitch 1.5 mm: (q + r / 2, r sqrt(3) / 2) pitches."""
     layout = small_layout("honeycomb", 6)
-    q, r = axial(layout.marker_layer, layout.marker_index).T
+    q, r = axial_coordinates(layout.marker_layer, layout.marker_index).T
     expected = 1.5 * np.stack([q + r / 2, r * np.sqrt(3) / 2], axis=1)
     np.testing.assert_allclose(layout.marker_xy_mm, expected, atol=1e-8)
 

@@ -10,7 +10,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene.standard import standard_layout
 from extractor import parse_layout
 from extractor.layout.topology import Topology, topology_of
-from extractor.localmap.regularised_maps import lay_quadratics
+from extractor.localmap.regularised_maps import fill_quadratic_derivatives
 from extractor.numeric.batched_systems import LANES
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def lone(xy: Array, mesh: Topology, m: int) -> Array:
     """(2, 5) the derivatives at one marker by numpy."""
     known = [k for k, n in enumerate(mesh.near[m]) if n >= 0 and np.isfinite(xy[n, 0])]
-    x, y = mesh.offset[m, known].T
+    x, y = mesh.ring_vectors[m, known].T
     terms, weight = np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), (x * x + y * y) ** -2
     held = 1e9 if len(known) < 5 else 0.02 if len(known) < 8 else 0.001
     gram = (weight * terms) @ terms.T + np.diag([0.0, 0.0, held, held, held])
@@ -34,7 +34,7 @@ def test_each_is_the_weighted_least_squares_quadratic(missing: float) -> None:
     xy[rng.random(len(xy)) < missing] = np.nan
     asked = np.flatnonzero(np.isfinite(xy[:, 0]))[: 2 * LANES + 3]
     out = np.full((len(xy), 2, 5), np.nan)
-    lay_quadratics(xy, asked, mesh.near, mesh.offset, out)
+    fill_quadratic_derivatives(xy, asked, mesh.near, mesh.ring_vectors, out)
     told = [m for m in asked if np.isfinite(out[m, 0, 0])]
     assert len(told) > LANES
     for m in told:
@@ -48,5 +48,5 @@ def test_neighbours_along_one_line_tell_nothing() -> None:
     near = np.full((1, 18), -1, np.int32)
     near[0, :3] = 0
     out = np.full((1, 2, 5), np.nan)
-    lay_quadratics(np.zeros((1, 2)), np.zeros(1, np.int64), near, offset, out)
+    fill_quadratic_derivatives(np.zeros((1, 2)), np.zeros(1, np.int64), near, offset, out)
     assert np.isnan(out).all()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from extractor.layout.lattice import axial
-from extractor.layout.neighbour_tables import MIN_LINEAR, MIN_QUADRATIC, neighbour_table
-from extractor.localmap.neighbour_prediction import predicted
+from extractor.layout.lattice import axial_coordinates
+from extractor.layout.neighbour_tables import MIN_LINEAR_NEIGHBOURS, MIN_QUADRATIC_NEIGHBOURS, neighbour_table
+from extractor.localmap.neighbour_prediction import predict_markers
 from extractor.numeric.batched_systems import LANES
 
 LAYERS = 5
@@ -19,7 +19,7 @@ def lattice() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Places in the layout, mm, and the two rings around each."""
     layer = np.repeat(np.arange(LAYERS + 1), [1, *(6 * k for k in range(1, LAYERS + 1))])
     index = np.concatenate([[0], *(np.arange(6 * k) for k in range(1, LAYERS + 1))])
-    at = axial(layer.astype(np.int32), index.astype(np.int32))
+    at = axial_coordinates(layer.astype(np.int32), index.astype(np.int32))
     return at @ np.array([[1.5, 0.0], [0.75, 1.3]]), neighbour_table(at, LAYERS)
 
 
@@ -40,11 +40,11 @@ def test_markers_are_predicted_together_as_alone(
     mm, table = lattice
     xy, alone = seen(mm, gone), np.zeros(len(mm), np.bool_)
     assert len(mm) > 2 * LANES
-    together = predicted(xy, ~alone, mm, table)
+    together = predict_markers(xy, ~alone, mm, table)
     for m in range(len(mm)):
         alone[:] = False
         alone[m] = True
-        for one, many in zip(predicted(xy, alone, mm, table), together, strict=True):
+        for one, many in zip(predict_markers(xy, alone, mm, table), together, strict=True):
             assert np.array_equal(one[m], many[m], equal_nan=True)
 
 
@@ -54,13 +54,13 @@ def test_a_prediction_is_least_squares(
 ) -> None:
     mm, table = lattice
     xy = seen(mm, gone)
-    place, variance, leverage, support = predicted(xy, np.ones(len(mm), np.bool_), mm, table)
+    place, variance, leverage, support = predict_markers(xy, np.ones(len(mm), np.bool_), mm, table)
     for m in np.flatnonzero(np.isfinite(place[:, 0])):
         near = [j for j in table[m] if j >= 0 and np.isfinite(xy[j, 0])]
-        assert support[m] == len(near) >= MIN_LINEAR
+        assert support[m] == len(near) >= MIN_LINEAR_NEIGHBOURS
         x, y = (mm[near] - mm[m]).T
         rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-        rows = rows[:, : 6 if len(near) >= MIN_QUADRATIC else 3]
+        rows = rows[:, : 6 if len(near) >= MIN_QUADRATIC_NEIGHBOURS else 3]
         terms = np.linalg.lstsq(rows, xy[near], rcond=None)[0]
         left = ((rows @ terms - xy[near]) ** 2).sum() / (2 * max(len(near) - rows.shape[1], 1))
         assert place[m] == pytest.approx(terms[0], abs=1e-6)

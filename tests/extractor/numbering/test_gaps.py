@@ -10,27 +10,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from benchmarks.suites.scoring.reading import extractor_of
-from benchmarks.suites.scoring.score import Score, score
-from benchmarks.suites.stress.damage import one_hole, scratches
-from benchmarks.suites.stress.frames import PATTERNS, RGB, Frame, plain
+from benchmarks.suites.scoring.reading import cached_extractor
+from benchmarks.suites.scoring.score import MarkerScore, score_markers
+from benchmarks.suites.stress.damage import missing_hole, with_scratches
+from benchmarks.suites.stress.frames import PATTERNS, RGB, PatternFrame, plain_frame
 from extractor.cells.cells import Cells
-from extractor.complete.layer_arcs import by_layer
+from extractor.complete.layer_arcs import predict_by_layer
 from extractor.layout.lattice_tables import Lattice, cells_at, lattice_of
-from extractor.numbering.gaps.detached_cells import attach
-from extractor.numbering.gaps.gap_check import leads_elsewhere, unbridged
+from extractor.numbering.gaps.detached_cells import number_detached_cells
+from extractor.numbering.gaps.gap_check import inconsistent_cells, is_white_cell_contradicted
 from extractor.numbering.lattice_walk import Numbering
-from extractor.numeric.nearest_points import bucketed, nearest
+from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
 
-def read(frame: Frame) -> Score:
+def read(frame: PatternFrame) -> MarkerScore:
     shot = frame.shoot()
-    return score(extractor_of(frame.layout.pattern, 11).extract(shot.image), shot, promised=True)
+    return score_markers(cached_extractor(frame.layout.pattern, 11).extract(shot.image), shot, promised=True)
 
 
 @cache
 def lattice(pattern: str) -> Lattice:
-    return lattice_of(extractor_of(pattern, 11).layout)
+    return lattice_of(cached_extractor(pattern, 11).layout)
 
 
 @settings(max_examples=40, deadline=None)
@@ -42,10 +42,10 @@ def lattice(pattern: str) -> Lattice:
 def test_the_nearest_are_those_of_a_tree(seed: int, count: int, shape: tuple[float, float]) -> None:
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-50, 50, (count, 2)) * shape
-    grid, wanted = bucketed(xy), min(8, count)
+    grid, wanted = bucket_grid(xy), min(8, count)
     for query in rng.uniform(-80, 80, (5, 2)) * shape:
         index, square = np.empty(8, np.int32), np.empty(8)
-        found = nearest(xy, grid, query[0], query[1], index, square)
+        found = fill_nearest_points(xy, grid, query[0], query[1], index, square)
         distance = cKDTree(xy).query(query, [*range(1, wanted + 1)])[0]
         assert found == wanted
         np.testing.assert_allclose(np.sqrt(square[:found]), distance, atol=1e-9)
@@ -62,7 +62,7 @@ def test_a_layers_quadratic_is_numpys() -> None:
     known = np.ones(9, np.bool_)
     known[[2, 5, 6]] = False
     xy[ids[~known]] = np.nan
-    place, variance = by_layer(xy, 11)
+    place, variance = predict_by_layer(xy, 11)
     terms = np.polyfit(step[known], xy[ids[known]], 2)
     left = ((xy[ids[known]] - rows[known] @ terms) ** 2).sum() / (2 * 3)
     leverage = np.diag(rows @ np.linalg.inv(rows[known].T @ rows[known]) @ rows.T)
@@ -79,14 +79,18 @@ def test_cells_around_the_white_one_tell_that_all_is_a_step_aside(
     """Whatever was numbered beyond a gap: these lead back to the white cell, or past it; far from it, nobody tells."""
     table = lattice(pattern)
     center, whole = table.center_mm * (20.0, -20.0), np.ones(len(table.ink), np.bool_)
-    white_mm = table.white_place[0]
+    white_mm = table.white_cell_frame[0]
     right, white_px = np.arange(len(center), dtype=np.int32), white_mm * (20.0, -20.0)
     shifted = cells_at(table.axial + np.array(step, np.int32), table)
-    assert not leads_elsewhere(center, whole, right, white_px, white_mm, table.plan)
-    assert leads_elsewhere(center, whole, shifted, white_px, white_mm, table.plan)
+    assert not is_white_cell_contradicted(center, whole, right, white_px, white_mm, table.layout_cells)
+    assert is_white_cell_contradicted(center, whole, shifted, white_px, white_mm, table.layout_cells)
     far = np.linalg.norm(center - white_px, axis=1) > 130.0
-    assert not leads_elsewhere(center, whole & far, shifted, white_px, white_mm, table.plan)
-    assert not leads_elsewhere(center, whole & False, shifted, white_px, white_mm, table.plan)
+    assert not is_white_cell_contradicted(
+        center, whole & far, shifted, white_px, white_mm, table.layout_cells
+    )
+    assert not is_white_cell_contradicted(
+        center, whole & False, shifted, white_px, white_mm, table.layout_cells
+    )
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
@@ -102,12 +106,12 @@ def test_a_part_numbered_one_step_aside_is_refused(pattern: str) -> None:
     white_px = center[np.argmin(np.hypot(*center.T))]
     right[gap] = -1
     for reference_px in (white_px, None):
-        assert not unbridged(cells, right, table, False, reference_px).any()
+        assert not inconsistent_cells(cells, right, table, False, reference_px).any()
     shifted = np.where(beyond, cells_at(table.axial + np.array([1, 1], np.int32), table), right)
-    refused = unbridged(cells, shifted.astype(np.int32), table, False, white_px)
+    refused = inconsistent_cells(cells, shifted.astype(np.int32), table, False, white_px)
     assert refused[beyond & (shifted >= 0)].all()
     assert not refused[~beyond].any()
-    others = unbridged(cells, shifted.astype(np.int32), table, False, center[beyond][0])
+    others = inconsistent_cells(cells, shifted.astype(np.int32), table, False, center[beyond][0])
     assert others[~beyond & ~gap].all() and not others[beyond].all()
 
 
@@ -126,26 +130,26 @@ def test_dirt_of_any_color_is_not_the_white_cell(
     pattern: str, seed: int, count: int, width_mm: float, rgb: RGB, aside: float
 ) -> None:
     """Scratches that cross black cells, and cut the pattern into parts that have no white cell of their own."""
-    figures = read(scratches(plain(pattern, seed), count, width_mm, rgb, aside))
+    figures = read(with_scratches(plain_frame(pattern, seed), count, width_mm, rgb, aside))
     assert figures.wrong == 0
     assert figures.kept >= 0.96 * figures.sure
 
 
 def test_a_block_beyond_a_scratch_is_numbered() -> None:
-    figures = read(scratches(plain("honeycomb", 0), 5, 0.3))
+    figures = read(with_scratches(plain_frame("honeycomb", 0), 5, 0.3))
     assert figures.wrong == 0 and figures.kept >= 0.99 * figures.sure
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_cells_in_a_row_beside_a_hole_have_corners(pattern: str) -> None:
-    figures = read(one_hole(plain(pattern, 0), 0.3))
+    figures = read(missing_hole(plain_frame(pattern, 0), 0.3))
     assert figures.wrong == 0 and figures.kept >= 0.98 * figures.sure
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_cells_that_touch_by_corners_are_numbered(pattern: str) -> None:
     """Three of ten cells missing, at random: the mesh falls to pieces, but corners hold together."""
-    figures = [read(plain(pattern, seed).damaged(missing_share=0.3)) for seed in (3, 4, 5)]
+    figures = [read(plain_frame(pattern, seed).damaged(missing_share=0.3)) for seed in (3, 4, 5)]
     assert all(one.wrong == 0 for one in figures)
     assert sum(one.kept for one in figures) >= 0.99 * sum(one.sure for one in figures)
 
@@ -163,6 +167,6 @@ def test_a_cell_in_pieces_beyond_a_gap_has_no_number(pieces: int) -> None:
     count, area = len(held), px * px * own.size_mm[held] ** 2 * 0.75**0.5 / 2
     numbers = np.concatenate([known, np.full(pieces, -1)]).astype(np.int32)
     cells = Cells(center, own.ink[held], area, np.full((count, 3, 2), np.nan))
-    after = attach(cells, Numbering(numbers, False, center[: len(known)].mean(axis=0), 0), own)
+    after = number_detached_cells(cells, Numbering(numbers, False, center[: len(known)].mean(axis=0), 0), own)
     assert (after.cell[: len(known)] == known).all()
     assert after.cell[len(known) :].tolist() == ([target] if pieces == 1 else [-1] * pieces)

@@ -25,10 +25,10 @@ from cmpdesign.scene import (
     render,
 )
 from extractor import Markers, Status, parse_layout
-from extractor.cells.cell_mesh import build_mesh
+from extractor.cells.cell_mesh import build_cell_mesh
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import lattice_of
-from extractor.numbering.lattice_walk import number
+from extractor.numbering.lattice_walk import number_cells
 from tests.support.layouts import small_layout, small_text
 from tests.support.pictures import extractor, picture, recolored, scene_of
 
@@ -55,23 +55,29 @@ def test_the_mesh_is_the_markers_and_the_black_cells(pattern: str, mirrored: boo
     """Faces of one turn are the markers with three inks around them, those of the other the black and white cells."""
     layout, seen = small_layout(pattern, 4), picture(pattern, mirrored=mirrored)
     cells, colored = shown_cells(pattern, 4, seen.truth.marker_xy_px)
-    mesh = build_mesh(cells)
+    mesh = build_cell_mesh(cells)
     assert mesh is not None
-    faces = mesh.faces[mesh.turn != 0]
+    faces = mesh.faces[mesh.orientation != 0]
     np.testing.assert_array_equal(cells.ink[faces], np.tile((1, 2, 3), (len(faces), 1)))
     shared = [
         set.intersection(*(set(layout.cell_corners[colored[i]].tolist()) for i in face)) for face in faces
     ]
     front = -1 if mirrored else 1
     markers = [
-        corners for corners, turn in zip(shared, mesh.turn[mesh.turn != 0], strict=True) if turn == front
+        corners
+        for corners, turn in zip(shared, mesh.orientation[mesh.orientation != 0], strict=True)
+        if turn == front
     ]
     assert all(len(corners) == 1 for corners in markers)
     touching = np.bincount(layout.cell_corners[colored].ravel(), minlength=len(layout.marker_xy_mm))
     assert {corner for corners in markers for corner in corners} == set(
         np.flatnonzero(touching == 3).tolist()
     )
-    inner = [turn for corners, turn in zip(shared, mesh.turn[mesh.turn != 0], strict=True) if not corners]
+    inner = [
+        turn
+        for corners, turn in zip(shared, mesh.orientation[mesh.orientation != 0], strict=True)
+        if not corners
+    ]
     assert inner and set(inner) == {-front}
 
 
@@ -80,7 +86,7 @@ def test_every_cell_pair_has_at_most_one_neighbour_of_each_ink() -> None:
     seen = picture()
     markers = extractor().extract(seen.image)
     mesh, cells = markers.stages["mesh"], markers.stages["cells"]
-    faces = mesh.faces[mesh.turn > 0]
+    faces = mesh.faces[mesh.orientation > 0]
     assert (np.sort(cells.ink[faces], axis=1) == (1, 2, 3)).all()
     for ink in range(3):
         at = faces[:, ink]
@@ -91,8 +97,8 @@ def test_fewer_than_three_cells_and_cells_in_a_row_make_no_mesh() -> None:
     corners = np.array([[[0, 0], [10, 0], [5, 8]]], float) + np.arange(6)[:, None, None] * (14.0, 0.0)
     ink = np.array([1, 2, 3, 1, 2, 3], np.uint8)
     for count in range(7):
-        mesh = build_mesh(cells_of(corners[:count], ink[:count]))
-        assert mesh is None or not (mesh.turn != 0).any()
+        mesh = build_cell_mesh(cells_of(corners[:count], ink[:count]))
+        assert mesh is None or not (mesh.orientation != 0).any()
 
 
 def assert_numbered_as_the_layout(markers: Markers, truth_xy_px: NDArray[np.float64], least: float) -> None:
@@ -178,9 +184,9 @@ def test_any_order_of_the_cells_is_numbered_alike(seed: int, pattern: str, mirro
     ink = np.where(wrong, ink % 3 + 1, ink).astype(np.uint8)
     shuffled = replace(cells_of(cells.corner_px[order] + jitter, ink), area_px=cells.area_px[order])
     lattice = lattice_of(parse_layout(small_text(pattern, 4)))
-    mesh = build_mesh(shuffled)
+    mesh = build_cell_mesh(shuffled)
     assert mesh is not None
-    numbering = number(seen.image, shuffled, mesh, lattice)
+    numbering = number_cells(seen.image, shuffled, mesh, lattice)
     if numbering is None or numbering.ambiguous:
         return
     assert numbering.mirrored is mirrored

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.suites.scoring.reading import extractor_of
-from benchmarks.suites.scoring.score import score
-from benchmarks.suites.stress.damage import DIRT, centres, rings, white_missing
-from benchmarks.suites.stress.frames import PATTERNS, Frame, plain
+from benchmarks.suites.scoring.reading import cached_extractor
+from benchmarks.suites.scoring.score import score_markers
+from benchmarks.suites.stress.damage import DIRT, cell_centres_mm, cell_rings, white_missing
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import Blob, Damage, Glare, Scratch
 from cmpdesign.scene.standard import INKS
@@ -17,28 +17,28 @@ from extractor import Markers, Origin
 HALF_MM = 8.0
 
 
-def cropped(frame: Frame) -> Frame:
+def cropped(frame: PatternFrame) -> PatternFrame:
     """So near that no outline is in view: the white cell alone tells."""
     return frame.seen(pitch_px=46.0)
 
 
-def read(frame: Frame) -> Markers:
+def read(frame: PatternFrame) -> Markers:
     shot = frame.shoot()
-    markers = extractor_of(frame.layout.pattern, 11).extract(shot.image)
-    assert score(markers, shot, promised=False).wrong == 0
+    markers = cached_extractor(frame.layout.pattern, 11).extract(shot.image)
+    assert score_markers(markers, shot, promised=False).wrong == 0
     return markers
 
 
-def black_cell(frame: Frame) -> tuple[float, float]:
+def black_cell(frame: PatternFrame) -> tuple[float, float]:
     """The middle of one, away from the white."""
-    black = np.flatnonzero((frame.layout.cell_color == BLACK) & (rings(frame.layout) == 3))
-    x, y = centres(frame.layout)[black[frame.scene.seed % len(black)]]
+    black = np.flatnonzero((frame.layout.cell_color == BLACK) & (cell_rings(frame.layout) == 3))
+    x, y = cell_centres_mm(frame.layout)[black[frame.scene.seed % len(black)]]
     return float(x), float(y)
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_the_white_cell_tells_where_no_outline_does(pattern: str) -> None:
-    markers = read(cropped(plain(pattern, 3)))
+    markers = read(cropped(plain_frame(pattern, 3)))
     assert markers.origin is Origin.WHITE and (markers.status > 0).sum() > 60
 
 
@@ -46,7 +46,7 @@ def test_the_white_cell_tells_where_no_outline_does(pattern: str) -> None:
 @pytest.mark.parametrize("kind", ["drop", "large drop", "scratch", "crossing", "glare"])
 def test_what_is_no_cell_is_not_white(pattern: str, kind: str) -> None:
     """The white cell is missing, and something else is white."""
-    frame = cropped(plain(pattern, 3))
+    frame = cropped(plain_frame(pattern, 3))
     x, y = black_cell(frame)
     white = INKS["white"]
     gone = white_missing(frame).scene.damage
@@ -68,7 +68,7 @@ def test_what_is_no_cell_is_not_white(pattern: str, kind: str) -> None:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_dirt_beside_the_white_cell_does_not_hide_it(pattern: str) -> None:
-    frame = cropped(plain(pattern, 3))
+    frame = cropped(plain_frame(pattern, 3))
     scratch = Scratch((-HALF_MM, -0.9), (HALF_MM, -0.9), 0.5, DIRT)
     markers = read(frame.damaged(scratches=(scratch,)))
     assert markers.origin is Origin.WHITE

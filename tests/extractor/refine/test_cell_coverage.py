@@ -9,8 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr, owens_t
 
-from extractor.numeric.gaussian import OF_CORNER, correlated, lay_corner, normal
-from extractor.refine.synthesis.pattern_drawing import draw_cells, erase_cells, room_for_strokes
+from extractor.numeric.gaussian import CORNER_TERMS, fill_corner_terms, normal_cdf, wedge_correlation
+from extractor.refine.synthesis.pattern_drawing import (
+    allocate_coverage_runs,
+    draw_cells,
+    update_erasing_cells,
+)
 
 FINE, SIGMA, SHAPE = 15, 2.0, (100, 110)  # an odd number: pixels' middles are sampled
 near = st.floats(-3.2, 3.2).filter(lambda z: abs(z) > 1e-3)
@@ -27,11 +31,11 @@ def wedge(h: float, k: float, r: float) -> float:
 @settings(deadline=None)
 @given(h=near, k=near, opening_deg=st.floats(20.0, 160.0))
 def test_a_wedge_is_seen_as_it_should(h: float, k: float, opening_deg: float) -> None:
-    r, corner = -np.cos(np.radians(opening_deg)), np.zeros(OF_CORNER, np.float32)
-    lay_corner(r, corner)
+    r, corner = -np.cos(np.radians(opening_deg)), np.zeros(CORNER_TERMS, np.float32)
+    fill_corner_terms(r, corner)
     one, other = np.float32(h), np.float32(k)
-    share = normal(one) * normal(other)
-    share += correlated(one * one + other * other, one * other, tuple(corner))
+    share = normal_cdf(one) * normal_cdf(other)
+    share += wedge_correlation(one * one + other * other, one * other, tuple(corner))
     atol = 1e-4 if 30.0 <= opening_deg <= 150.0 else 4e-4
     np.testing.assert_allclose(share, wedge(h, k, r), atol=atol)
 
@@ -50,7 +54,7 @@ def test_a_cell_is_drawn_as_it_is_blurred(size: float, turned_deg: float) -> Non
     lines = np.zeros((3, 8))
     lines[:, 4] = np.linalg.norm(chords, axis=1)
     lines[:, :2], lines[:, 2:4], lines[:, 7] = corners[edges[:, 0]], chords / lines[:, 4:5], 1.0
-    picture, strokes = np.zeros((*SHAPE, 3), np.float32), room_for_strokes(1)
+    picture, strokes = np.zeros((*SHAPE, 3), np.float32), allocate_coverage_runs(1)
     box, which = np.array([25, 22, 81, 70]), np.ones(1, np.bool_)
     ink = np.full((1, 3), 100.0), np.zeros((1, 3, 2)), SIGMA, box, picture, strokes
     draw_cells(which, 1.0, corners, cells, cells, edges, lines, *ink)
@@ -67,5 +71,5 @@ def test_a_cell_is_drawn_as_it_is_blurred(size: float, turned_deg: float) -> Non
     outside = picture.copy()
     outside[inside] = 0.0
     assert not outside.any()
-    erase_cells(which, corners, cells, cells, edges, lines, *ink)
+    update_erasing_cells(which, corners, cells, cells, edges, lines, *ink)
     np.testing.assert_allclose(picture, 0.0, atol=1e-4)

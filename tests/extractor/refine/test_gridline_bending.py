@@ -17,10 +17,17 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Rendered, render
 from cmpdesign.scene.standard import standard_layout, standard_scene
 from extractor import Extractor, Status, parse_layout
-from extractor.complete.consistency_filter import _drop_slid, _slid
+from extractor.complete.consistency_filter import _shifted_rim_markers, _update_shifted_markers
 from extractor.layout.lattice_tables import lattice_of
 from extractor.layout.topology import Topology, topology_of
-from extractor.refine.measure.gridline_bending import FREE, MAX_FREE, bent, eliminate, freedom, roughness
+from extractor.refine.measure.gridline_bending import (
+    MAX_BEND_DEVIATION,
+    MAX_BEND_SHARE,
+    bend_after_shift,
+    estimate_bend_variance,
+    measure_roughness,
+    update_without_bending,
+)
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, local_maps
 from extractor.refine.synthesis.residual_kernel import (
     AA,
@@ -61,11 +68,11 @@ def rough_at(
 ) -> Array:
     """How rough markers at ``xy`` are, each known to a hundredth of a pixel."""
     own = mesh(pattern)
-    maps = local_maps(xy, own.near, own.offset, own.stencil)
+    maps = local_maps(xy, own.near, own.ring_vectors, own.derivative_stencil)
     diagonal = np.tile([information, 0.0, information], (len(xy), 1))
     which = np.ones(len(xy), np.bool_) if which is None else which
-    about = own.edges, own.ahead, own.third, own.spokes, own.near
-    return np.asarray(roughness(xy, maps, diagonal, *about, which))
+    about = own.edges, own.next_markers, own.third_differences, own.spokes, own.near
+    return np.asarray(measure_roughness(xy, maps, diagonal, *about, which))
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
@@ -74,7 +81,7 @@ def test_what_is_flat_or_noisy_is_not_rough(pattern: str) -> None:
     assert rough_at(xy, pattern).max() == 0.0
     noise = np.random.default_rng(0).normal(0, 0.01, xy.shape)
     noisy = rough_at(xy + noise, pattern)
-    assert (noisy > 0).mean() < 0.2 and FREE * np.sqrt(noisy.max()) < 0.03
+    assert (noisy > 0).mean() < 0.2 and MAX_BEND_SHARE * np.sqrt(noisy.max()) < 0.03
 
 
 def test_a_kink_is_rough_and_one_moved_marker_is_not() -> None:
@@ -124,20 +131,20 @@ def test_eliminating_and_following_solves_the_whole_system(
     wanted = np.linalg.solve(whole, right)
     to_a, to_b = sums[:, A].copy(), sums[:, B].copy()
     bend = np.array([before])
-    kept = eliminate(sums, to_a, to_b, np.zeros(1), bend, np.array([loose]), variance)
+    kept = update_without_bending(sums, to_a, to_b, np.zeros(1), bend, np.array([loose]), variance)
     ends = np.linalg.solve([[sums[0, AA], sums[0, AB]], [sums[0, AB], sums[0, BB]]], [to_a[0], to_b[0]])
     np.testing.assert_allclose(ends, wanted[:2], atol=1e-6)
     lines = np.zeros((1, 8))
     lines[0, [UX, LENGTH, KNOWN]] = 1.0, 20.0, 1.0
     shift = np.array([[0.0, ends[0]], [0.0, ends[1]]])
-    after = bent(bend, kept, shift, lines, np.array([[0, 1]], np.int32))
+    after = bend_after_shift(bend, kept, shift, lines, np.array([[0, 1]], np.int32))
     np.testing.assert_allclose(after[0] - before, wanted[2:], atol=1e-6)
 
 
 def test_a_stiff_gridline_loses_the_bending_it_had() -> None:
     sums = read(np.zeros(9))
     to_a, to_b = sums[:, A].copy(), sums[:, B].copy()
-    kept = eliminate(sums, to_a, to_b, np.zeros(1), np.array([[0.3, -0.1]]), np.zeros(1), 4.0)
+    kept = update_without_bending(sums, to_a, to_b, np.zeros(1), np.array([[0.3, -0.1]]), np.zeros(1), 4.0)
     np.testing.assert_array_equal(kept[0, :2], [-0.3, 0.1])
     assert to_a[0] > 0  # the image shows a straight gridline: without its bending its start lies higher
 
@@ -151,14 +158,14 @@ def test_freedom_is_what_gridlines_show(b: float, least: float, most: float) -> 
     given_ = sums, sums[:, A], sums[:, B], np.zeros(len(sums)), np.zeros((len(sums), 2)), rough
     lines = np.zeros((len(sums), 8))
     lines[:, LENGTH] = 20.0
-    loose = freedom(*given_, np.ones(len(sums)), lines, own.edges, 4.0)
+    loose = estimate_bend_variance(*given_, np.ones(len(sums)), lines, own.edges, 4.0)
     assert (least <= np.sqrt(loose)).all() and (np.sqrt(loose) <= max(most, 0.015 * 10 + 1e-9)).all()
     short = lines.copy()
     short[:, LENGTH] = 2.0
-    held = freedom(*given_, np.ones(len(sums)), short, own.edges, 4.0)
-    assert (np.sqrt(held) <= MAX_FREE * 2.0 + 1e-9).all()
-    tight = freedom(*given_[:-1], 1e-4 * rough, np.ones(len(sums)), lines, own.edges, 4.0)
-    assert (np.sqrt(tight) <= FREE * 0.1 + 1e-9).all()
+    held = estimate_bend_variance(*given_, np.ones(len(sums)), short, own.edges, 4.0)
+    assert (np.sqrt(held) <= MAX_BEND_DEVIATION * 2.0 + 1e-9).all()
+    tight = estimate_bend_variance(*given_[:-1], 1e-4 * rough, np.ones(len(sums)), lines, own.edges, 4.0)
+    assert (np.sqrt(tight) <= MAX_BEND_SHARE * 0.1 + 1e-9).all()
 
 
 @pytest.mark.parametrize(
@@ -187,8 +194,18 @@ def test_a_corner_of_the_rim_that_slid_is_not_believed(
     cov = np.tile(1e-4 * np.eye(2), (count, 1, 1))
     all_agree = np.full(count, agreed)
     after, edge = xy.copy(), np.full(count, 20.0)
-    slid = _slid(after, cov, np.full(count, free_px), found, edge, lattice.rim)
-    _drop_slid(after, cov, slid, found, edge, all_agree, lattice.neighbours, lattice.inner, lattice.marker_mm)
+    slid = _shifted_rim_markers(after, cov, np.full(count, free_px), found, edge, lattice.rim)
+    _update_shifted_markers(
+        after,
+        cov,
+        slid,
+        found,
+        edge,
+        all_agree,
+        lattice.neighbours,
+        lattice.inward_neighbours,
+        lattice.marker_mm,
+    )
     others = np.arange(count) != corner
     np.testing.assert_array_equal(after[others], flat[others])
     wanted = {"found": found[corner], "refined": xy[corner], "lost": [np.nan, np.nan]}[expected]

@@ -18,7 +18,7 @@ from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.layout.topology import Topology, topology_of
 from extractor.presets import Preset
-from extractor.refine.outliers import doubted_ones, straying
+from extractor.refine.outliers import outlier_markers, suspect_markers
 from extractor.refine.synthesis.gridlines import local_maps
 
 Array = NDArray[np.float64]
@@ -41,11 +41,11 @@ def mesh(pattern: str) -> Topology:
 
 def strays_in(xy: Array, pattern: str, doubted: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     own = mesh(pattern)
-    maps = local_maps(xy, own.near, own.offset, own.stencil)
+    maps = local_maps(xy, own.near, own.ring_vectors, own.derivative_stencil)
     doubted = np.zeros(len(xy), np.bool_) if doubted is None else doubted
     edge = np.full(len(xy), EDGE_PX)
-    lattice = own.edges, own.ahead, own.third, own.spokes, own.onward, own.near
-    return np.asarray(straying(xy, maps, doubted, edge, *lattice))
+    lattice = own.edges, own.next_markers, own.third_differences, own.spokes, own.next_edges, own.near
+    return np.asarray(outlier_markers(xy, maps, doubted, edge, *lattice))
 
 
 def smooth(pattern: str, bend: float, turn: float) -> Array:
@@ -114,12 +114,12 @@ def test_what_is_dented_or_slips_a_little_does_not_stray(pattern: str) -> None:
 def test_doubt_is_the_mean_of_what_was_read() -> None:
     own = mesh("honeycomb")
     use, read = np.ones(len(own.edges)), np.ones(len(own.edges), np.bool_)
-    assert not doubted_ones(use, read, own.spokes)[1]
+    assert not suspect_markers(use, read, own.spokes)[1]
     use[own.spokes[0][:3]] = 0.0
-    doubted, some = doubted_ones(use, read, own.spokes)
+    doubted, some = suspect_markers(use, read, own.spokes)
     assert some and np.flatnonzero(doubted).tolist() == [0]
     read[own.spokes[0][:3]] = False  # what is not read does not count
-    assert not doubted_ones(use, read, own.spokes)[1]
+    assert not suspect_markers(use, read, own.spokes)[1]
 
 
 def read(damage: Damage, preset: Preset, surface: Surface | None = None) -> tuple[Markers, Array, Array]:

@@ -9,18 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from benchmarks.suites.scoring.reading import read
-from benchmarks.suites.stress.conditions import matching
+from benchmarks.suites.scoring.reading import read_case
+from benchmarks.suites.stress.conditions import matching_cases
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Blob, Camera, Damage, Optics, Press, composed, render
 from cmpdesign.scene.standard import BLACK_RGB, standard_layout, standard_scene
 from extractor import Extractor, parse_layout
 from extractor.layout.topology import Topology
-from extractor.refine.drawn_pattern import Drawing
-from extractor.refine.estimate import Fit
-from extractor.refine.refinement_step import roughened
-from extractor.refine.solve.convergence import beside
-from extractor.refine.synthesis_steps import Draughtsman
+from extractor.refine.drawn_pattern import Synthesis
+from extractor.refine.estimate import Estimate
+from extractor.refine.refinement_step import with_roughness
+from extractor.refine.solve.convergence import add_neighbours
+from extractor.refine.synthesis_steps import SynthesisSolver
 
 SIZE = (300, 260)
 
@@ -31,27 +31,27 @@ class Step(NamedTuple):
     mesh: Topology
     anew: Any
     free: Any
-    before: Fit
-    read: Drawing
-    after: Fit
-    drawn: Drawing
-    whole: Fit
+    before: Estimate
+    read: Synthesis
+    after: Estimate
+    drawn: Synthesis
+    whole: Estimate
 
 
 @cache
 def steps(name: str) -> list[Step]:
     """All that ``accurate`` takes in an image."""
-    plain, taken = Draughtsman._again, []
+    plain, taken = SynthesisSolver._partial_step, []
 
     def noted(
-        self: Draughtsman, view: Any, fit: Fit, read: Drawing, anew: Any, wide: bool, *how: bool
+        self: SynthesisSolver, view: Any, fit: Estimate, read: Synthesis, anew: Any, wide: bool, *how: bool
     ) -> Any:
         after, drawn = plain(self, view, fit, read, anew, wide, *how)
         start = fit._replace(xy=after.xy, beyond=after.beyond, maps=after.maps, bend=drawn.bend)
-        start = start._replace(rough=np.zeros(len(anew))) if wide else roughened(self._mesh, start)
+        start = start._replace(roughness=np.zeros(len(anew))) if wide else with_roughness(self._mesh, start)
         free = anew.copy()
-        beside(anew, self._mesh.edges, free)
-        whole = self._stepped(view.frame, start, drawn)
+        add_neighbours(anew, self._mesh.edges, free)
+        whole = self._update_estimate(view.frame, start, drawn)
         taken.append(Step(self._mesh, anew, free, fit, read, after, drawn, whole))
         return after, drawn
 
@@ -67,7 +67,7 @@ def steps(name: str) -> list[Step]:
     scene = replace(standard_scene(standard_layout(pattern, 5)), camera=camera, optics=optics, **changes)
     extractor = Extractor(parse_layout(layout_to_json(standard_layout(pattern, 5))), "accurate")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Draughtsman, "_again", noted)
+        patch.setattr(SynthesisSolver, "_partial_step", noted)
         extractor.extract(render(scene, size=SIZE).image)
     assert taken
     return taken
@@ -99,13 +99,13 @@ def test_nothing_else_moves(name: str) -> None:
         assert before.reading is not None and after.reading is not None
         for was, now in (
             (before.bend, after.bend),
-            (before.loose, after.loose),
+            (before.bend_variance, after.bend_variance),
             (before.information.beside, after.information.beside),
-            (before.reading.use, after.reading.use),
+            (before.reading.weight, after.reading.weight),
             (before.reading.foot, after.reading.foot),
         ):
             np.testing.assert_array_equal(now[others], was[others])
-        assert (after.sigma, after.swelling) == (before.sigma, before.swelling)
+        assert (after.sigma, after.dot_gain) == (before.sigma, before.dot_gain)
         assert after.noise == after.reading.noise == pytest.approx(step.whole.noise, rel=0.03)
         np.testing.assert_array_equal(after.levels.cell, before.levels.cell)
 
@@ -113,8 +113,8 @@ def test_nothing_else_moves(name: str) -> None:
 def test_what_lies_where_others_put_it_is_drawn_where_these_are_now() -> None:
     """A corner beyond the image's border, which was placed inside by few cells: few markers are drawn anew, but it is,
     and so leaves the image."""
-    case = matching("overflowing=40/elliptical")[0]
-    result = read(case, runs=1, timing=False)[0]
+    case = matching_cases("overflowing=40/elliptical")[0]
+    result = read_case(case, runs=1, timing=False)[0]
     assert result.score.measured > 150 and result.score.outside == 0 and result.score.wrong == 0
 
 
@@ -123,8 +123,8 @@ def test_what_hardly_shows_is_not_guiding_afterwards() -> None:
     measured."""
     for name in ("dirty", "cut"):
         for step in steps(name):
-            weak = np.isnan(step.before.guiding[:, 0])
-            np.testing.assert_array_equal(np.isnan(step.after.guiding[:, 0]), weak)
+            weak = np.isnan(step.before.reliable[:, 0])
+            np.testing.assert_array_equal(np.isnan(step.after.reliable[:, 0]), weak)
             sure = step.free & ~weak
-            np.testing.assert_array_equal(step.after.guiding[sure], step.after.measured[sure])
-    assert any(np.isnan(step.before.guiding).any() for step in steps("cut"))
+            np.testing.assert_array_equal(step.after.reliable[sure], step.after.measured[sure])
+    assert any(np.isnan(step.before.reliable).any() for step in steps("cut"))

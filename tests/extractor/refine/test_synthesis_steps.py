@@ -15,16 +15,21 @@ from cmpdesign.scene import Blob, Damage, Press, Rendered, Sensor, composed
 from cmpdesign.scene.standard import BLACK_RGB, INKS, standard_layout
 from extractor import Extractor, Status
 from extractor.layout.topology import topology_of
-from extractor.presets import STEPS
+from extractor.presets import SCHEDULES
 from extractor.refine import refiner as refine
-from extractor.refine.drawn_pattern import Drawing, chosen
-from extractor.refine.refinement_step import placed
-from extractor.refine.solve.convergence import beside, still_moving, unsettled
+from extractor.refine.drawn_pattern import Synthesis, merged_rows
+from extractor.refine.refinement_step import with_pattern_moved
+from extractor.refine.solve.convergence import add_neighbours, convergence_covariance, unconverged_markers
 from extractor.refine.solve.fisher_information import covariances
-from extractor.refine.synthesis.blur_bleed import bled, rebled, unbled
-from extractor.refine.synthesis.ink_levels import Levels
-from extractor.refine.synthesis.pattern_drawing import RUNS, draw_cells, erase_cells, room_for_strokes
-from extractor.refine.synthesis_steps import SAME_LEVELS, Draughtsman
+from extractor.refine.synthesis.blur_bleed import adapt_levels_to_blur, bleed_shares, remove_bleed
+from extractor.refine.synthesis.ink_levels import InkLevels
+from extractor.refine.synthesis.pattern_drawing import (
+    RUN_COUNT,
+    allocate_coverage_runs,
+    draw_cells,
+    update_erasing_cells,
+)
+from extractor.refine.synthesis_steps import LEVEL_TOLERANCE, SynthesisSolver
 from tests.support.standard_views import LAYERS, extractor, shown
 
 
@@ -39,19 +44,19 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
     pattern: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cells taken out and drawn elsewhere leave no trace, and gridlines that did not move keep what was read."""
-    plain, parts = Draughtsman._again, []
+    plain, parts = SynthesisSolver._partial_step, []
 
     def checked(
-        self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_], *how: bool
+        self: SynthesisSolver, view: Any, fit: Any, before: Synthesis, anew: NDArray[np.bool_], *how: bool
     ) -> Any:
         fit, drawing = plain(self, view, fit, before, anew, *how)
         mesh, levels = self._mesh, drawing.levels
         fresh = np.zeros(view.image.shape, np.float32)
         every, sides = np.ones(len(mesh.cells), np.bool_), (mesh.cells, mesh.cell_edges, mesh.edges)
         how = drawing.lines, levels.cell, levels.slope, drawing.sigma, drawing.box
-        draw_cells(every, 1.0, drawing.xy, *sides, *how, fresh, room_for_strokes(len(every)))
+        draw_cells(every, 1.0, drawing.xy, *sides, *how, fresh, allocate_coverage_runs(len(every)))
         x0, y0, x1, y1 = drawing.box
-        picture = self.board(view.image.shape).picture[y0:y1, x0:x1]
+        picture = self.buffers(view.image.shape).synthetic_image[y0:y1, x0:x1]
         np.testing.assert_allclose(picture, fresh[y0:y1, x0:x1], atol=2e-3)  # grey levels
         kept = ~anew[mesh.edges].any(axis=1)
         np.testing.assert_array_equal(drawing.sums[kept], before.sums[kept])
@@ -60,7 +65,7 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
         parts.append(int(anew.sum()))
         return fit, drawing
 
-    monkeypatch.setattr(Draughtsman, "_again", checked)
+    monkeypatch.setattr(SynthesisSolver, "_partial_step", checked)
     if pattern == "dirty honeycomb":
         extractor("honeycomb").extract(dirty((-2.0, 1.5)).image)
     else:
@@ -70,13 +75,13 @@ def test_what_is_drawn_in_part_is_what_would_be_drawn_anew(
 
 def test_steps_in_part_end_where_steps_from_everything_do(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = shown("round", surface=composed(Press(4.0, 0.6)))
-    preset = STEPS["accurate"]
+    preset = SCHEDULES["accurate"]
     part = extractor("round", "accurate").extract(seen.image)
-    monkeypatch.setattr("extractor.refine.synthesis_steps.MAX_AGAIN", -1.0)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.MAX_PARTIAL_SHARE", -1.0)
     whole = extractor("round", "accurate").extract(seen.image)
     deviation = np.sqrt(np.einsum("mii->m", whole.cov_px2))
     away = np.linalg.norm(part.xy_px - whole.xy_px, axis=1)
-    assert (away < preset.enough * deviation).all() and np.median(away / deviation) < 0.1
+    assert (away < preset.converged_deviations * deviation).all() and np.median(away / deviation) < 0.1
 
 
 @pytest.mark.parametrize("preset", ["fast", "balanced", "accurate"])
@@ -84,13 +89,13 @@ def test_no_image_takes_more_than_its_preset_allows(preset: str, monkeypatch: py
     """Noise, damage and wide blur end after the effort of the preset, or two steps."""
     taken: list[str] = []
     for name in ("_first", "_again"):
-        plain = getattr(Draughtsman, name)
+        plain = getattr(SynthesisSolver, name)
 
-        def counted(self: Draughtsman, *given: Any, _plain: Any = plain, _name: str = name) -> Any:
+        def counted(self: SynthesisSolver, *given: Any, _plain: Any = plain, _name: str = name) -> Any:
             taken.append(_name)
             return _plain(self, *given)
 
-        monkeypatch.setattr(Draughtsman, name, counted)
+        monkeypatch.setattr(SynthesisSolver, name, counted)
     for seen, balanced in (
         (dirty((1.5, 0.4), (-2.0, 1.5), (0.3, -2.4)), 3),
         (shown("honeycomb", blur=2.5), 2),
@@ -108,7 +113,7 @@ def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
     share: float, dirty: bool, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Though the gridlines at those that move are trusted at the next look."""
-    looks, taken, plain = [0.1, share, 0.0], [], Draughtsman._again
+    looks, taken, plain = [0.1, share, 0.0], [], SynthesisSolver._partial_step
 
     def look(measured: NDArray[np.float64], *rest: Any) -> tuple[NDArray[np.bool_], int, bool]:
         anew = np.arange(len(measured)) < looks[0] * len(measured)
@@ -116,14 +121,14 @@ def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
         looks.pop(0)
         return anew, int(anew.sum()), dirty and first
 
-    def counted(self: Draughtsman, *given: Any) -> Any:
+    def counted(self: SynthesisSolver, *given: Any) -> Any:
         taken.append(given)
         return plain(self, *given)
 
-    monkeypatch.setattr("extractor.refine.synthesis_steps.still_moving", look)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.unconverged_markers", look)
     monkeypatch.setattr("extractor.refine.synthesis_steps.effort", lambda *_: 0.1)
-    monkeypatch.setattr(Draughtsman, "_again", counted)
-    monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(patience=5))
+    monkeypatch.setattr(SynthesisSolver, "_partial_step", counted)
+    monkeypatch.setitem(SCHEDULES, "balanced", SCHEDULES["balanced"]._replace(patience=5))
     Extractor(extractor("round").layout).extract(shown("round").image)
     assert len(taken) == steps
 
@@ -131,21 +136,25 @@ def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
 def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer markers are drawn anew, in fewer steps, and the error hardly grows."""
     taken: list[int] = []
-    plain = Draughtsman._again
+    plain = SynthesisSolver._partial_step
 
     def counted(
-        self: Draughtsman, view: Any, fit: Any, before: Drawing, anew: NDArray[np.bool_], *how: bool
+        self: SynthesisSolver, view: Any, fit: Any, before: Synthesis, anew: NDArray[np.bool_], *how: bool
     ) -> Any:
         taken.append(int(anew.sum()))
         return plain(self, view, fit, before, anew, *how)
 
     def error(many: float, most: float) -> float:
         taken.clear()
-        monkeypatch.setitem(STEPS, "balanced", STEPS["balanced"]._replace(many=many, most=most))
+        monkeypatch.setitem(
+            SCHEDULES,
+            "balanced",
+            SCHEDULES["balanced"]._replace(max_partial_share=many, max_partial_share_in_dirt=most),
+        )
         found = Extractor(extractor("round").layout).extract(seen.image)
         return float(np.sqrt(np.nanmean((found.xy_px - seen.truth.marker_xy_px) ** 2)))
 
-    monkeypatch.setattr(Draughtsman, "_again", counted)
+    monkeypatch.setattr(SynthesisSolver, "_partial_step", counted)
     seen = shown("round", surface=composed(Press(4.0, 0.6)))
     whole = error(1.0, 1.0)
     beside = list(taken)
@@ -162,7 +171,7 @@ def test_where_much_moves_what_is_beside_it_stays(monkeypatch: pytest.MonkeyPatc
 def test_what_a_step_left_grows_with_it(share: float, angle: float, sigma: float) -> None:
     """A tenth of the blur leaves a hundredth; never more than half of the step; along it, and symmetric."""
     along = np.array([np.cos(angle), np.sin(angle)])
-    left = unsettled((share * sigma * along)[None], sigma, 0.0)[0]
+    left = convergence_covariance((share * sigma * along)[None], sigma, 0.0)[0]
     expected = min(share, 0.5) * share * sigma
     np.testing.assert_allclose(left, expected**2 * np.outer(along, along), atol=1e-12)
 
@@ -171,15 +180,16 @@ def test_where_blur_is_wide_a_share_of_a_usual_step_is_left_everywhere() -> None
     rng = np.random.default_rng(0)
     shift = 0.01 * rng.normal(size=(4000, 2))
     shift[0] = np.nan  # of a marker that is not known
-    more = unsettled(shift, 1.0, 0.5) - unsettled(shift, 1.0, 0.0)
+    more = convergence_covariance(shift, 1.0, 0.5) - convergence_covariance(shift, 1.0, 0.0)
     np.testing.assert_allclose(
         more[1:], np.broadcast_to((0.5 * 0.01) ** 2 * np.eye(2), (3999, 2, 2)), rtol=0.1
     )
-    assert (unsettled(shift, 1.0, 3.0)[1:] == unsettled(shift, 1.0, 1.0)[1:]).all()
+    assert (convergence_covariance(shift, 1.0, 3.0)[1:] == convergence_covariance(shift, 1.0, 1.0)[1:]).all()
 
 
 def dirty_at(edges: NDArray[np.int32], trust: float = 0.2, explained: bool = True) -> tuple[Any, ...]:
-    """The last four arguments of ``still_moving``: gridlines so far trusted, the first two around each marker."""
+    """The last four arguments of ``unconverged_markers``: gridlines so far trusted, the first two around each
+    marker."""
     spokes = np.full((edges.max() + 1, 6), -1, np.int32)
     for m in range(len(spokes)):
         own = np.flatnonzero((edges == m).any(axis=1))[:2]
@@ -194,33 +204,35 @@ def test_moving_markers_bring_their_neighbours() -> None:
     strides = np.array([6.0, 60.0, 4.0, 9.0])  # only the first is both far and sure
     moving = measured, drawn, strides
     far, much = (0.1, 1.0, np.inf, 5.0), (0.3, 1.0, np.inf, 5.0)
-    anew, count, dirty = still_moving(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges))
+    anew, count, dirty = unconverged_markers(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     assert count == 2 and dirty
-    assert not still_moving(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[2]  # nothing is hidden
-    anew, count, _ = still_moving(*moving, *far, 0.25, 1.0, 1.0, *dirty_at(edges))
+    assert not unconverged_markers(*moving, *far, 0.0, 1.0, 1.0, *dirty_at(edges, 0.5))[
+        2
+    ]  # nothing is hidden
+    anew, count, _ = unconverged_markers(*moving, *far, 0.25, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()  # one of four is few
-    anew, count, _ = still_moving(*moving, *far, 0.0, 0.5, 0.25, *dirty_at(edges))
+    anew, count, _ = unconverged_markers(*moving, *far, 0.0, 0.5, 0.25, *dirty_at(edges))
     np.testing.assert_array_equal(anew, [True, True, False, False])
     between = np.array([[0, 1], [0, 2], [0, 3]], np.int32)
-    anew, count, dirty = still_moving(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between))
+    anew, count, dirty = unconverged_markers(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between))
     np.testing.assert_array_equal(anew, [True, False, False, False])
     assert count == 4 and dirty  # with those beside it, all are
-    anew, count, dirty = still_moving(*moving, *far, 0.0, 0.4, 0.75, *dirty_at(between))
+    anew, count, dirty = unconverged_markers(*moving, *far, 0.0, 0.4, 0.75, *dirty_at(between))
     assert count == 0 and not anew.any() and dirty  # all is dirty
     unexplained = dirty_at(between, explained=False)
-    anew, count, _ = still_moving(*moving, *far, 0.0, 0.4, 0.75, *unexplained)
+    anew, count, _ = unconverged_markers(*moving, *far, 0.0, 0.4, 0.75, *unexplained)
     assert count == 4 and anew.all()
-    anew, _, dirty = still_moving(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
+    anew, _, dirty = unconverged_markers(*moving, *far, 0.0, 0.5, 0.75, *dirty_at(between, 1.0))
     assert anew.all() and not dirty
-    anew, _, _ = still_moving(*moving, *far, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
+    anew, _, _ = unconverged_markers(*moving, *far, 0.0, 0.3, 0.75, *dirty_at(between, 1.0))
     np.testing.assert_array_equal(anew, [True, False, False, False])
-    anew, count, _ = still_moving(*moving, *much, 0.0, 1.0, 1.0, *dirty_at(edges))
+    anew, count, _ = unconverged_markers(*moving, *much, 0.0, 1.0, 1.0, *dirty_at(edges))
     assert count == 0 and not anew.any()
     out = np.zeros(4, np.bool_)
-    beside(np.array([False, False, False, True]), edges, out)
+    add_neighbours(np.array([False, False, False, True]), edges, out)
     np.testing.assert_array_equal(out, [False, False, True, False])
-    np.testing.assert_array_equal(chosen(out, np.ones((4, 2)), np.zeros((4, 2)))[:, 0], [0, 0, 1, 0])
+    np.testing.assert_array_equal(merged_rows(out, np.ones((4, 2)), np.zeros((4, 2)))[:, 0], [0, 0, 1, 0])
 
 
 def test_how_far_a_marker_must_move_is_told_by_the_shortest_gridline_there() -> None:
@@ -229,11 +241,11 @@ def test_how_far_a_marker_must_move_is_told_by_the_shortest_gridline_there() -> 
     drawn = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 50.0], [10.0, 50.0], [0.0, 90.0], [6.0, 90.0]])
     moving = drawn + [0.0, 0.05], drawn, np.full(6, 9.0)
     usual = 0.0, 1.0, 1.0, *dirty_at(edges, 1.0)
-    assert still_moving(*moving, 0.0, 1.0, np.inf, 5.0, *usual)[0].all()
+    assert unconverged_markers(*moving, 0.0, 1.0, np.inf, 5.0, *usual)[0].all()
     # a tenth of the blur is too far; of the share that short gridlines answer with, 0.36 and 0.13, it is not
-    anew = still_moving(*moving, 0.1, 1.0, np.inf, 5.0, *usual)[0]
+    anew = unconverged_markers(*moving, 0.1, 1.0, np.inf, 5.0, *usual)[0]
     np.testing.assert_array_equal(anew, [False, False, True, True, True, True])
-    anew = still_moving(*moving, 0.1, 1.0, 0.12, 5.0, *usual)[0]
+    anew = unconverged_markers(*moving, 0.1, 1.0, 0.12, 5.0, *usual)[0]
     np.testing.assert_array_equal(anew, [False, False, True, True, False, False])
 
 
@@ -251,7 +263,7 @@ def test_where_many_move_the_farthest_are_drawn_anew(far: list[float], most: flo
     away = np.linalg.norm(shift, axis=1)
     assume(np.abs(away - near).min() > 1e-9 and np.diff(np.sort(away[:half])).min() > 1e-9)
     about = drawn + shift, drawn, np.full(2 * half, 9.0), near, 1.0, np.inf, 5.0, 0.0
-    anew, touched, dirty = still_moving(*about, many, most, *dirty_at(edges))
+    anew, touched, dirty = unconverged_markers(*about, many, most, *dirty_at(edges))
     moving = np.count_nonzero(away > near)
     assert dirty == (moving > 0)
     if 2 * moving <= many * 2 * half:
@@ -276,8 +288,8 @@ def test_what_neighbours_bleed_into_means_is_taken_out(share: float) -> None:
     field = np.zeros((3, 10))
     field[:, 0] = black + share * total
     seen = (1 - 3 * share) * true - share * total
-    levels = Levels(seen, np.zeros((4, 3, 2)), field, np.zeros(4, np.bool_))
-    found = unbled(levels, color, np.full(4, share), share)
+    levels = InkLevels(seen, np.zeros((4, 3, 2)), field, np.zeros(4, np.bool_))
+    found = remove_bleed(levels, color, np.full(4, share), share)
     np.testing.assert_allclose(found.cell, true, rtol=1e-9)
     np.testing.assert_allclose(found.black[:, 0], black, rtol=1e-9)
 
@@ -285,7 +297,7 @@ def test_what_neighbours_bleed_into_means_is_taken_out(share: float) -> None:
 def test_bleeding_grows_with_blur_and_ends_with_unknown_corners() -> None:
     xy = np.array([[0.0, 0.0], [20.0, 0.0], [10.0, 17.3], [np.nan, np.nan]])
     cells = np.array([[0, 1, 2], [0, 1, 3]], np.int32)
-    shares = [bled(xy, cells, sigma, 1.5)[0] for sigma in (1.0, 2.0, 4.0)]
+    shares = [bleed_shares(xy, cells, sigma, 1.5)[0] for sigma in (1.0, 2.0, 4.0)]
     assert all(np.isnan(share[1]) for share in shares)
     assert shares[0][0] < 1e-3 < shares[1][0] < shares[2][0] < 0.15
 
@@ -305,7 +317,7 @@ def test_the_first_estimate_of_the_blur_is_close(
         ratios.append(fit.sigma / true)
         return fit, across
 
-    monkeypatch.setattr(refine, "cleared", noted)
+    monkeypatch.setattr(refine, "update_blur_and_bleed", noted)
     extractor(pattern).extract(shown(pattern, blur).image)
     assert 0.75 < ratios[-1] < 1.1
     if blur <= 1.0:
@@ -316,18 +328,18 @@ def test_maps_are_laid_anew_around_some_markers_only(monkeypatch: pytest.MonkeyP
     fits: list[Any] = []
     plain = refine.Draughtsman.steps
 
-    def kept(self: Draughtsman, view: Any, fit: Any, *given: Any) -> Any:
+    def kept(self: SynthesisSolver, view: Any, fit: Any, *given: Any) -> Any:
         fits.append((self._mesh, fit))
         return plain(self, view, fit, *given)
 
-    monkeypatch.setattr(Draughtsman, "steps", kept)
+    monkeypatch.setattr(SynthesisSolver, "steps", kept)
     extractor("honeycomb").extract(shown("honeycomb").image)
     mesh, fit = fits[0]
-    moved = fit.guiding + np.random.default_rng(1).normal(0.0, 0.3, fit.guiding.shape)
+    moved = fit.reliable + np.random.default_rng(1).normal(0.0, 0.3, fit.reliable.shape)
     moved[3] = np.nan
-    fit, which = fit._replace(guiding=moved), np.zeros(len(moved), np.bool_)
+    fit, which = fit._replace(reliable=moved), np.zeros(len(moved), np.bool_)
     which[[5, 20]] = True
-    near, whole = placed(mesh, fit, which), placed(mesh, fit)
+    near, whole = with_pattern_moved(mesh, fit, which), with_pattern_moved(mesh, fit)
     np.testing.assert_array_equal(near.beyond, whole.beyond)
     ends = np.unique(mesh.edges[which[mesh.edges].any(axis=1)])
     np.testing.assert_array_equal(near.maps[ends], whole.maps[ends])
@@ -370,11 +382,11 @@ def test_what_is_taken_out_leaves_nothing(shares: int) -> None:
     """Whether its strokes were kept, did not fit all, or were not kept at all; larger than a chunk of pixels, too."""
     picture, which = np.full((96, 96, 3), 50.0, np.float32), np.ones(1, np.bool_)
     for size in (0.5, 1.0):  # 700 pixels and 2,400
-        strokes = room_for_strokes(1, shares)
+        strokes = allocate_coverage_runs(1, shares)
         cell = one_cell(0.2, 1.0, picture, size)
         draw_cells(which, 1.0, *cell, picture, strokes)
-        assert picture.max() > 120.0 and bool(strokes.cell[0, RUNS]) == (size < 1.0 and shares >= 4000)
-        erase_cells(which, *cell, picture, strokes)
+        assert picture.max() > 120.0 and bool(strokes.cell[0, RUN_COUNT]) == (size < 1.0 and shares >= 4000)
+        update_erasing_cells(which, *cell, picture, strokes)
         np.testing.assert_allclose(picture, 50.0, atol=1e-4)
 
 
@@ -383,7 +395,7 @@ def test_a_curved_edge_is_blurred_as_it_should(bow: float) -> None:
     """One cell with a curved side against the same, finely sampled and filtered: blur moves curved edges."""
     fine, sigma, size = 16, 3.0, 96
     picture = np.zeros((size, size, 3), np.float32)
-    which, strokes = np.ones(1, np.bool_), room_for_strokes(1)
+    which, strokes = np.ones(1, np.bool_), allocate_coverage_runs(1)
     draw_cells(which, 1.0, *one_cell(bow, sigma, picture), picture, strokes)
     y, x = np.mgrid[0 : size * fine, 0 : size * fine].astype(np.float32)
     x, y = (x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5
@@ -405,16 +417,16 @@ def test_two_steps_find_wide_blur_and_the_levels_that_it_hides(
 ) -> None:
     """From a blur known to a tenth, with levels as the middles of the cells show them under it."""
     seen: list[tuple[float, float, float]] = []
-    plain = Draughtsman._first
+    plain = SynthesisSolver._full_step
 
-    def noted(self: Draughtsman, view: Any, fit: Any) -> Any:
+    def noted(self: SynthesisSolver, view: Any, fit: Any) -> Any:
         stepped, drawing = plain(self, view, fit)
         true = np.sqrt(blur**2 + view.scale**2 / 12) / view.scale
         level = np.median(np.abs(stepped.levels.cell).sum(axis=1))
         seen.append((drawing.sigma / true, stepped.sigma / true, level))
         return stepped, drawing
 
-    monkeypatch.setattr(Draughtsman, "_first", noted)
+    monkeypatch.setattr(SynthesisSolver, "_full_step", noted)
     extractor(pattern, "accurate").extract(shown(pattern, blur, sensor=Sensor(noise=0.5)).image)
     sharp = np.median([np.abs(np.array(INKS[ink]) - BLACK_RGB).sum() for ink in ("red", "green", "blue")])
     assert abs(seen[1][1] - 1) < 0.03
@@ -430,14 +442,18 @@ def test_levels_follow_the_blur_there_and_back() -> None:
     cell = np.tile([120.0, 40.0, 20.0], (count, 1))
     field = np.zeros((3, 10))
     field[:, 0] = 20.0
-    levels = Levels(cell, np.zeros((count, 3, 2)), field, np.zeros(4, np.bool_))
-    wider = rebled(levels, xy, own, 1.2, 1.5)
+    levels = InkLevels(cell, np.zeros((count, 3, 2)), field, np.zeros(4, np.bool_))
+    wider = adapt_levels_to_blur(levels, xy, own, 1.2, 1.5)
     assert (wider.cell[:, 0] > 1.02 * cell[:, 0]).all() and (wider.black[:, 0] < 20.0).all()
-    back = rebled(wider, xy, own, 1.5, 1.2)
+    back = adapt_levels_to_blur(wider, xy, own, 1.5, 1.2)
     np.testing.assert_allclose(back.cell, cell, rtol=0.02)
-    assert rebled(levels, xy, own, 0.5, 0.6) is levels
+    assert adapt_levels_to_blur(levels, xy, own, 0.5, 0.6) is levels
     # a little more blur than drawn is left alone only where it makes no difference: half of what makes levels others
-    assert rebled(levels, xy, own, 1.2, 1.2005) is levels
-    kept = [sigma for sigma in np.linspace(1.2, 1.3, 41) if rebled(levels, xy, own, 1.2, sigma) is levels]
-    first = rebled(levels, xy, own, 1.2, kept[-1] + 0.0025)
-    assert first is not levels and np.abs(first.cell / cell - 1.0).max() < 0.5 * SAME_LEVELS
+    assert adapt_levels_to_blur(levels, xy, own, 1.2, 1.2005) is levels
+    kept = [
+        sigma
+        for sigma in np.linspace(1.2, 1.3, 41)
+        if adapt_levels_to_blur(levels, xy, own, 1.2, sigma) is levels
+    ]
+    first = adapt_levels_to_blur(levels, xy, own, 1.2, kept[-1] + 0.0025)
+    assert first is not levels and np.abs(first.cell / cell - 1.0).max() < 0.5 * LEVEL_TOLERANCE

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from extractor import RigError, View, load_rig, parse_rig
-from extractor.space.camera import distorted, undistorted
+from extractor.space.camera import distort_points, undistort_points
 from tests.support.view_scenes import DISTORTION, looking, opencv_px, pair, pressed, reference
 
 RIG = """
@@ -79,10 +79,10 @@ def test_the_inverse_of_the_distortion_is_one_or_says_no(
 ) -> None:
     fold = plain_view(distortion=distortion).fold_radius
     plain = np.array([place])
-    bent, by_plain = distorted(plain, distortion)
-    back = undistorted(bent, distortion, fold)
+    bent, by_plain = distort_points(plain, distortion)
+    back = undistort_points(bent, distortion, fold)
     if np.isfinite(back).all():
-        np.testing.assert_allclose(distorted(back, distortion)[0], bent, atol=1e-8)
+        np.testing.assert_allclose(distort_points(back, distortion)[0], bent, atol=1e-8)
         assert np.hypot(*back[0]) < fold
     gentle = (
         np.hypot(*place) < 0.8 * fold and np.linalg.cond(by_plain[0]) < 20 and np.linalg.det(by_plain[0]) > 0
@@ -97,7 +97,7 @@ def test_points_inside_the_model_come_back_to_the_last_digits(k1: float, radius:
     view = plain_view(distortion=(k1, 0.0, 0.001, -0.001, 0.0))
     radius = min(radius, 0.9 * view.fold_radius)
     plain = radius * np.array([[np.cos(angle), np.sin(angle)]])
-    bent, _ = distorted(plain, view.distortion)
+    bent, _ = distort_points(plain, view.distortion)
     np.testing.assert_allclose(view.normalised(bent * 900 + (320, 240)), plain, atol=1e-11)
 
 

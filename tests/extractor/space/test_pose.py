@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from extractor import PoseError, View
-from extractor.space.pose import place_views
+from extractor.space.pose import estimate_poses
 from tests.support.view_scenes import flat, looking, noisy, opencv_px, pair, reference, unplaced
 
 NONE = (0.0, 0.0, 0.0)
@@ -16,7 +16,7 @@ def placed(views: tuple[View, ...], rng: np.random.Generator, spread=NONE, sigma
     layout = reference()
     seen = [noisy(layout, view, flat(layout), rng, sigma_px) for view in views]
     xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
-    return place_views(unplaced(views).views, layout.xy_mm, xy, cov, spread)
+    return estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, spread)
 
 
 def pose_error(found: View, true: View) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_a_dome_at_rest_is_a_dome_when_views_are_placed_jointly() -> None:
     seen = [noisy(layout, view, dome, rng) for view in views]
     xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
     rigid, joint = (
-        place_views(unplaced(views).views, layout.xy_mm, xy, cov, spread)
+        estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, spread)
         for spread in (NONE, (0.001, 0.001, 0.2))
     )
     assert rigid.misfit > 3 and joint.misfit < 1.2
@@ -84,7 +84,7 @@ def test_markers_that_lie_elsewhere_do_not_turn_the_pose() -> None:
     seen = [noisy(layout, view, flat(layout), np.random.default_rng(5)) for view in views]
     xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
     xy[0, [3, 40]] += (4.0, -6.0)
-    poses = place_views(unplaced(views).views, layout.xy_mm, xy, cov, NONE)
+    poses = estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, NONE)
     assert not poses.used[[3, 40]].any() and poses.used.sum() == len(layout.xy_mm) - 2
     assert np.abs(pose_error(poses.views[0], views[0])).max() < 0.005
 
@@ -94,7 +94,7 @@ def test_a_given_pose_is_kept_and_exact() -> None:
     layout, rng = reference(), np.random.default_rng(6)
     seen = [noisy(layout, view, flat(layout), rng) for view in (left, right)]
     xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
-    poses = place_views((left, unplaced((right,)).views[0]), layout.xy_mm, xy, cov, NONE)
+    poses = estimate_poses((left, unplaced((right,)).views[0]), layout.xy_mm, xy, cov, NONE)
     assert poses.views[0] is left and not poses.cov[:6].any() and poses.cov[6:, 6:].diagonal().all()
 
 
@@ -107,7 +107,7 @@ def test_too_few_markers_or_markers_on_a_line_are_refused() -> None:
     line[0, row] = xy[0, row]
     for seen, said in ((few, "5 markers at rest; a pose needs 6"), (line, "lie on a line")):
         with pytest.raises(PoseError, match=f"view 'left': .*{said}"):
-            place_views(unplaced((view,)).views, layout.xy_mm, seen, cov, NONE)
+            estimate_poses(unplaced((view,)).views, layout.xy_mm, seen, cov, NONE)
 
 
 def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
@@ -117,8 +117,8 @@ def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
     layout = reference()
     xy = np.stack([opencv_px(view, flat(layout)) for view in (left, right)])
     cov = np.tile(np.eye(2) * 1e-4, (2, len(layout.xy_mm), 1, 1))
-    assert place_views(rig, layout.xy_mm, xy, cov, NONE).views[0].position_mm[2] < 0
+    assert estimate_poses(rig, layout.xy_mm, xy, cov, NONE).views[0].position_mm[2] < 0
     with pytest.raises(
         PoseError, match="view 'left' would look at the pattern's front, view 'right' at its back"
     ):
-        place_views((wrong, rig[1]), layout.xy_mm, xy, cov, NONE)
+        estimate_poses((wrong, rig[1]), layout.xy_mm, xy, cov, NONE)

@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.products.laser.setup import Setup
+from cmpdesign.products.laser.setup import LaserSetup
 
 POWER_SHARES = (0.8, 1.0, 1.2)
 REPEAT_FACTORS = (1, 2)
@@ -71,7 +71,7 @@ class CouponError(CmpDesignError, ValueError):
     """A file that is no coupon."""
 
 
-def design_coupon(setup: Setup) -> Coupon:
+def design_coupon(setup: LaserSetup) -> Coupon:
     """The coupon for a machine and material: power and repeats around the settings that the job uses."""
     width, height = PATCH_MM[0] * len(POWER_SHARES), PATCH_MM[1] * len(REPEAT_FACTORS) + 4 * TRIANGLE_MM
     right, top = width + 2 * MARGIN_MM, height + 2 * MARGIN_MM
@@ -112,7 +112,7 @@ def load_coupon(path: str | Path) -> Coupon:
     try:
         with Path(path).open("rb") as file:
             text = file.read(_MAX_BYTES + 1).decode("utf-8")
-        return _checked(json.loads(text))
+        return _parse_coupon(json.loads(text))
     except OSError as error:
         raise CouponError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:
@@ -125,18 +125,18 @@ def load_coupon(path: str | Path) -> Coupon:
         raise CouponError(f"{path}: is no coupon.json; build writes one with --only laser") from None
 
 
-class _Closed(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=False)
 
 
-class _OpeningFile(_Closed):
+class _OpeningFile(_StrictModel):
     x_mm: float = Field(ge=-1e4, le=1e4)
     y_mm: float = Field(ge=-1e4, le=1e4)
     width_mm: float = Field(gt=0, le=1e3)
     height_mm: float = Field(gt=0, le=1e3)
 
 
-class _PatchFile(_Closed):
+class _PatchFile(_StrictModel):
     name: str = Field(min_length=1, max_length=20)
     power_percent: float = Field(gt=0, le=100)
     speed_mm_s: float = Field(gt=0, le=1e6)
@@ -144,7 +144,7 @@ class _PatchFile(_Closed):
     openings: list[_OpeningFile] = Field(min_length=1, max_length=100)
 
 
-class _CouponFile(_Closed):
+class _CouponFile(_StrictModel):
     format: str = Field(pattern="^cmp-coupon$")
     version: int = Field(ge=1, le=1)
     units: str = Field(pattern="^mm$")
@@ -155,7 +155,7 @@ class _CouponFile(_Closed):
     patches: list[_PatchFile] = Field(min_length=1, max_length=100)
 
 
-def _checked(document: Any) -> Coupon:
+def _parse_coupon(document: Any) -> Coupon:
     data = _CouponFile.model_validate(document)
     patches = tuple(
         Patch(

@@ -16,77 +16,82 @@ from cmpdesign.products.laser.coupon.design import (
     coupon_to_json,
     design_coupon,
 )
-from cmpdesign.products.laser.formats.drawing import Drawing
-from cmpdesign.products.laser.formats.palette import LAYERS
-from cmpdesign.products.laser.job import CIRCLE_POINTS, Pass
-from cmpdesign.products.laser.paths.beam import Beam, Points
-from cmpdesign.products.laser.paths.cavities import cavities
-from cmpdesign.products.laser.paths.strokes import Strokes, loops
-from cmpdesign.products.laser.setup import Setup
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
+from cmpdesign.products.laser.formats.palette import LASER_LAYERS
+from cmpdesign.products.laser.job import CIRCLE_POINTS, LaserPass
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
+from cmpdesign.products.laser.paths.cavities import make_cavities
+from cmpdesign.products.laser.paths.strokes import Strokes, loop_strokes
+from cmpdesign.products.laser.setup import LaserSetup
 
 
-def coupon(setup: Setup) -> tuple[Drawing, str]:
+def coupon_job(setup: LaserSetup) -> tuple[LaserDrawing, str]:
     """The coupon as a drawing, and the text of coupon.json."""
     piece = design_coupon(setup)
     passes = [
-        _pass(f"patch-{patch.name}", _openings(patch), setup, patch.power_percent, patch.passes)
+        _make_pass(f"patch-{patch.name}", _opening_strokes(patch), setup, patch.power_percent, patch.passes)
         for patch in piece.patches
     ]
-    passes.insert(0, _pass("fiducials", _circles(piece), setup, setup.cut_power_percent, setup.cut_repeats))
-    passes.append(_pass("kerf-row", _triangles(piece), setup, setup.cut_power_percent, setup.cut_repeats))
-    origin = _origin(piece, setup)
+    passes.insert(
+        0,
+        _make_pass("fiducials", _fiducial_strokes(piece), setup, setup.cut_power_percent, setup.cut_repeats),
+    )
+    passes.append(
+        _make_pass("kerf-row", _triangle_strokes(piece), setup, setup.cut_power_percent, setup.cut_repeats)
+    )
+    origin = _coupon_origin_mm(piece, setup)
     moved = tuple(replace(one, walls=one.walls.moved(origin)) for one in passes)
-    drawing = Drawing(
+    drawing = LaserDrawing(
         name=f"coupon for {setup.material.name}",
         setup=setup,
         passes=moved,
-        layers={one.name: layer for one, layer in zip(moved, LAYERS, strict=True)},
+        layers={one.name: layer for one, layer in zip(moved, LASER_LAYERS, strict=True)},
         fiducials_mm=np.array(piece.fiducials_mm) + origin,
         fiducial_diameter_mm=piece.fiducial_diameter_mm,
     )
     return drawing, coupon_to_json(piece)
 
 
-def _origin(piece: Coupon, setup: Setup) -> Points:
+def _coupon_origin_mm(piece: Coupon, setup: LaserSetup) -> Points:
     """Centred on the bed."""
     marks = np.array(piece.fiducials_mm)
     bed = np.array([setup.machine.bed_width_mm.value, setup.machine.bed_height_mm.value])
     return np.asarray(np.round((bed - marks.max(axis=0)) / 2, 3))
 
 
-def _pass(name: str, walls: Strokes, setup: Setup, power_percent: float, repeats: int) -> Pass:
-    return Pass(name, "coupon", None, None, walls, (), power_percent, setup.cut_speed_mm_s, repeats)
+def _make_pass(name: str, walls: Strokes, setup: LaserSetup, power_percent: float, repeats: int) -> LaserPass:
+    return LaserPass(name, "coupon", None, None, walls, (), power_percent, setup.cut_speed_mm_s, repeats)
 
 
-def _openings(patch: Patch) -> Strokes:
+def _opening_strokes(patch: Patch) -> Strokes:
     """The rectangles themselves, not compensated: that is what the coupon is for."""
     unit = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
     rows = [
         (opening.x_mm, opening.y_mm) + unit * (opening.width_mm, opening.height_mm)
         for opening in patch.openings
     ]
-    return loops(np.array(rows), np.arange(len(rows)))
+    return loop_strokes(np.array(rows), np.arange(len(rows)))
 
 
-def _circles(piece: Coupon) -> Strokes:
+def _fiducial_strokes(piece: Coupon) -> Strokes:
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
     circle = piece.fiducial_diameter_mm / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     centres = np.array(piece.fiducials_mm)
-    return loops(centres[:, None] + circle, np.arange(len(centres)))
+    return loop_strokes(centres[:, None] + circle, np.arange(len(centres)))
 
 
-def _triangles(piece: Coupon) -> Strokes:
+def _triangle_strokes(piece: Coupon) -> Strokes:
     """The row of compensated cells, each for its kerf, from the left."""
     triangle = TRIANGLE_MM * np.array([(-0.5, 0), (0.5, 0), (0, np.sqrt(0.75))])
     columns = {opening.x_mm for patch in piece.patches for opening in patch.openings}
     step = (max(columns) - min(columns) + PATCH_MM[0] / 2) / len(KERFS_MM)
     paths = [
-        cavities(
+        make_cavities(
             np.arange(1),
             (triangle + (MARGIN_MM + (number + 0.5) * step, MARGIN_MM))[None],
-            Beam.of_kerf(kerf_mm, kerf_mm),
+            BeamFootprint.of_kerf(kerf_mm, kerf_mm),
             "overcut",
         ).loops_mm
         for number, kerf_mm in enumerate(KERFS_MM)
     ]
-    return loops(np.concatenate(paths), np.arange(len(paths)))
+    return loop_strokes(np.concatenate(paths), np.arange(len(paths)))

@@ -22,14 +22,14 @@ from cmpdesign.products.laser.coupon.design import Coupon, Opening, Patch
 Values = NDArray[np.float64]
 # Bright or dark ground beyond an opening that its profile is measured from, and how much of its length is used.
 GROUND_MM, LENGTH_SHARE = 1.0, 0.6
-BANDS = 8
-STEP_PX = 0.5
-ROUNDNESS = 0.84
-CANDIDATES = 9
+PROFILE_BANDS = 8
+SAMPLE_SPACING_PX = 0.5
+MIN_ROUNDNESS = 0.84
+MAX_CANDIDATES = 9
 # A fifth mark farther from its place than this share of a mark's diameter belongs to some other piece.
-KEY_SHARE = 0.35
+MAX_FIFTH_MARK_ERROR = 0.35
 # Marks look alike from above; a tilt by 50 degrees makes them 1.6 times as wide as high (log 1.6 = 0.45).
-STRETCH = 0.7
+MAX_STRETCH = 0.7
 SMALLEST_SCALE_PX_MM = 6.0
 LEAST_CONTRAST = 20.0
 
@@ -39,7 +39,7 @@ class PhotoError(CmpDesignError, ValueError):
 
 
 @dataclass(frozen=True)
-class Width:
+class MeasuredWidth:
     """A kerf in mm with its standard uncertainty (one sigma)."""
 
     value_mm: float
@@ -51,12 +51,12 @@ class PatchKerf:
     """The kerf of one patch: of cuts that run in y (x) and in x (y)."""
 
     patch: Patch
-    x: Width
-    y: Width
+    x: MeasuredWidth
+    y: MeasuredWidth
 
 
 @dataclass(frozen=True)
-class Reading:
+class CouponReading:
     """What a photo of a coupon says.
 
     Attributes:
@@ -72,7 +72,7 @@ class Reading:
     from_back: bool
 
 
-def read_coupon(coupon: Coupon, image: Image) -> Reading:
+def read_coupon(coupon: Coupon, image: Image) -> CouponReading:
     """Measure the kerf.
 
     Args:
@@ -85,27 +85,29 @@ def read_coupon(coupon: Coupon, image: Image) -> Reading:
     gray = np.asarray(image, dtype=np.float64).mean(axis=2) / (256.0 if image.dtype == np.uint16 else 1.0)
     gray = np.ascontiguousarray(gray, dtype=np.float32)
     marks = np.array(coupon.fiducials_mm)
-    centres = _find_marks(gray, coupon, marks)
-    image_from_coupon, fit_mm, scale = _map(marks, centres, coupon, gray)
+    centres = _find_fiducials(gray, coupon, marks)
+    image_from_coupon, fit_mm, scale = _fit_homography(marks, centres, coupon, gray)
     if scale < SMALLEST_SCALE_PX_MM:
         raise PhotoError(
             f"the photo has {scale:.1f} px in a mm, limit {SMALLEST_SCALE_PX_MM:g} px; go nearer, or scan at 300 dpi"
         )
     relative = fit_mm / float(np.ptp(marks, axis=0).max())
-    view = _View(gray, image_from_coupon, scale, relative, _inside(coupon, gray, image_from_coupon))
-    patches = _patches(coupon, view)
+    view = _CouponImage(
+        gray, image_from_coupon, scale, relative, _fit_opening_level(coupon, gray, image_from_coupon)
+    )
+    patches = _measure_patches(coupon, view)
     turn = np.linalg.det(np.diff(image_from_coupon(marks[:3]), axis=0)) * np.linalg.det(
         np.diff(marks[:3], axis=0)
     )
     # The image's y runs down: seen from the front, the map turns the frame over.
-    return Reading(patches, scale, fit_mm, bool(turn > 0))
+    return CouponReading(patches, scale, fit_mm, bool(turn > 0))
 
 
-Map = Callable[[Values], Values]
+PointMap = Callable[[Values], Values]
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _CouponImage:
     """The picture and what is known of it.
 
     Attributes:
@@ -117,17 +119,17 @@ class _View:
     """
 
     gray: NDArray[np.float32]
-    to_image: Map
+    to_image: PointMap
     scale: float
-    relative: float
-    inside: Map
+    scale_deviation: float
+    inside: PointMap
 
 
-def _find_marks(gray: NDArray[np.float32], coupon: Coupon, marks: Values) -> Values:
+def _find_fiducials(gray: NDArray[np.float32], coupon: Coupon, marks: Values) -> Values:
     """(5, 2) px, rough centres of the fiducials in the coupon's order."""
     best: tuple[float, Values] | None = None
-    for candidates in _round_openings(gray):
-        found = _assigned(candidates, marks, coupon.fiducial_diameter_mm)
+    for candidates in _find_round_regions(gray):
+        found = _assign_fiducials(candidates, marks, coupon.fiducial_diameter_mm)
         if found is not None and (best is None or found[0] < best[0]):
             best = found
     if best is None:
@@ -138,7 +140,7 @@ def _find_marks(gray: NDArray[np.float32], coupon: Coupon, marks: Values) -> Val
     return best[1]
 
 
-def _round_openings(gray: NDArray[np.float32]) -> list[Values]:
+def _find_round_regions(gray: NDArray[np.float32]) -> list[Values]:
     """(N, 3) x, y, area in px of round regions, the largest first; dark ones, then bright ones."""
     import cv2
 
@@ -154,7 +156,7 @@ def _round_openings(gray: NDArray[np.float32]) -> list[Values]:
             if (
                 area > 30
                 and cv2.contourArea(contour) > 0.9 * area
-                and 4 * np.pi * area / length**2 > ROUNDNESS
+                and 4 * np.pi * area / length**2 > MIN_ROUNDNESS
             ):
                 (x, y), _ = cv2.minEnclosingCircle(hull)
                 moments = cv2.moments(hull)
@@ -165,16 +167,16 @@ def _round_openings(gray: NDArray[np.float32]) -> list[Values]:
     return found
 
 
-def _assigned(candidates: Values, marks: Values, diameter_mm: float) -> tuple[float, Values] | None:
+def _assign_fiducials(candidates: Values, marks: Values, diameter_mm: float) -> tuple[float, Values] | None:
     """The assignment of five candidates to the marks whose fifth lies best where the other four put it.
 
     Larger round things may lie about, so windows of candidates of like size are tried.
     """
     best: tuple[float, Values] | None = None
     for start in range(max(len(candidates) - 4, 0)):
-        alike = candidates[start:][candidates[start:, 2] > 0.4 * candidates[start, 2]][:CANDIDATES]
+        alike = candidates[start:][candidates[start:, 2] > 0.4 * candidates[start, 2]][:MAX_CANDIDATES]
         for four in permutations(range(len(alike)), 4):
-            found = _tried(alike, four, marks, diameter_mm)
+            found = _score_assignment(alike, four, marks, diameter_mm)
             if found is not None and (best is None or found[0] < best[0]):
                 best = found
         if best is not None:
@@ -182,7 +184,7 @@ def _assigned(candidates: Values, marks: Values, diameter_mm: float) -> tuple[fl
     return None
 
 
-def _tried(
+def _score_assignment(
     alike: Values, four: tuple[int, ...], marks: Values, diameter_mm: float
 ) -> tuple[float, Values] | None:
     """How badly an assignment of the first four fits (place of the fifth, sizes of all), and all five centres."""
@@ -191,46 +193,48 @@ def _tried(
     source = marks[:4].astype(np.float32)
     image_from_coupon = cv2.getPerspectiveTransform(source, alike[list(four), :2].astype(np.float32))
     compass = diameter_mm / 2 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
-    rims = _projected(image_from_coupon, (marks[:, None] + compass).reshape(-1, 2)).reshape(5, 4, 2)
+    rims = _project_points(image_from_coupon, (marks[:, None] + compass).reshape(-1, 2)).reshape(5, 4, 2)
     wide = np.linalg.norm(rims[:, 0] - rims[:, 1], axis=1)
     high = np.linalg.norm(rims[:, 2] - rims[:, 3], axis=1)
     rest = [i for i in range(len(alike)) if i not in four]
     if not rest or not np.isfinite(rims).all() or min(wide.min(), high.min()) <= 1:
         return None
-    fifth = _projected(image_from_coupon, marks[4:])
+    fifth = _project_points(image_from_coupon, marks[4:])
     away = np.linalg.norm(np.subtract(alike[rest, :2], fifth), axis=1)
     five = alike[[*four, rest[int(away.argmin())]]]
     measured = np.sqrt(4 * five[:, 2] / np.pi)
     stretch = max(np.abs(np.log(measured / np.sqrt(wide * high)))) + max(np.abs(np.log(wide / high)))
     place = float(away.min()) / float(measured[4])
-    if place > KEY_SHARE or stretch > STRETCH:
+    if place > MAX_FIFTH_MARK_ERROR or stretch > MAX_STRETCH:
         return None
     return float(place + stretch), five[:, :2]
 
 
-def _projected(homography: NDArray[Any], points: Values) -> Values:
+def _project_points(homography: NDArray[Any], points: Values) -> Values:
     lifted = np.column_stack([points, np.ones(len(points))]) @ homography.T
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(lifted[:, :2] / lifted[:, 2:])
 
 
-def _map(marks: Values, rough: Values, coupon: Coupon, gray: NDArray[np.float32]) -> tuple[Map, float, float]:
+def _fit_homography(
+    marks: Values, rough: Values, coupon: Coupon, gray: NDArray[np.float32]
+) -> tuple[PointMap, float, float]:
     """The map from coupon (mm) to image (px), the RMS of the fit in mm, and the scale in px in a mm."""
     import cv2
 
     homography = cv2.findHomography(marks, rough)[0]
-    local = _projected(homography, np.vstack([marks, marks + (0.5, 0)]))
+    local = _project_points(homography, np.vstack([marks, marks + (0.5, 0)]))
     radii = np.hypot(*(local[5:] - local[:5]).T) * coupon.fiducial_diameter_mm
-    centres = np.array([_centroid(gray, xy, radius) for xy, radius in zip(rough, radii, strict=True)])
+    centres = np.array([_refine_centroid(gray, xy, radius) for xy, radius in zip(rough, radii, strict=True)])
     homography = cv2.findHomography(marks, centres)[0]
     scale = float(2 * np.median(radii) / coupon.fiducial_diameter_mm)
     # Five marks hold ten numbers, the map eight: two are left to tell how well it fits.
-    rest = _projected(homography, marks) - centres
+    rest = _project_points(homography, marks) - centres
     fit_mm = float(np.sqrt((rest**2).sum() / 2)) / scale
-    return lambda points: _projected(homography, points), fit_mm, scale
+    return lambda points: _project_points(homography, points), fit_mm, scale
 
 
-def _centroid(gray: NDArray[np.float32], centre: Values, radius: float) -> Values:
+def _refine_centroid(gray: NDArray[np.float32], centre: Values, radius: float) -> Values:
     """The centre of brightness of a mark against its ground; blur and soft rims do not move it."""
     reach = int(np.ceil(1.5 * radius))
     x, y = np.rint(centre).astype(int)
@@ -243,7 +247,7 @@ def _centroid(gray: NDArray[np.float32], centre: Values, radius: float) -> Value
     return np.asarray(np.array([(weight * columns).sum(), (weight * rows).sum()]) / weight.sum())
 
 
-def _inside(coupon: Coupon, gray: NDArray[np.float32], to_image: Map) -> Map:
+def _fit_opening_level(coupon: Coupon, gray: NDArray[np.float32], to_image: PointMap) -> PointMap:
     """Brightness inside openings over the whole piece: the plane through the widest opening of every patch.
 
     A slot is too narrow to show how dark it is inside, and no light is quite even.
@@ -252,34 +256,40 @@ def _inside(coupon: Coupon, gray: NDArray[np.float32], to_image: Map) -> Map:
         max(p.openings, key=lambda opening: min(opening.width_mm, opening.height_mm)) for p in coupon.patches
     ]
     places = np.array([(opening.x_mm, opening.y_mm) for opening in wide])
-    levels = np.array([_brightness(opening, gray, to_image) for opening in wide])
+    levels = np.array([_opening_level(opening, gray, to_image) for opening in wide])
     centre = places.mean(axis=0)
     plane = np.linalg.lstsq(np.column_stack([np.ones(len(places)), places - centre]), levels, rcond=None)[0]
     return lambda points: np.asarray(plane[0] + (points - centre) @ plane[1:])
 
 
-def _patches(coupon: Coupon, view: _View) -> tuple[PatchKerf, ...]:
+def _measure_patches(coupon: Coupon, view: _CouponImage) -> tuple[PatchKerf, ...]:
     """Both kerfs of every patch: a square tells both, a slot the one across it."""
-    x = [[_excess(o, True, view) for o in p.openings if o.height_mm >= o.width_mm] for p in coupon.patches]
-    y = [[_excess(o, False, view) for o in p.openings if o.width_mm >= o.height_mm] for p in coupon.patches]
-    kerfs = zip(coupon.patches, _means(x), _means(y), strict=True)
+    x = [
+        [_measure_excess_width(o, True, view) for o in p.openings if o.height_mm >= o.width_mm]
+        for p in coupon.patches
+    ]
+    y = [
+        [_measure_excess_width(o, False, view) for o in p.openings if o.width_mm >= o.height_mm]
+        for p in coupon.patches
+    ]
+    kerfs = zip(coupon.patches, _pool_widths(x), _pool_widths(y), strict=True)
     return tuple(PatchKerf(patch, across_x, across_y) for patch, across_x, across_y in kerfs)
 
 
-def _excess(opening: Opening, across_x: bool, view: _View) -> Width:
+def _measure_excess_width(opening: Opening, across_x: bool, view: _CouponImage) -> MeasuredWidth:
     """Measured less nominal width of an opening, with what its bands and the map's scale leave uncertain."""
     width, length = opening.width_mm, opening.height_mm
     if not across_x:
         width, length = length, width
     half = width / 2 + GROUND_MM
-    along = (np.arange(BANDS * 4) + 0.5) / (BANDS * 4) - 0.5
-    count = int(np.ceil(2 * half * view.scale / STEP_PX))
+    along = (np.arange(PROFILE_BANDS * 4) + 0.5) / (PROFILE_BANDS * 4) - 0.5
+    count = int(np.ceil(2 * half * view.scale / SAMPLE_SPACING_PX))
     across = ((np.arange(count) + 0.5) / count - 0.5) * 2 * half
     place, band = np.meshgrid(across, along * LENGTH_SHARE * length)
     points = np.stack([place, band] if across_x else [band, place], axis=-1) + (opening.x_mm, opening.y_mm)
-    profile = _banded(_sampled(view.gray, view.to_image, points))
-    ground = _ground(profile, across, half)
-    depth = _banded(view.inside(points)) - ground
+    profile = _band_means(_sample_image(view.gray, view.to_image, points))
+    ground = _fit_ground_level(profile, across, half)
+    depth = _band_means(view.inside(points)) - ground
     if np.abs(depth).min() < LEAST_CONTRAST:
         raise PhotoError(
             f"an opening at ({opening.x_mm:g}, {opening.y_mm:g}) mm differs from the sheet by "
@@ -287,16 +297,16 @@ def _excess(opening: Opening, across_x: bool, view: _View) -> Width:
             "bright ground behind it"
         )
     widths = ((profile - ground) / depth).sum(axis=1) * (2 * half / count)
-    scatter = float(widths.std(ddof=1)) / np.sqrt(BANDS)
-    return Width(float(widths.mean()) - width, float(np.hypot(scatter, view.relative * width)))
+    scatter = float(widths.std(ddof=1)) / np.sqrt(PROFILE_BANDS)
+    return MeasuredWidth(float(widths.mean()) - width, float(np.hypot(scatter, view.scale_deviation * width)))
 
 
-def _banded(values: Values) -> Values:
+def _band_means(values: Values) -> Values:
     """(BANDS, N) means of neighbouring rows."""
-    return np.asarray(values.reshape(BANDS, -1, values.shape[1]).mean(axis=1))
+    return np.asarray(values.reshape(PROFILE_BANDS, -1, values.shape[1]).mean(axis=1))
 
 
-def _ground(profile: Values, across: Values, half: float) -> Values:
+def _fit_ground_level(profile: Values, across: Values, half: float) -> Values:
     """The sheet's brightness along each profile: a straight line through both ends."""
     ends = np.abs(across) > half - 0.5 * GROUND_MM
     basis = np.stack([np.ones_like(across), across])
@@ -304,15 +314,15 @@ def _ground(profile: Values, across: Values, half: float) -> Values:
     return np.asarray(weights @ basis)
 
 
-def _brightness(opening: Opening, gray: NDArray[np.float32], to_image: Map) -> float:
+def _opening_level(opening: Opening, gray: NDArray[np.float32], to_image: PointMap) -> float:
     """Of the inner half of an opening."""
     share = (np.arange(16) + 0.5) / 16 - 0.5
     x, y = np.meshgrid(0.5 * opening.width_mm * share, 0.5 * opening.height_mm * share)
     points = np.stack([x + opening.x_mm, y + opening.y_mm], axis=-1)
-    return float(_sampled(gray, to_image, points).mean())
+    return float(_sample_image(gray, to_image, points).mean())
 
 
-def _sampled(gray: NDArray[np.float32], to_image: Map, points_mm: Values) -> Values:
+def _sample_image(gray: NDArray[np.float32], to_image: PointMap, points_mm: Values) -> Values:
     import cv2
 
     xy = to_image(points_mm.reshape(-1, 2)).reshape(points_mm.shape).astype(np.float32)
@@ -324,7 +334,7 @@ def _sampled(gray: NDArray[np.float32], to_image: Map, points_mm: Values) -> Val
     return np.asarray(sampled, dtype=np.float64)
 
 
-def _means(patches: list[list[Width]]) -> list[Width]:
+def _pool_widths(patches: list[list[MeasuredWidth]]) -> list[MeasuredWidth]:
     """The mean of each patch's widths.
 
     A patch has too few openings to tell by itself how much they differ; all patches together tell it.
@@ -335,5 +345,5 @@ def _means(patches: list[list[Width]]) -> list[Width]:
     means = []
     for widths, found in zip(patches, values, strict=True):
         own = sum(width.sigma_mm**2 for width in widths) / len(widths) ** 2
-        means.append(Width(float(found.mean()), float(np.sqrt(own + between / len(widths)))))
+        means.append(MeasuredWidth(float(found.mean()), float(np.sqrt(own + between / len(widths)))))
     return means

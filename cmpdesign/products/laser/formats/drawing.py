@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmpdesign.products.laser.formats.palette import Layer, job_layers
-from cmpdesign.products.laser.job import Job, Pass
+from cmpdesign.products.laser.formats.palette import LaserLayer, job_layers
+from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.beam import Points
-from cmpdesign.products.laser.setup import Setup
+from cmpdesign.products.laser.setup import LaserSetup
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class LaserDrawing:
     """Passes on the bed, in mm, origin at its lower left corner.
 
     Attributes:
@@ -27,13 +27,13 @@ class Drawing:
     """
 
     name: str
-    setup: Setup
-    passes: tuple[Pass, ...]
-    layers: Mapping[str, Layer]
+    setup: LaserSetup
+    passes: tuple[LaserPass, ...]
+    layers: Mapping[str, LaserLayer]
     fiducials_mm: Points
     fiducial_diameter_mm: float
 
-    def only(self, one: Pass) -> Drawing:
+    def with_one_pass(self, one: LaserPass) -> LaserDrawing:
         """The same with one pass."""
         return replace(self, passes=(one,))
 
@@ -48,9 +48,9 @@ class Drawing:
         return left, bottom, right, top
 
 
-def job_drawing(job: Job) -> Drawing:
+def job_drawing(job: LaserJob) -> LaserDrawing:
     """All passes of a job."""
-    return Drawing(
+    return LaserDrawing(
         name=job.name,
         setup=job.setup,
         passes=job.passes,

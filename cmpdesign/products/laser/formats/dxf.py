@@ -8,15 +8,15 @@ from itertools import pairwise
 from typing import Any
 
 from cmpdesign import __version__
-from cmpdesign.products.laser.formats.drawing import Drawing
-from cmpdesign.products.laser.formats.palette import TOOL, Layer
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
+from cmpdesign.products.laser.formats.palette import TOOL_LAYER, LaserLayer
 
 MILLIMETRES, METRIC = 4, 1
 _ENTITIES = "  0\nSECTION\n  2\nENTITIES\n"
-FIDUCIALS = "T1"
+FIDUCIAL_LAYER = "T1"
 
 
-def drawing_to_dxf(drawing: Drawing) -> str:
+def drawing_to_dxf(drawing: LaserDrawing) -> str:
     """The walls of the passes, and the fiducials as circles on the layer T1, which is not plotted."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
@@ -29,14 +29,14 @@ def drawing_to_dxf(drawing: Drawing) -> str:
         classes = document.classes
         classes.add_required_classes(document.dxfversion)
         classes.classes = OrderedDict(sorted(classes.classes.items()))
-        _header(document, drawing)
+        _update_header(document, drawing)
         space = document.modelspace()
         for one in drawing.passes:
-            _layer(document, one.name, drawing.layers[one.name])
-        _layer(document, FIDUCIALS, TOOL).dxf.plot = 0
+            _add_layer(document, one.name, drawing.layers[one.name])
+        _add_layer(document, FIDUCIAL_LAYER, TOOL_LAYER).dxf.plot = 0
         for x, y in drawing.fiducials_mm.tolist():
-            space.add_circle((x, y), drawing.fiducial_diameter_mm / 2, dxfattribs={"layer": FIDUCIALS})
-        polylines = _polylines(document, drawing)
+            space.add_circle((x, y), drawing.fiducial_diameter_mm / 2, dxfattribs={"layer": FIDUCIAL_LAYER})
+        polylines = _polyline_text(document, drawing)
         text = io.StringIO()
         document.write(text)
     finally:
@@ -45,7 +45,7 @@ def drawing_to_dxf(drawing: Drawing) -> str:
     return before + entities + polylines + after
 
 
-def _polylines(document: Any, drawing: Drawing) -> str:
+def _polyline_text(document: Any, drawing: LaserDrawing) -> str:
     """The walls as text for the section ENTITIES, with handles that the document leaves to them.
 
     The library takes a tenth of a millisecond for every polyline and twice that to write it; a job has each cell
@@ -64,7 +64,7 @@ def _polylines(document: Any, drawing: Drawing) -> str:
     return "".join(parts)
 
 
-def _header(document: Any, drawing: Drawing) -> None:
+def _update_header(document: Any, drawing: LaserDrawing) -> None:
     left, bottom, right, top = drawing.extent_mm
     header = document.header
     header["$INSUNITS"], header["$MEASUREMENT"] = MILLIMETRES, METRIC
@@ -75,5 +75,5 @@ def _header(document: Any, drawing: Drawing) -> None:
     document.header.custom_vars.append("generator", f"cmpdesign {__version__}")
 
 
-def _layer(document: Any, name: str, layer: Layer) -> Any:
+def _add_layer(document: Any, name: str, layer: LaserLayer) -> Any:
     return document.layers.add(name, color=layer.aci, true_color=layer.rgb)

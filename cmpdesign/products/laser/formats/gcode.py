@@ -10,20 +10,20 @@ from __future__ import annotations
 from itertools import pairwise
 
 from cmpdesign import __version__
-from cmpdesign.products.laser.formats.drawing import Drawing
-from cmpdesign.products.laser.formats.palette import number
-from cmpdesign.products.laser.job import Pass
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
+from cmpdesign.products.laser.formats.palette import format_mm
+from cmpdesign.products.laser.job import LaserPass
 from cmpdesign.products.laser.paths.strokes import Strokes
 
 PAUSE = "M0 ; take the pad out, fill, cure, put it back on its pins"
 
 
-def drawing_to_gcode(drawing: Drawing) -> str:
+def drawing_to_gcode(drawing: LaserDrawing) -> str:
     """The passes' program; where there are several, it waits after each pass of cells but the last."""
     machine = drawing.setup.machine
     lines = [
-        f"; cmpdesign {__version__}: {_plain(drawing.name)}",
-        f"; machine: {_plain(machine.name)}, $30={machine.s_max.value:g}, $32=1",
+        f"; cmpdesign {__version__}: {_plain_comment(drawing.name)}",
+        f"; machine: {_plain_comment(machine.name)}, $30={machine.s_max.value:g}, $32=1",
         "; origin: lower left corner of the bed, mm",
         "G21",
         "G90",
@@ -32,24 +32,24 @@ def drawing_to_gcode(drawing: Drawing) -> str:
         "M5",
     ]
     for place, one in enumerate(drawing.passes):
-        lines += _pass(one, machine.s_max.value)
+        lines += _pass_program(one, machine.s_max.value)
         if place + 1 < len(drawing.passes) and one.kind == "cells":
             lines.append(PAUSE)
     return "\n".join([*lines, "G0 X0 Y0 S0", "M2", ""])
 
 
-def _pass(one: Pass, s_max: float) -> list[str]:
-    power = f"S{number(one.power_percent / 100 * s_max)}"
+def _pass_program(one: LaserPass, s_max: float) -> list[str]:
+    power = f"S{format_mm(one.power_percent / 100 * s_max)}"
     lines = [f"; {one.name}: {one.power_percent:g} %, {one.speed_mm_s:g} mm/s, {one.repeats} times"]
-    lines += ["M4 S0", f"G1 F{number(60 * one.speed_mm_s)}"]
-    same = None if one.fills else _moves(one.burnt(0), power)
+    lines += ["M4 S0", f"G1 F{format_mm(60 * one.speed_mm_s)}"]
+    same = None if one.fills else _move_lines(one.burnt(0), power)
     for repeat in range(one.repeats):
-        lines += same or _moves(one.burnt(repeat), power)
+        lines += same or _move_lines(one.burnt(repeat), power)
     return [*lines, "M5"]
 
 
-def _moves(strokes: Strokes, power: str) -> list[str]:
-    places = [f"X{number(x)} Y{number(y)}" for x, y in strokes.xy_mm.tolist()]
+def _move_lines(strokes: Strokes, power: str) -> list[str]:
+    places = [f"X{format_mm(x)} Y{format_mm(y)}" for x, y in strokes.xy_mm.tolist()]
     lines: list[str] = []
     first = strokes.first.tolist()
     for start, end in pairwise(first):
@@ -58,6 +58,6 @@ def _moves(strokes: Strokes, power: str) -> list[str]:
     return lines
 
 
-def _plain(text: str) -> str:
+def _plain_comment(text: str) -> str:
     """A comment that no controller can take for code: printable ASCII without brackets."""
     return "".join(c if c.isascii() and c.isprintable() and c not in "();%" else "_" for c in text)

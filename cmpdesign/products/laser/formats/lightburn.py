@@ -11,14 +11,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cmpdesign.products.laser.formats.drawing import Drawing
-from cmpdesign.products.laser.formats.palette import TOOL, Layer, number
-from cmpdesign.products.laser.job import Pass
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
+from cmpdesign.products.laser.formats.palette import TOOL_LAYER, LaserLayer, format_mm
+from cmpdesign.products.laser.job import LaserPass
 
 APP_VERSION = "1.7.08"
 
 
-def drawing_to_lightburn(drawing: Drawing) -> str:
+def drawing_to_lightburn(drawing: LaserDrawing) -> str:
     """The passes as a project. A hatched pocket is a Fill + Line layer on its wall: LightBurn draws the
     lines."""
     lines = [
@@ -27,22 +27,22 @@ def drawing_to_lightburn(drawing: Drawing) -> str:
         'MirrorX="False" MirrorY="False">',
     ]
     for place, one in enumerate(drawing.passes):
-        lines += _setting(drawing, one, drawing.layers[one.name], place)
-    lines += _tool()
+        lines += _cut_setting_lines(drawing, one, drawing.layers[one.name], place)
+    lines += _tool_layer_lines()
     vertices = 0
     for one in drawing.passes:
-        lines += _paths(one, drawing.layers[one.name].index, vertices)
+        lines += _path_lines(one, drawing.layers[one.name].index, vertices)
         vertices += len(one.walls)
-    radius = number(drawing.fiducial_diameter_mm / 2)
+    radius = format_mm(drawing.fiducial_diameter_mm / 2)
     for x, y in drawing.fiducials_mm.tolist():
-        lines.append(f'<Shape Type="Ellipse" CutIndex="{TOOL.index}" Rx="{radius}" Ry="{radius}">')
-        lines.append(f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm></Shape>")
+        lines.append(f'<Shape Type="Ellipse" CutIndex="{TOOL_LAYER.index}" Rx="{radius}" Ry="{radius}">')
+        lines.append(f"<XForm>1 0 0 1 {format_mm(x)} {format_mm(y)}</XForm></Shape>")
     note = f"{drawing.name}: fill and cure after every pass; T1 holds the fiducials, see the job sheet"
     lines.append(f'<Notes ShowOnLoad="0" Notes={quoteattr(note)}/>')
     return "\n".join([*lines, "</LightBurnProject>", ""])
 
 
-def _setting(drawing: Drawing, one: Pass, layer: Layer, place: int) -> list[str]:
+def _cut_setting_lines(drawing: LaserDrawing, one: LaserPass, layer: LaserLayer, place: int) -> list[str]:
     values: dict[str, object] = {
         "index": layer.index,
         "name": one.name,
@@ -56,7 +56,7 @@ def _setting(drawing: Drawing, one: Pass, layer: Layer, place: int) -> list[str]
     }
     if one.fills:
         options = drawing.setup.options
-        values["interval"] = number(drawing.setup.hatch_mm)
+        values["interval"] = format_mm(drawing.setup.hatch_mm)
         values["angle"] = f"{options.hatch_deg:g}"
         values["anglePerPass"] = f"{options.hatch_turn_deg:g}"
     kind = "Scan+Cut" if one.fills else "Cut"
@@ -64,13 +64,13 @@ def _setting(drawing: Drawing, one: Pass, layer: Layer, place: int) -> list[str]
     return [f'<CutSetting type="{kind}">', *inner, "</CutSetting>"]
 
 
-def _tool() -> list[str]:
-    inner = [f'<index Value="{TOOL.index}"/>', '<name Value="T1"/>', '<priority Value="100"/>']
+def _tool_layer_lines() -> list[str]:
+    inner = [f'<index Value="{TOOL_LAYER.index}"/>', '<name Value="T1"/>', '<priority Value="100"/>']
     return ['<CutSetting type="Tool">', *inner, "</CutSetting>"]
 
 
-def _paths(one: Pass, index: int, first_number: int) -> list[str]:
-    vertices = [f"V{number(x)} {number(y)}c0x1c1x1" for x, y in one.walls.xy_mm.tolist()]
+def _path_lines(one: LaserPass, index: int, first_number: int) -> list[str]:
+    vertices = [f"V{format_mm(x)} {format_mm(y)}c0x1c1x1" for x, y in one.walls.xy_mm.tolist()]
     bounds = zip(one.walls.first[:-1].tolist(), one.walls.first[1:].tolist(), strict=True)
     return [
         f'<Shape Type="Path" CutIndex="{index}" VertID="{n}" PrimID="{n}"><XForm>1 0 0 1 0 0</XForm>'

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.laser.job import Job
+from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.paths.strokes import DECIMALS
 
 
 @dataclass(frozen=True)
-class Layer:
+class LaserLayer:
     """A layer: LightBurn's index and color, and the AutoCAD color index for programs that read no other."""
 
     index: int
@@ -20,39 +20,39 @@ class Layer:
 
 
 # Palette of LightBurn: https://docs.lightburnsoftware.com, colors 00 to 07, tool layer T1 (index 30).
-LAYERS = (
-    Layer(0, 0x000000, 7),
-    Layer(1, 0x0000FF, 5),
-    Layer(2, 0xFF0000, 1),
-    Layer(3, 0x00E000, 3),
-    Layer(4, 0xD0D000, 2),
-    Layer(5, 0xFF8000, 30),
-    Layer(6, 0x00E0E0, 4),
-    Layer(7, 0xFF00FF, 6),
+LASER_LAYERS = (
+    LaserLayer(0, 0x000000, 7),
+    LaserLayer(1, 0x0000FF, 5),
+    LaserLayer(2, 0xFF0000, 1),
+    LaserLayer(3, 0x00E000, 3),
+    LaserLayer(4, 0xD0D000, 2),
+    LaserLayer(5, 0xFF8000, 30),
+    LaserLayer(6, 0x00E0E0, 4),
+    LaserLayer(7, 0xFF00FF, 6),
 )
-TOOL = Layer(30, 0xF36926, 30)
-_BY_COLOR = {"red": 2, "green": 3, "blue": 1, "white": 4}
-_BY_KIND = {"holes": 5, "outline": 0}
-_SPARE = (6, 7)
+TOOL_LAYER = LaserLayer(30, 0xF36926, 30)
+_LAYER_OF_COLOR = {"red": 2, "green": 3, "blue": 1, "white": 4}
+_LAYER_OF_KIND = {"holes": 5, "outline": 0}
+_SPARE_LAYERS = (6, 7)
 
 
-def job_layers(job: Job) -> Mapping[str, Layer]:
+def job_layers(job: LaserJob) -> Mapping[str, LaserLayer]:
     """The layer of every pass, by the pass' name; a color's second part takes a spare one."""
-    chosen: dict[str, Layer] = {}
-    spare = iter(_SPARE)
+    chosen: dict[str, LaserLayer] = {}
+    spare = iter(_SPARE_LAYERS)
     for one in job.passes:
-        number = _BY_KIND.get(one.kind) if one.color is None else _BY_COLOR[COLORS[one.color]]
+        number = _LAYER_OF_KIND.get(one.kind) if one.color is None else _LAYER_OF_COLOR[COLORS[one.color]]
         assert number is not None
-        taken = LAYERS[number] in chosen.values()
-        chosen[one.name] = LAYERS[next(spare)] if taken else LAYERS[number]
+        taken = LASER_LAYERS[number] in chosen.values()
+        chosen[one.name] = LASER_LAYERS[next(spare)] if taken else LASER_LAYERS[number]
     return chosen
 
 
-def hex_color(layer: Layer) -> str:
+def hex_color(layer: LaserLayer) -> str:
     return f"#{layer.rgb:06X}"
 
 
-def number(value: float) -> str:
+def format_mm(value: float) -> str:
     """A coordinate in mm, to a tenth of a micrometre, without trailing zeros."""
     text = f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

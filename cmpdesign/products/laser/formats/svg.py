@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from cmpdesign.products.laser.formats.drawing import Drawing
-from cmpdesign.products.laser.formats.palette import hex_color, number
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
+from cmpdesign.products.laser.formats.palette import format_mm, hex_color
 from cmpdesign.products.laser.paths.strokes import Strokes
 
 
-def drawing_to_svg(drawing: Drawing) -> str:
+def drawing_to_svg(drawing: LaserDrawing) -> str:
     """The walls of the passes; y runs down from the bed's upper edge."""
     machine = drawing.setup.machine
     width, height = machine.bed_width_mm.value, machine.bed_height_mm.value
@@ -32,6 +32,6 @@ def drawing_to_svg(drawing: Drawing) -> str:
 
 def path_data(strokes: Strokes, height_mm: float) -> list[str]:
     """Closed paths as SVG path data, y down from ``height_mm``."""
-    pairs = [f"{number(x)} {number(height_mm - y)}" for x, y in strokes.xy_mm.tolist()]
+    pairs = [f"{format_mm(x)} {format_mm(height_mm - y)}" for x, y in strokes.xy_mm.tolist()]
     first = strokes.first.tolist()
     return ["M" + "L".join(pairs[start:end]) + "Z" for start, end in pairwise(first)]

@@ -18,14 +18,14 @@ Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Beam:
+class BeamFootprint:
     """Half-axes of the footprint in mm: half the kerf of cuts that run in y (x) and in x (y)."""
 
     x_mm: float
     y_mm: float
 
     @classmethod
-    def of_kerf(cls, kerf_x_mm: float, kerf_y_mm: float) -> Beam:
+    def of_kerf(cls, kerf_x_mm: float, kerf_y_mm: float) -> BeamFootprint:
         return cls(kerf_x_mm / 2, kerf_y_mm / 2)
 
     @property
@@ -51,10 +51,10 @@ class Beam:
         """(..., 2) beam units to millimetres."""
         return np.asarray(xy * (self.x_mm, self.y_mm))
 
-    def at_depth(self, depth_mm: float, taper_deg: float) -> Beam:
+    def at_depth(self, depth_mm: float, taper_deg: float) -> BeamFootprint:
         """The footprint at a depth below the front; each wall leans inward by the taper.
 
         The half-axes may come out zero or negative: then the cut does not reach that deep.
         """
         narrowing = depth_mm * math.tan(math.radians(taper_deg))
-        return Beam(self.x_mm - narrowing, self.y_mm - narrowing)
+        return BeamFootprint(self.x_mm - narrowing, self.y_mm - narrowing)

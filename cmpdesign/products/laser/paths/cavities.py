@@ -9,17 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.laser.paths.beam import Beam, Points
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.corners import (
-    balanced_spur,
+    balanced_spur_length,
     half_angles,
-    spur_gain,
+    spur_area,
     spur_start,
     with_spurs,
 )
-from cmpdesign.products.laser.paths.kerf import inset
+from cmpdesign.products.laser.paths.kerf import inset_polygons
 
-Corner = Literal["plain", "overcut"]
+CornerMode = Literal["plain", "overcut"]
 ARC_POINTS = 25
 
 
@@ -40,7 +40,7 @@ class Cavities:
     nominal_mm: Points
     path_mm: Points
     tip_mm: Points
-    corner: Corner
+    corner: CornerMode
     exists: NDArray[np.bool_]
 
     @property
@@ -70,7 +70,9 @@ class Cavities:
         )
 
 
-def cavities(cell: NDArray[np.int64], polygons_mm: Points, beam: Beam, corner: Corner) -> Cavities:
+def make_cavities(
+    cell: NDArray[np.int64], polygons_mm: Points, beam: BeamFootprint, corner: CornerMode
+) -> Cavities:
     """Paths whose burn meets the cells' sides, plain or with balanced spurs.
 
     Args:
@@ -79,7 +81,7 @@ def cavities(cell: NDArray[np.int64], polygons_mm: Points, beam: Beam, corner: C
         beam: the footprint at the face where the cells are to have their nominal size.
         corner: how corners are treated.
     """
-    path_mm, exists = inset(polygons_mm, beam)
+    path_mm, exists = inset_polygons(polygons_mm, beam)
     tip_mm = path_mm
     if corner == "overcut":
         outward = beam.units(polygons_mm - path_mm)
@@ -87,27 +89,27 @@ def cavities(cell: NDArray[np.int64], polygons_mm: Points, beam: Beam, corner: C
             outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
         half, _ = half_angles(beam.units(path_mm), outward)
         half = np.where(exists[:, None], half, np.pi / 6)
-        tip_mm = path_mm + beam.millimetres(outward * balanced_spur(half)[..., None])
+        tip_mm = path_mm + beam.millimetres(outward * balanced_spur_length(half)[..., None])
     return Cavities(cell, polygons_mm, path_mm, tip_mm, corner, exists)
 
 
-def burnt_areas_mm2(made: Cavities, beam: Beam) -> NDArray[np.float64]:
+def burnt_areas_mm2(made: Cavities, beam: BeamFootprint) -> NDArray[np.float64]:
     """(N,) areas of the holes, exact: area + perimeter + pi (Steiner's formula) + the spurs' gain, in beam
     units."""
-    path, toward, length = _spurs(made, beam)
+    path, toward, length = _spur_geometry(made, beam)
     after = np.roll(path, -1, axis=1)
     area = (path[..., 0] * after[..., 1] - after[..., 0] * path[..., 1]).sum(axis=1) / 2
     side = after - path
     perimeter = np.hypot(side[..., 0], side[..., 1]).sum(axis=1)
     first, second = half_angles(path, toward)
-    gain = (spur_gain(first, length) + spur_gain(second, length)).sum(axis=1)
+    gain = (spur_area(first, length) + spur_area(second, length)).sum(axis=1)
     return np.asarray(beam.area_factor * (area + perimeter + np.pi + gain))
 
 
-def burnt_outlines_mm(made: Cavities, beam: Beam) -> Points:
+def burnt_outlines_mm(made: Cavities, beam: BeamFootprint) -> Points:
     """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true
     curve."""
-    path, toward, length = _spurs(made, beam)
+    path, toward, length = _spur_geometry(made, beam)
     left = np.stack([-toward[..., 1], toward[..., 0]], axis=-1)
     after, before = half_angles(path, toward)
     # Counter-clockwise, the side that arrives lies on the spur's right, the one that leaves on its left.
@@ -140,7 +142,7 @@ def burnt_outlines_mm(made: Cavities, beam: Beam) -> Points:
     return beam.millimetres(points.reshape(len(path), -1, 2))
 
 
-def _spurs(made: Cavities, beam: Beam) -> tuple[Points, Points, NDArray[np.float64]]:
+def _spur_geometry(made: Cavities, beam: BeamFootprint) -> tuple[Points, Points, NDArray[np.float64]]:
     """Path corners, spur directions (unit) and spur lengths, in beam units."""
     path = beam.units(made.path_mm)
     spur = beam.units(made.tip_mm) - path

@@ -32,24 +32,24 @@ def half_angles(path: Points, toward: Points) -> tuple[Values, Values]:
         toward: (N, K, 2) unit vectors along the spurs, outward.
     """
     after, before = np.roll(path, -1, axis=1) - path, np.roll(path, 1, axis=1) - path
-    return _angle(after, -toward), _angle(before, -toward)
+    return _angle_between(after, -toward), _angle_between(before, -toward)
 
 
-def sliver(half_angle: Values) -> Values:
+def corner_residue_area(half_angle: Values) -> Values:
     """Area that a plain path leaves on one side of a corner, in square beam units."""
     return np.asarray((1 / np.tan(half_angle) - (np.pi / 2 - half_angle)) / 2)
 
 
-def spur_gain(half_angle: Values, length: Values) -> Values:
+def spur_area(half_angle: Values, length: Values) -> Values:
     """Area that a spur adds on one side of the rounded corner, in square beam units."""
     start, _ = spur_start(half_angle, length)
     line_end = np.sin(half_angle)
     apex = 1 / np.sin(half_angle)
     on_line = np.maximum(line_end - start, 0)
     line = (apex * on_line - (line_end**2 - np.minimum(start, line_end) ** 2) / 2) * np.tan(half_angle)
-    rounded = line + _segment(np.maximum(start, line_end))
+    rounded = line + _circle_segment_area(np.maximum(start, line_end))
     flat = np.maximum(length - start, 0)
-    spur = flat + _segment(np.maximum(start - length, 0))
+    spur = flat + _circle_segment_area(np.maximum(start - length, 0))
     return np.asarray(spur - rounded)
 
 
@@ -64,13 +64,13 @@ def spur_start(half_angle: Values, length: Values) -> tuple[Values, Values]:
     return np.where(is_flat, flat_from, along), np.where(is_flat, 1.0, beside)
 
 
-def balanced_spur(half_angle: Values) -> Values:
+def balanced_spur_length(half_angle: Values) -> Values:
     """Length in beam units of the spur that burns beside a corner just what it leaves of it; by bisection."""
-    wanted = sliver(half_angle)
+    wanted = corner_residue_area(half_angle)
     low, high = np.zeros_like(half_angle), 1 / np.sin(half_angle) - 1
     for _ in range(60):
         middle = (low + high) / 2
-        short = spur_gain(half_angle, middle) < wanted
+        short = spur_area(half_angle, middle) < wanted
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.asarray((low + high) / 2)
 
@@ -82,12 +82,12 @@ def with_spurs(path: Points, tips: Points) -> Points:
     )
 
 
-def _segment(start: Values) -> Values:
+def _circle_segment_area(start: Values) -> Values:
     """Area under the unit circle's upper half from ``start`` (-1 to 1) to 1."""
     s = np.clip(start, -1, 1)
     return np.asarray((np.pi / 2 - s * np.sqrt(1 - s**2) - np.arcsin(s)) / 2)
 
 
-def _angle(a: Points, b: Points) -> Values:
+def _angle_between(a: Points, b: Points) -> Values:
     cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return np.asarray(np.abs(np.arctan2(cross, (a * b).sum(axis=-1))))

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.products.laser.paths.beam import Beam, Points
-from cmpdesign.products.laser.paths.kerf import inset, polygon_areas
-from cmpdesign.products.laser.paths.strokes import Strokes, joined, loops, rounded
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
+from cmpdesign.products.laser.paths.kerf import inset_polygons, polygon_areas
+from cmpdesign.products.laser.paths.strokes import Strokes, join_strokes, loop_strokes, round_points
 
 # The last ring of a cell may be so small that it is a point for any machine: then it is left out.
-SPECK_SHARE = 0.01
+MIN_RING_AREA_SHARE = 0.01
 
 
-def hatch(paths_mm: Points, spacing_mm: float, angle_deg: float) -> Strokes:
+def hatch_strokes(paths_mm: Points, spacing_mm: float, angle_deg: float) -> Strokes:
     """Parallel lines inside convex wall paths, to and fro, all on one grid so that every cell is cut alike.
 
     Args:
@@ -40,22 +40,22 @@ def hatch(paths_mm: Points, spacing_mm: float, angle_deg: float) -> Strokes:
     height = spacing_mm * (row + 0.5)[:, None]
     x = ends * np.cos(turn) - height * np.sin(turn)
     y = ends * np.sin(turn) + height * np.cos(turn)
-    points = rounded(np.stack([x, y], axis=-1).reshape(-1, 2))
+    points = round_points(np.stack([x, y], axis=-1).reshape(-1, 2))
     return Strokes(points, 2 * np.arange(len(owner) + 1), owner, closed=False)
 
 
-def rings(paths_mm: Points, spacing_mm: float) -> Strokes:
+def ring_strokes(paths_mm: Points, spacing_mm: float) -> Strokes:
     """Rings inside convex wall paths, the innermost first, the wall path itself left out."""
-    step = Beam(spacing_mm, spacing_mm)
+    step = BeamFootprint(spacing_mm, spacing_mm)
     parts: list[Strokes] = []
     inner, owner = paths_mm, np.arange(len(paths_mm))
     while len(inner):
-        inner, exists = inset(inner, step)
-        exists &= polygon_areas(inner) > SPECK_SHARE * spacing_mm**2
+        inner, exists = inset_polygons(inner, step)
+        exists &= polygon_areas(inner) > MIN_RING_AREA_SHARE * spacing_mm**2
         inner, owner = inner[exists], owner[exists]
-        parts.append(loops(inner, owner))
+        parts.append(loop_strokes(inner, owner))
     # Opened, joined by owner from the inside out, closed again.
-    ordered = joined([part.opened() for part in reversed(parts)])
+    ordered = join_strokes([part.opened() for part in reversed(parts)])
     keep = np.ones(len(ordered.xy_mm), dtype=np.bool_)
     keep[ordered.first[1:] - 1] = False
     first = ordered.first - np.arange(len(ordered.first))

@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.laser.paths.beam import Beam, Points
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 
 # A 60 degree corner has a mitre ratio of exactly 2; the sharpest corner that the elliptical pattern draws
 # needs 8.
 MITRE_LIMIT = 16.0
 
 
-def inset(polygons_mm: Points, beam: Beam) -> tuple[Points, NDArray[np.bool_]]:
+def inset_polygons(polygons_mm: Points, beam: BeamFootprint) -> tuple[Points, NDArray[np.bool_]]:
     """The paths along which the beam touches every side of convex polygons from inside, in closed form.
 
     Each side moves inward by the footprint's extent along the side's normal (one beam unit); neighbouring
@@ -39,14 +39,14 @@ def inset(polygons_mm: Points, beam: Beam) -> tuple[Points, NDArray[np.bool_]]:
     return beam.millimetres(path), kept.all(axis=1)
 
 
-def inset_outline(outline_mm: Points, beam: Beam) -> list[Points]:
+def inset_outline(outline_mm: Points, beam: BeamFootprint) -> list[Points]:
     """The same for any simple outline (K, 2): none, one or several closed paths, counter-clockwise."""
-    return _buffered(outline_mm, beam, -1.0)
+    return _offset_outline(outline_mm, beam, -1.0)
 
 
-def outset_outline(outline_mm: Points, beam: Beam) -> list[Points]:
+def outset_outline(outline_mm: Points, beam: BeamFootprint) -> list[Points]:
     """Paths along which the beam touches an outline from outside: what is inside keeps its size."""
-    return _buffered(outline_mm, beam, 1.0)
+    return _offset_outline(outline_mm, beam, 1.0)
 
 
 def polygon_areas(polygons: Points) -> NDArray[np.float64]:
@@ -56,7 +56,7 @@ def polygon_areas(polygons: Points) -> NDArray[np.float64]:
     return np.asarray(cross.sum(axis=1) / 2)
 
 
-def _buffered(outline_mm: Points, beam: Beam, distance: float) -> list[Points]:
+def _offset_outline(outline_mm: Points, beam: BeamFootprint, distance: float) -> list[Points]:
     import shapely
 
     polygon = shapely.Polygon(beam.units(outline_mm))

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from cmpdesign.products.laser.paths.beam import Points
 
-Order = Literal["travel", "heat", "given"]
+BurnOrder = Literal["travel", "heat", "given"]
 Ints = NDArray[np.int64]
 # Cells this many mean distances apart count as neighbours for the heat that they give each other.
 NEIGHBOURHOOD = 2.2
 
 
-def ordered(entries_mm: Points, order: Order) -> tuple[Ints, Ints]:
+def order_cells(entries_mm: Points, order: BurnOrder) -> tuple[Ints, Ints]:
     """The cells in burning order, and the entry point of each.
 
     Args:
@@ -26,17 +26,17 @@ def ordered(entries_mm: Points, order: Order) -> tuple[Ints, Ints]:
     Returns:
         (N,) cells, and (N,) the number (0 to K - 1) of each one's entry point, in that order.
     """
-    from cmpdesign.products.laser.paths.tour import best_entries, short_tour
+    from cmpdesign.products.laser.paths.tour import best_entries, find_short_tour
 
     if order == "travel":
-        return short_tour(entries_mm)
+        return find_short_tour(entries_mm)
     cells = np.arange(len(entries_mm))
     if order == "heat":
-        cells = spread(entries_mm.mean(axis=1))
+        cells = spread_order(entries_mm.mean(axis=1))
     return cells, best_entries(entries_mm, cells)
 
 
-def spread(centre_mm: Points) -> Ints:
+def spread_order(centre_mm: Points) -> Ints:
     """(N,) an order in which neighbours are burnt far apart in time.
 
     Cells are colored so that no two in a neighbourhood share a color, and burnt color by color. Within a
@@ -50,8 +50,8 @@ def spread(centre_mm: Points) -> Ints:
     tree = cKDTree(centre_mm)
     nearest = tree.query(centre_mm, k=2)[0][:, 1]
     reach = NEIGHBOURHOOD * float(np.median(nearest))
-    rows = _rows(centre_mm, float(np.median(nearest)))
-    color = _colored(tree.query_ball_point(centre_mm, reach), rows)
+    rows = _row_order(centre_mm, float(np.median(nearest)))
+    color = _greedy_coloring(tree.query_ball_point(centre_mm, reach), rows)
     return rows[np.argsort(color[rows], kind="stable")]
 
 
@@ -75,14 +75,14 @@ def shortest_pause(order: Ints, centre_mm: Points, times_s: NDArray[np.float64])
     return float(np.abs(begun[pairs[:, 0]] - begun[pairs[:, 1]]).min()) if len(pairs) else float("inf")
 
 
-def _rows(centre_mm: Points, height_mm: float) -> Ints:
+def _row_order(centre_mm: Points, height_mm: float) -> Ints:
     """Cells row by row, every second row backwards."""
     row = np.floor((centre_mm[:, 1] - centre_mm[:, 1].min()) / height_mm + 0.5).astype(np.int64)
     x = np.where(row % 2 == 0, centre_mm[:, 0], -centre_mm[:, 0])
     return np.lexsort([x, row])
 
 
-def _colored(near: list[list[int]], sequence: Ints) -> Ints:
+def _greedy_coloring(near: list[list[int]], sequence: Ints) -> Ints:
     """The smallest color that no neighbour has, cell by cell in the given sequence."""
     color = np.full(len(near), -1)
     for cell in sequence.tolist():

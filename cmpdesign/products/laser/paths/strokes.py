@@ -54,23 +54,23 @@ class Strokes:
 
     def moved(self, by_mm: Points) -> Strokes:
         """All of them shifted; by_mm: (2,)."""
-        return Strokes(rounded(self.xy_mm + by_mm), self.first, self.owner, self.closed)
+        return Strokes(round_points(self.xy_mm + by_mm), self.first, self.owner, self.closed)
 
 
-def loops(paths_mm: Points, owner: NDArray[np.int64]) -> Strokes:
+def loop_strokes(paths_mm: Points, owner: NDArray[np.int64]) -> Strokes:
     """(N, K, 2) closed paths as strokes."""
     count, corners = paths_mm.shape[:2]
-    return Strokes(rounded(paths_mm.reshape(-1, 2)), corners * np.arange(count + 1), owner, closed=True)
+    return Strokes(round_points(paths_mm.reshape(-1, 2)), corners * np.arange(count + 1), owner, closed=True)
 
 
-def ragged(paths_mm: Sequence[Points], owner: Sequence[int], closed: bool) -> Strokes:
+def ragged_strokes(paths_mm: Sequence[Points], owner: Sequence[int], closed: bool) -> Strokes:
     """Paths of different lengths as strokes."""
     first = np.cumsum([0, *(len(path) for path in paths_mm)])
     points = np.concatenate([*paths_mm, np.empty((0, 2))])
-    return Strokes(rounded(points), first, np.array(owner, dtype=np.int64), closed)
+    return Strokes(round_points(points), first, np.array(owner, dtype=np.int64), closed)
 
 
-def joined(parts: Sequence[Strokes]) -> Strokes:
+def join_strokes(parts: Sequence[Strokes]) -> Strokes:
     """Several sets of open strokes as one, those of the same owner together, in the order of the parts."""
     first = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(part.first) for part in parts]))])
     owner = np.concatenate([part.owner for part in parts])
@@ -78,6 +78,6 @@ def joined(parts: Sequence[Strokes]) -> Strokes:
     return together.taken(np.argsort(owner, kind="stable"))
 
 
-def rounded(xy_mm: Points) -> Points:
+def round_points(xy_mm: Points) -> Points:
     """To ``DECIMALS`` places, without negative zeros."""
     return np.asarray(np.round(xy_mm, DECIMALS) + 0.0)

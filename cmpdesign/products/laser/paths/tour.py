@@ -24,15 +24,15 @@ from cmpdesign.products.laser.paths.beam import Points
 Function = TypeVar("Function", bound=Callable[..., Any])
 Ints = NDArray[np.int64]
 NEIGHBOURS = 10
-ROUNDS = 12
-GAIN_MM = 1e-9
+MAX_ROUNDS = 12
+MIN_GAIN_MM = 1e-9
 
 
 def _compiled(function: Function) -> Function:
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[return-value]
 
 
-def short_tour(entries_mm: Points) -> tuple[Ints, Ints]:
+def find_short_tour(entries_mm: Points) -> tuple[Ints, Ints]:
     """An order of the cells and the entry point of each.
 
     Args:
@@ -45,44 +45,44 @@ def short_tour(entries_mm: Points) -> tuple[Ints, Ints]:
     if count < 3:
         return np.arange(count), best_entries(entries_mm, np.arange(count))
     centre_mm = entries_mm.mean(axis=1)
-    near = _neighbours(centre_mm)
-    starts = (_nearest_first(centre_mm), np.arange(count), np.lexsort(centre_mm.T))
-    tours = [_shortened(start.astype(np.int64), entries_mm, near) for start in starts]
-    return min(tours, key=lambda tour: length_mm(entries_mm, *tour))
+    near = _nearest_neighbours(centre_mm)
+    starts = (_nearest_neighbour_order(centre_mm), np.arange(count), np.lexsort(centre_mm.T))
+    tours = [_shorten_tour(start.astype(np.int64), entries_mm, near) for start in starts]
+    return min(tours, key=lambda tour: tour_length_mm(entries_mm, *tour))
 
 
-def _shortened(order: Ints, entries_mm: Points, near: Ints) -> tuple[Ints, Ints]:
+def _shorten_tour(order: Ints, entries_mm: Points, near: Ints) -> tuple[Ints, Ints]:
     """A tour from a first order: never longer than that order at its best entry points."""
     count = len(order)
     entry = best_entries(entries_mm, order)
-    best = length_mm(entries_mm, order, entry)
+    best = tour_length_mm(entries_mm, order, entry)
     trial = order.copy()
-    _improve(trial, entries_mm.mean(axis=1), near)
+    _update_order(trial, entries_mm.mean(axis=1), near)
     trial_entry = best_entries(entries_mm, trial)
-    if length_mm(entries_mm, trial, trial_entry) < best:
-        order, entry, best = trial, trial_entry, length_mm(entries_mm, trial, trial_entry)
-    for _ in range(ROUNDS):
+    if tour_length_mm(entries_mm, trial, trial_entry) < best:
+        order, entry, best = trial, trial_entry, tour_length_mm(entries_mm, trial, trial_entry)
+    for _ in range(MAX_ROUNDS):
         trial = order.copy()
         points = np.empty((count, 2))
         points[trial] = entries_mm[trial, entry]
-        _improve(trial, points, near)
+        _update_order(trial, points, near)
         trial_entry = best_entries(entries_mm, trial)
-        _reinsert(trial, trial_entry, entries_mm, near)
+        _update_by_reinsertion(trial, trial_entry, entries_mm, near)
         trial_entry = best_entries(entries_mm, trial)
-        found = length_mm(entries_mm, trial, trial_entry)
-        if found > best - GAIN_MM:
+        found = tour_length_mm(entries_mm, trial, trial_entry)
+        if found > best - MIN_GAIN_MM:
             break
         order, entry, best = trial, trial_entry, found
     return order, entry
 
 
-def length_mm(entries_mm: Points, order: Ints, entry: Ints) -> float:
+def tour_length_mm(entries_mm: Points, order: Ints, entry: Ints) -> float:
     """Length of the dark way from the first cell's entry point to the last one's."""
     way = np.diff(entries_mm[order, entry], axis=0)
     return float(np.hypot(way[:, 0], way[:, 1]).sum())
 
 
-def _neighbours(centre_mm: Points) -> Ints:
+def _nearest_neighbours(centre_mm: Points) -> Ints:
     """(N, n) the nearest cells of each, the nearest first."""
     from scipy.spatial import cKDTree
 
@@ -92,7 +92,7 @@ def _neighbours(centre_mm: Points) -> Ints:
 
 
 @_compiled
-def _nearest_first(centre: Points) -> Ints:
+def _nearest_neighbour_order(centre: Points) -> Ints:
     count = len(centre)
     order = np.empty(count, np.int64)
     left = np.arange(count)
@@ -110,7 +110,7 @@ def _nearest_first(centre: Points) -> Ints:
 
 
 @_compiled
-def _apart(points: Points, a: int, b: int) -> float:
+def _distance_or_zero(points: Points, a: int, b: int) -> float:
     """Distance of two cells' points; nothing where there is no cell (-1), before the first and after the
     last."""
     if a < 0 or b < 0:
@@ -119,7 +119,7 @@ def _apart(points: Points, a: int, b: int) -> float:
 
 
 @_compiled
-def _reverse(order: Ints, place: Ints, start: int, end: int) -> None:
+def _update_reversed(order: Ints, place: Ints, start: int, end: int) -> None:
     while start < end:
         order[start], order[end] = order[end], order[start]
         place[order[start]], place[order[end]] = start, end
@@ -127,32 +127,35 @@ def _reverse(order: Ints, place: Ints, start: int, end: int) -> None:
 
 
 @_compiled
-def _two_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> bool:
+def _update_by_two_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> bool:
     """Join a with a near cell by reversing what lies between; for the way after a, and the one before it."""
     count = len(order)
     for forward in (True, False):
         i = place[a]
         j = i + 1 if forward else i - 1
         b = order[j] if 0 <= j < count else -1
-        before = _apart(points, a, b)
+        before = _distance_or_zero(points, a, b)
         for c in near[a]:
-            joined = _apart(points, a, c)
+            joined = _distance_or_zero(points, a, c)
             if b >= 0 and joined >= before:
                 break
             k = place[c]
             m = k + 1 if forward else k - 1
             d = order[m] if 0 <= m < count else -1
-            if before + _apart(points, c, d) - joined - _apart(points, b, d) > GAIN_MM:
+            if (
+                before + _distance_or_zero(points, c, d) - joined - _distance_or_zero(points, b, d)
+                > MIN_GAIN_MM
+            ):
                 if forward:
-                    _reverse(order, place, min(i, k) + 1, max(i, k))
+                    _update_reversed(order, place, min(i, k) + 1, max(i, k))
                 else:
-                    _reverse(order, place, min(i, k), max(i, k) - 1)
+                    _update_reversed(order, place, min(i, k), max(i, k) - 1)
                 return True
     return False
 
 
 @_compiled
-def _or_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> bool:
+def _update_by_or_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> bool:
     """Move one to three cells that start or end with a to between two others, near a, either way round."""
     count = len(order)
     for size in range(1, 4):
@@ -164,12 +167,14 @@ def _or_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> boo
             far = order[end] if forward else order[start]
             before = order[start - 1] if start > 0 else -1
             after = order[end + 1] if end + 1 < count else -1
-            removed = _apart(points, before, order[start]) + _apart(points, order[end], after)
-            removed -= _apart(points, before, after) if before >= 0 and after >= 0 else 0.0
-            if removed <= GAIN_MM:
+            removed = _distance_or_zero(points, before, order[start]) + _distance_or_zero(
+                points, order[end], after
+            )
+            removed -= _distance_or_zero(points, before, after) if before >= 0 and after >= 0 else 0.0
+            if removed <= MIN_GAIN_MM:
                 continue
             for c in near[a]:
-                joined = _apart(points, a, c)
+                joined = _distance_or_zero(points, a, c)
                 if joined >= removed:
                     break
                 k = place[c]
@@ -180,15 +185,15 @@ def _or_opt(order: Ints, place: Ints, points: Points, near: Ints, a: int) -> boo
                     if start <= m <= end:
                         m = end + 1 if side > 0 else start - 1
                     d = order[m] if 0 <= m < count else -1
-                    added = joined + _apart(points, far, d) - _apart(points, c, d)
-                    if removed - added > GAIN_MM:
-                        _move(order, place, start, end, k, side, forward)
+                    added = joined + _distance_or_zero(points, far, d) - _distance_or_zero(points, c, d)
+                    if removed - added > MIN_GAIN_MM:
+                        _update_moved(order, place, start, end, k, side, forward)
                         return True
     return False
 
 
 @_compiled
-def _move(order: Ints, place: Ints, start: int, end: int, k: int, side: int, a_first: bool) -> None:
+def _update_moved(order: Ints, place: Ints, start: int, end: int, k: int, side: int, a_first: bool) -> None:
     """Put order[start..end] beside position k (after it: side 1), its end "a" next to the cell there."""
     size = end - start + 1
     piece = order[start : end + 1].copy()
@@ -211,7 +216,7 @@ def _move(order: Ints, place: Ints, start: int, end: int, k: int, side: int, a_f
 
 
 @_compiled
-def _improve(order: Ints, points: Points, near: Ints) -> None:
+def _update_order(order: Ints, points: Points, near: Ints) -> None:
     """2-opt and Or-opt in place, until no cell has a move that shortens the way."""
     count = len(order)
     place = np.empty(count, np.int64)
@@ -222,7 +227,9 @@ def _improve(order: Ints, points: Points, near: Ints) -> None:
         changed = False
         for i in range(count):
             a = order[i]
-            while _two_opt(order, place, points, near, a) or _or_opt(order, place, points, near, a):
+            while _update_by_two_opt(order, place, points, near, a) or _update_by_or_opt(
+                order, place, points, near, a
+            ):
                 changed = True
 
 
@@ -250,12 +257,12 @@ def best_entries(entries: Points, order: Ints) -> Ints:
 
 
 @_compiled
-def _gap(entries: Points, a: int, i: int, b: int, j: int) -> float:
+def _entry_distance(entries: Points, a: int, i: int, b: int, j: int) -> float:
     return float(np.hypot(entries[a, i, 0] - entries[b, j, 0], entries[a, i, 1] - entries[b, j, 1]))
 
 
 @_compiled
-def _reinsert(order: Ints, entry: Ints, entries: Points, near: Ints) -> None:
+def _update_by_reinsertion(order: Ints, entry: Ints, entries: Points, near: Ints) -> None:
     """Take each cell out and put it where, at its best entry point, it lengthens the way least; in place."""
     count, corners = len(order), entries.shape[1]
     place = np.empty(count, np.int64)
@@ -268,27 +275,27 @@ def _reinsert(order: Ints, entry: Ints, entries: Points, near: Ints) -> None:
         after = order[i + 1] if i + 1 < count else -1
         removed = 0.0
         if before >= 0:
-            removed += _gap(entries, before, at[before], a, at[a])
+            removed += _entry_distance(entries, before, at[before], a, at[a])
         if after >= 0:
-            removed += _gap(entries, a, at[a], after, at[after])
+            removed += _entry_distance(entries, a, at[a], after, at[after])
         if before >= 0 and after >= 0:
-            removed -= _gap(entries, before, at[before], after, at[after])
-        best, best_k, best_side, best_corner = removed - GAIN_MM, -1, 0, 0
+            removed -= _entry_distance(entries, before, at[before], after, at[after])
+        best, best_k, best_side, best_corner = removed - MIN_GAIN_MM, -1, 0, 0
         for c in near[a]:
             for side in (-1, 1):
                 m = place[c] + side
                 d = order[m] if 0 <= m < count else -1
                 if d == a:
                     continue
-                joint = _gap(entries, c, at[c], d, at[d]) if d >= 0 else 0.0
+                joint = _entry_distance(entries, c, at[c], d, at[d]) if d >= 0 else 0.0
                 for corner in range(corners):
-                    added = _gap(entries, c, at[c], a, corner) - joint
+                    added = _entry_distance(entries, c, at[c], a, corner) - joint
                     if d >= 0:
-                        added += _gap(entries, a, corner, d, at[d])
+                        added += _entry_distance(entries, a, corner, d, at[d])
                     if added < best:
                         best, best_k, best_side, best_corner = added, place[c], side, corner
         if best_k >= 0:
-            _move(order, place, i, i, best_k, best_side, True)
+            _update_moved(order, place, i, i, best_k, best_side, True)
             at[a] = best_corner
     for i in range(count):
         entry[i] = at[order[i]]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.laser.paths.beam import Beam, Points
+from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import Cavities
 
 # Pairs that are copies of each other to a nanometre are measured once.
@@ -15,7 +15,11 @@ SAME_DECIMALS = 6
 
 
 def smallest_web_mm(
-    made: Sequence[Cavities], outlines: Sequence[Points], beam: Beam, reach_mm: float, across: bool = False
+    made: Sequence[Cavities],
+    outlines: Sequence[Points],
+    beam: BeamFootprint,
+    reach_mm: float,
+    across: bool = False,
 ) -> float | None:
     """The smallest distance between two burnt outlines; 0 where they meet, None where none lies within reach.
 
@@ -31,8 +35,8 @@ def smallest_web_mm(
     """
     import shapely
 
-    lines = np.concatenate([_paths(group) for group in made])
-    pairs = _pairs(made, reach_mm, across)
+    lines = np.concatenate([_cavity_lines(group) for group in made])
+    pairs = _neighbour_pairs(made, reach_mm, across)
     if not len(pairs):
         return None
     gap = shapely.distance(lines[pairs[:, 0]], lines[pairs[:, 1]])
@@ -41,7 +45,7 @@ def smallest_web_mm(
         return float(max(gap.min() - wide, 0))
     pairs = pairs[gap - wide <= gap.min() - narrow]
     burnt = np.concatenate(outlines)
-    pairs = _distinct(pairs, burnt)
+    pairs = _distinct_pairs(pairs, burnt)
     shapes = shapely.polygons(burnt[np.unique(pairs)])
     index = np.searchsorted(np.unique(pairs), pairs)
     return float(shapely.distance(shapes[index[:, 0]], shapes[index[:, 1]]).min())
@@ -63,14 +67,14 @@ def burn_depth_mm(outlines: Points, filled: Points) -> float:
     return deepest
 
 
-def _paths(group: Cavities) -> NDArray[np.object_]:
+def _cavity_lines(group: Cavities) -> NDArray[np.object_]:
     """Each cavity's path with its spurs, as one closed line."""
     import shapely
 
     return np.asarray(shapely.linearrings(group.loops_mm), dtype=np.object_)
 
 
-def _pairs(made: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
+def _neighbour_pairs(made: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
     from scipy.spatial import cKDTree
 
     centres = [group.nominal_mm.mean(axis=1) for group in made]
@@ -86,7 +90,7 @@ def _pairs(made: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[n
     return np.column_stack([near["i"], near["j"] + len(centres[0])]).astype(np.int64)
 
 
-def _distinct(pairs: NDArray[np.int64], burnt: Points) -> NDArray[np.int64]:
+def _distinct_pairs(pairs: NDArray[np.int64], burnt: Points) -> NDArray[np.int64]:
     """One pair of each shape: relative to the first cavity's first point, all points the same."""
     first = burnt[pairs[:, 0]]
     origin = first[:, :1]

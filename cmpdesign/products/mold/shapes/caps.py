@@ -7,7 +7,7 @@ from typing import Any
 from cmpdesign.products.mold.stack.crown import END_SLOPE, Crown
 
 
-def with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
+def solid_with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
     """The solid with the crown's cap standing on z = 0 (raised), or with its shape cut out from z = 0 up."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_ShapeEnum
@@ -29,7 +29,7 @@ def cap_solid(crown: Crown) -> Any:
     sphere = crown.shape == "sphere"
     y = 0.0 if sphere else -crown.length_mm
     foot, apex = gp_Pnt(crown.reach_mm, y, 0.0), gp_Pnt(0.0, y, crown.height_mm)
-    on_the_way = gp_Pnt(*_arc_middle(crown, y))
+    on_the_way = gp_Pnt(*_arc_midpoint(crown, y))
     if sphere:
         origin = gp_Pnt(0.0, 0.0, 0.0)
         arc = GC_MakeArcOfCircle(foot, on_the_way, apex).Value()
@@ -45,10 +45,12 @@ def cap_solid(crown: Crown) -> Any:
     face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
     if sphere:
         return BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(0.0, 0.0, 1.0))).Shape()
-    return _between_ends(BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 2 * crown.length_mm, 0.0)).Shape(), crown)
+    return _cut_cylinder_ends(
+        BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 2 * crown.length_mm, 0.0)).Shape(), crown
+    )
 
 
-def _between_ends(bar: Any, crown: Crown) -> Any:
+def _cut_cylinder_ends(bar: Any, crown: Crown) -> Any:
     """A cylinder's cap, cut off by its leaning ends."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
@@ -66,7 +68,7 @@ def _between_ends(bar: Any, crown: Crown) -> Any:
     return BRepAlgoAPI_Common(bar, BRepPrimAPI_MakePrism(face, gp_Vec(2 * aside, 0.0, 0.0)).Shape()).Shape()
 
 
-def _arc_middle(crown: Crown, y: float) -> tuple[float, float, float]:
+def _arc_midpoint(crown: Crown, y: float) -> tuple[float, float, float]:
     """A point of the arc between foot and apex."""
     x = crown.reach_mm / 2
     z = (crown.radius_mm**2 - x**2) ** 0.5 - (crown.radius_mm - crown.height_mm)

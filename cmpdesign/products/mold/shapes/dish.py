@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN
-from cmpdesign.products.mold.solids.loops import Loop, Points, frustum_volume_mm3, inset_cells, polygon
+from cmpdesign.products.mold.solids.loops import Loop, Points, frustum_volume_mm3, inset_cells, polygon_loop
 from cmpdesign.products.mold.stack.crown import END_SLOPE, Crown
-from cmpdesign.products.mold.stack.stack import Stack
+from cmpdesign.products.mold.stack.stack import MoldStack
 
 FOOT_POINTS = 96
 ARCH_POINTS = 24
-Facet = tuple[int, ...]
+FacetPoints = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Dish:
 
     points: Points
     foot: tuple[int, ...]
-    facets: list[Facet]
-    ends: list[Facet]
+    facets: list[FacetPoints]
+    ends: list[FacetPoints]
     outlines: dict[int, tuple[Loop, Loop]]
     height_mm: float
 
@@ -55,34 +55,34 @@ class Dish:
         total = 0.0
         for facet in self.facets:
             corners = self.points[list(facet)]
-            total += polygon(corners[:, :2]).area_mm2() * float(corners[:, 2].mean())
-        return total + sum(_under_mm3(self.points[list(end)]) for end in self.ends)
+            total += polygon_loop(corners[:, :2]).area_mm2() * float(corners[:, 2].mean())
+        return total + sum(_volume_under_mm3(self.points[list(end)]) for end in self.ends)
 
     def outlines_volume_mm3(self) -> float:
         """Of all bosses or holes; a shear along z leaves a frustum's volume as it is."""
         return sum(frustum_volume_mm3(start, end, self.height_mm) for start, end in self.outlines.values())
 
 
-def bare_dish(stack: Stack) -> Dish:
+def make_bare_dish(stack: MoldStack) -> Dish:
     """The crown without bosses or holes, in the mold's frame, seen from above.
 
     Cells must be triangles: four markers on a crown are in no plane.
     """
     assert stack.crown is not None
-    border, foot, ends = _border(stack.crown)
+    border, foot, ends = _crown_border(stack.crown)
     kept = np.unique(stack.layout.cell_corners)
     markers = stack.marker_xy_mm[kept]
     points = np.concatenate([border, np.column_stack([markers, stack.crown.z_mm(markers)])])
     number = np.full(len(stack.marker_xy_mm), -1)
     number[kept] = len(border) + np.arange(len(kept))
     cells = [tuple(corners) for corners in number[stack.layout.cell_corners].tolist()]
-    facets = [*cells, *_rim_facets(points[:, :2], len(border), cells)]
+    facets = [*cells, *_triangulate_rim(points[:, :2], len(border), cells)]
     return Dish(points, foot, facets, ends, {}, 0.0)
 
 
-def dish_of(stack: Stack, color: int, through: bool) -> Dish:
+def make_dish(stack: MoldStack, color: int, through: bool) -> Dish:
     """The dish of a color's plate or (``through``) stencil; a facet's number is its cell's."""
-    dish = bare_dish(stack)
+    dish = make_bare_dish(stack)
     option = stack.options
     height = option.stencil_mm if through else stack.thickness_mm[1]
     grows = (STENCIL_LEAN if through else -stack.lean) * height
@@ -96,7 +96,7 @@ def dish_of(stack: Stack, color: int, through: bool) -> Dish:
     return replace(dish, outlines=outlines, height_mm=height)
 
 
-def _under_mm3(corners: Points) -> float:
+def _volume_under_mm3(corners: Points) -> float:
     """Between a flat polygon and z = 0: a fan of prisms, each under a triangle."""
     a, b, c = corners[0], corners[1:-1], corners[2:]
     x1, y1 = (b - a)[:, :2].T
@@ -104,7 +104,7 @@ def _under_mm3(corners: Points) -> float:
     return float(((x1 * y2 - x2 * y1) / 2 * (a[2] + b[:, 2] + c[:, 2]) / 3).sum())
 
 
-def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
+def _crown_border(crown: Crown) -> tuple[Points, tuple[int, ...], list[FacetPoints]]:
     """(B, 3) points around the crown in plan, counter-clockwise; the foot's; a cylinder's end facets."""
     if crown.shape == "sphere":
         angle = 2 * np.pi * np.arange(FOOT_POINTS) / FOOT_POINTS
@@ -126,7 +126,7 @@ def _border(crown: Crown) -> tuple[Points, tuple[int, ...], list[Facet]]:
     )
 
 
-def _rim_facets(plan: Points, border: int, cells: Sequence[Facet]) -> list[Facet]:
+def _triangulate_rim(plan: Points, border: int, cells: Sequence[FacetPoints]) -> list[FacetPoints]:
     """Triangles between the pattern and the border, on no other points than theirs."""
     import shapely
 

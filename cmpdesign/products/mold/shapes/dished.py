@@ -7,27 +7,27 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.mold.shapes.dish import Dish
-from cmpdesign.products.mold.solids.facets import Facets
-from cmpdesign.products.mold.solids.loops import Loop, Points, polygon
+from cmpdesign.products.mold.solids.facets import FacetBuilder
+from cmpdesign.products.mold.solids.loops import Loop, Points, polygon_loop
 from cmpdesign.products.mold.solids.shells import ShellBuilder, Slab, slab_volume_mm3
-from cmpdesign.products.mold.solids.tiled_faces import plain_sheet
+from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
 
 Wires = list[list[int]]
-TURNED = np.array([1.0, -1.0, -1.0])
+TURN_OVER = np.array([1.0, -1.0, -1.0])
 
 
-def dished_plate(slab: Slab, dish: Dish) -> Any:
+def dished_plate_solid(slab: Slab, dish: Dish) -> Any:
     """A plate on its back, hollowed by the dish turned over, with bosses standing in it."""
-    surface = _Surface(dish, 0.0)
+    surface = _DishSurface(dish, 0.0)
     surface.bosses(dish.height_mm * -1.0)
-    foot = dish.points[list(dish.foot)][::-1, :2] * TURNED[:2]
+    foot = dish.points[list(dish.foot)][::-1, :2] * TURN_OVER[:2]
     builder = ShellBuilder()
     holes = [below for below, _ in slab.through]
-    bottom = builder.place(plain_sheet(slab.outer, holes), slab.bottom_mm, up=False)
-    top = builder.place(plain_sheet(slab.outer, [*holes, polygon(foot)]), slab.top_mm, up=True)
+    bottom = builder.place(untiled_faces(slab.outer, holes), slab.bottom_mm, up=False)
+    top = builder.place(untiled_faces(slab.outer, [*holes, polygon_loop(foot)]), slab.top_mm, up=True)
     for rim in range(1 + len(holes)):
         builder.walls(bottom, rim, top, rim, outward=rim == 0)
-    facets = Facets(builder, np.array(surface.points) * TURNED)
+    facets = FacetBuilder(builder, np.array(surface.points) * TURN_OVER)
     facets.share(top, 1 + len(holes), dish.foot[::-1])
     for wires in surface.faces:
         # Seen from the plate's side every face of the crown runs the other way round.
@@ -35,21 +35,21 @@ def dished_plate(slab: Slab, dish: Dish) -> Any:
     return builder.solid()
 
 
-def dished_sheet(slab: Slab, dish: Dish) -> Any:
+def dished_sheet_solid(slab: Slab, dish: Dish) -> Any:
     """A sheet that follows the dish on both sides, with holes through it."""
-    upper, lower = _Surface(dish, slab.top_mm), _Surface(dish, slab.bottom_mm)
+    upper, lower = _DishSurface(dish, slab.top_mm), _DishSurface(dish, slab.bottom_mm)
     lower.open(0)
     upper.open(1)
-    foot = polygon(dish.points[list(dish.foot), :2])
+    foot = polygon_loop(dish.points[list(dish.foot), :2])
     builder = ShellBuilder()
     holes = [below for below, _ in slab.through]
-    sheet = plain_sheet(slab.outer, [*holes, foot])
+    sheet = untiled_faces(slab.outer, [*holes, foot])
     bottom = builder.place(sheet, slab.bottom_mm, up=False)
-    top = builder.place(plain_sheet(slab.outlines[1], [*holes, foot]), slab.top_mm, up=True)
+    top = builder.place(untiled_faces(slab.outlines[1], [*holes, foot]), slab.top_mm, up=True)
     for rim in range(1 + len(holes)):
         builder.walls(bottom, rim, top, rim, outward=rim == 0)
     shift = len(lower.points)
-    facets = Facets(builder, np.array([*lower.points, *upper.points]))
+    facets = FacetBuilder(builder, np.array([*lower.points, *upper.points]))
     facets.share(bottom, 1 + len(holes), dish.foot)
     facets.share(top, 1 + len(holes), [shift + point for point in dish.foot])
     for wires in lower.faces:
@@ -58,7 +58,7 @@ def dished_sheet(slab: Slab, dish: Dish) -> Any:
         facets.add([[shift + point for point in wire] for wire in wires])
     for inner, outer in zip(lower.rims, upper.rims, strict=True):
         above = [shift + point for point in outer]
-        for side in _walls(inner, above):
+        for side in _wall_quads(inner, above):
             facets.add([side[::-1]])
     return builder.solid()
 
@@ -71,7 +71,7 @@ def dished_volume_mm3(slab: Slab, dish: Dish, kind: str) -> float:
     return volume - dish.outlines_volume_mm3()
 
 
-class _Surface:
+class _DishSurface:
     """The dish's faces at a height, outward up, in the mold's frame."""
 
     def __init__(self, dish: Dish, z: float) -> None:
@@ -100,10 +100,10 @@ class _Surface:
             at_root, at_tip = self.outline(facet, root, 0.0), self.outline(facet, tip, lift)
             self.faces[facet].append(at_root[::-1])
             self.faces.append([at_tip])
-            self.faces += [[side[::-1]] for side in _walls(at_tip, at_root)]
+            self.faces += [[side[::-1]] for side in _wall_quads(at_tip, at_root)]
 
 
-def _walls(below: list[int], above: list[int]) -> list[list[int]]:
+def _wall_quads(below: list[int], above: list[int]) -> list[list[int]]:
     """The quadrilaterals between two outlines, counter-clockwise seen from outside the outlines."""
     after_below, after_above = [*below[1:], below[0]], [*above[1:], above[0]]
     return [list(corners) for corners in zip(below, after_below, after_above, above, strict=True)]

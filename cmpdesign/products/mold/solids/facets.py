@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.mold.solids.loops import Points
-from cmpdesign.products.mold.solids.shells import TOLERANCE_MM, PlacedSheet, ShellBuilder, straight_edge
+from cmpdesign.products.mold.solids.shells import TOLERANCE_MM, PlacedFaces, ShellBuilder, make_straight_edge
 
 
-class Facets:
+class FacetBuilder:
     """Polygons in space over numbered points; neighbouring polygons share their edges."""
 
     def __init__(self, builder: ShellBuilder, points: Points) -> None:
@@ -20,7 +20,7 @@ class Facets:
         # (from, to) -> the edge, which runs from -> to.
         self._edges: dict[tuple[int, int], Any] = {}
 
-    def share(self, placed: PlacedSheet, rim: int, points: Sequence[int]) -> None:
+    def share(self, placed: PlacedFaces, rim: int, points: Sequence[int]) -> None:
         """Take a placed rim's vertices and edges for ``points``, which lie at its corners in its order."""
         for side, edges in enumerate(placed.sheet.rims[rim]):
             start, end, _ = placed.sheet.edges[edges[0]]
@@ -62,7 +62,7 @@ class Facets:
             return self._edges[b, a].Oriented(TopAbs_Orientation.TopAbs_REVERSED)
         if (a, b) not in self._edges:
             start, end = tuple(self._points[a].tolist()), tuple(self._points[b].tolist())
-            self._edges[a, b] = straight_edge(
+            self._edges[a, b] = make_straight_edge(
                 self._builder.make, self._vertex(a), start, self._vertex(b), end
             )
         return self._edges[a, b].Oriented(TopAbs_Orientation.TopAbs_FORWARD)

@@ -79,7 +79,7 @@ class Loop:
             count = max(1, int(np.ceil(np.degrees(sweep) / (FINE_DEG if fine else COARSE_DEG) - 1e-6)))
             angles = first + sweep * np.arange(1, count) / count
             points += list(self.centres[side] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
-        return polygon(np.array(points))
+        return polygon_loop(np.array(points))
 
 
 def chorded_pair(first: Loop, second: Loop) -> tuple[Loop, Loop]:
@@ -94,26 +94,26 @@ def _unit(vectors: Points) -> Points:
     return unit
 
 
-def polygon(points: Points) -> Loop:
+def polygon_loop(points: Points) -> Loop:
     """A loop of straight sides."""
     return Loop(np.asarray(points, dtype=np.float64), np.full((len(points), 2), np.nan))
 
 
-def circle(centre: Points, diameter_mm: float) -> Loop:
+def circle_loop(centre: Points, diameter_mm: float) -> Loop:
     """A circle of two half arcs."""
     centre = np.asarray(centre, dtype=np.float64)
     reach = np.array([diameter_mm / 2, 0.0])
     return Loop(np.stack([centre + reach, centre - reach]), np.stack([centre, centre]))
 
 
-def rounded(corners: Points, radius_mm: float) -> Loop:
+def rounded_polygon(corners: Points, radius_mm: float) -> Loop:
     """A convex polygon (counter-clockwise) whose corners are arcs of the given radius; sharp at radius 0.
 
     The arcs touch the polygon's sides from inside, as a cutter or a beam of that radius leaves them.
     """
     if radius_mm == 0:
-        return polygon(corners)
-    core = polygon(corners).moved(-radius_mm).points
+        return polygon_loop(corners)
+    core = polygon_loop(corners).moved(-radius_mm).points
     side = np.roll(corners, -1, axis=0) - corners
     normal = radius_mm * np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
     points = np.stack([core + np.roll(normal, 1, axis=0), core + normal], axis=1).reshape(-1, 2)
@@ -121,7 +121,7 @@ def rounded(corners: Points, radius_mm: float) -> Loop:
     return Loop(points, centres)
 
 
-def grown(corners: Points, offset_mm: float) -> Loop:
+def rounded_offset(corners: Points, offset_mm: float) -> Loop:
     """Everything within ``offset_mm`` of a convex polygon: its corners become arcs around themselves."""
     side = np.roll(corners, -1, axis=0) - corners
     normal = offset_mm * np.stack([side[:, 1], -side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
@@ -133,7 +133,7 @@ def grown(corners: Points, offset_mm: float) -> Loop:
 def rounded_rectangle(low: Points, high: Points, radius_mm: float) -> Loop:
     """An upright rectangle from its lower left to its upper right corner."""
     (left, bottom), (right, top) = low, high
-    return rounded(np.array([(left, bottom), (right, bottom), (right, top), (left, top)]), radius_mm)
+    return rounded_polygon(np.array([(left, bottom), (right, bottom), (right, top), (left, top)]), radius_mm)
 
 
 def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -> list[Loop]:
@@ -158,10 +158,10 @@ def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -
     return [Loop(*pair) for pair in zip(points, centres, strict=True)]
 
 
-def boxes_of(loops: Sequence[Loop]) -> NDArray[np.float64]:
+def bounding_boxes(loops: Sequence[Loop]) -> NDArray[np.float64]:
     """(N, 2, 2) lower left and upper right corner of each; arcs must sweep less than 180 degrees."""
     result = np.empty((len(loops), 2, 2))
-    for numbers, points, centres in _alike(loops):
+    for numbers, points, centres in _group_by_sides(loops):
         low, high = points.min(axis=1), points.max(axis=1)
         start, end = points - centres, np.roll(points, -1, axis=1) - centres
         radius = np.hypot(start[..., 0], start[..., 1])
@@ -184,7 +184,9 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     return result
 
 
-def _alike(loops: Sequence[Loop]) -> Iterator[tuple[list[int], NDArray[np.float64], NDArray[np.float64]]]:
+def _group_by_sides(
+    loops: Sequence[Loop],
+) -> Iterator[tuple[list[int], NDArray[np.float64], NDArray[np.float64]]]:
     """The loops' numbers, (N, m, 2) points and centres, for each number of sides m."""
     groups: dict[int, list[int]] = {}
     for number, loop in enumerate(loops):
@@ -213,7 +215,7 @@ def frusta_volume_mm3(pairs: Sequence[tuple[Loop, Loop]], height_mm: float) -> f
     """
     lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     total = 0.0
-    for numbers, points, centres in _alike(lower):
+    for numbers, points, centres in _group_by_sides(lower):
         other = np.stack([upper[number].points for number in numbers])
         sections = [_areas_mm2(p, centres) for p in (points, (points + other) / 2, other)]
         total += float((sections[0] + 4 * sections[1] + sections[2]).sum())

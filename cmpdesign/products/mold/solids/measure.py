@@ -14,7 +14,7 @@ Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Measured:
+class SolidMeasures:
     """One solid's check.
 
     Attributes:
@@ -30,14 +30,14 @@ class Measured:
     volume_mm3: float
 
 
-def measure(shape: Any) -> Measured:
+def measure_solid(shape: Any) -> SolidMeasures:
     """Validity, closure and volume of a solid."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_ShapeEnum
 
     valid = bool(BRepCheck_Analyzer(shape, True, True).IsValid())
-    faces = len(of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE))
-    return Measured(valid, is_closed(shape), faces, volume_mm3(shape))
+    faces = len(subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE))
+    return SolidMeasures(valid, is_closed(shape), faces, volume_mm3(shape))
 
 
 def volume_mm3(shape: Any) -> float:
@@ -55,11 +55,11 @@ def is_closed(shape: Any) -> bool:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    shells = of_kind(shape, TopAbs_ShapeEnum.TopAbs_SHELL)
+    shells = subshapes(shape, TopAbs_ShapeEnum.TopAbs_SHELL)
     return bool(shells) and all(BRep_Tool.IsClosed_s(shell) for shell in shells)
 
 
-def of_kind(shape: Any, kind: Any) -> list[Any]:
+def subshapes(shape: Any, kind: Any) -> list[Any]:
     """Sub-shapes of a kind, in order; shared ones once for every use."""
     from OCP.TopExp import TopExp_Explorer
 
@@ -82,7 +82,7 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
     from OCP.TopoDS import TopoDS
 
     least, largest = float("inf"), float("-inf")
-    for face in of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+    for face in subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         surface = BRepAdaptor_Surface(TopoDS.Face(face), False)
         kind, lean = surface.GetType(), LEVEL_DEG
         if kind == GeomAbs_SurfaceType.GeomAbs_Plane:
@@ -95,18 +95,18 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
             )
         # Where a face lies is asked only if it would change the answer: nearly all lean alike.
         known = least <= lean <= largest
-        if lean < LEVEL_DEG and not known and _within(face, low_mm, high_mm):
+        if lean < LEVEL_DEG and not known and _is_within(face, low_mm, high_mm):
             least, largest = min(least, lean), max(largest, lean)
     return (least, largest) if least <= largest else (float("nan"), float("nan"))
 
 
-def _within(face: Any, low_mm: Point, high_mm: Point) -> bool:
+def _is_within(face: Any, low_mm: Point, high_mm: Point) -> bool:
     """True when every corner of the face lies in the box, a micrometre of tolerance around it."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS
 
-    for vertex in of_kind(face, TopAbs_ShapeEnum.TopAbs_VERTEX):
+    for vertex in subshapes(face, TopAbs_ShapeEnum.TopAbs_VERTEX):
         point = BRep_Tool.Pnt_s(TopoDS.Vertex(vertex))
         place = (point.X(), point.Y(), point.Z())
         if any(c < a - 1e-3 or c > b + 1e-3 for a, c, b in zip(low_mm, place, high_mm, strict=True)):

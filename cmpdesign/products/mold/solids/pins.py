@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.products.mold.solids.loops import circle
+from cmpdesign.products.mold.solids.loops import circle_loop
 from cmpdesign.products.mold.solids.shells import ShellBuilder
-from cmpdesign.products.mold.solids.tiled_faces import plain_sheet
+from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
 
 
 def pin_solid(diameter_mm: float, length_mm: float, chamfer_mm: float) -> Any:
@@ -23,7 +23,7 @@ def pin_solid(diameter_mm: float, length_mm: float, chamfer_mm: float) -> Any:
     )
     rings = []
     for number, (z, diameter) in enumerate(levels):
-        sheet = plain_sheet(circle(np.zeros(2), diameter), ())
+        sheet = untiled_faces(circle_loop(np.zeros(2), diameter), ())
         if 0 < number < len(levels) - 1:
             sheet.faces.clear()
         rings.append(builder.place(sheet, z, up=number > 0))

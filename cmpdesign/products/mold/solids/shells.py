@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.products.mold.solids.loops import Loop, boxes_of, frusta_volume_mm3, frustum_volume_mm3
+from cmpdesign.products.mold.solids.loops import Loop, bounding_boxes, frusta_volume_mm3, frustum_volume_mm3
 from cmpdesign.products.mold.solids.tiled_faces import (
+    PlanarFaces,
     Point,
-    Sheet,
     Wire,
-    backward,
-    forward,
-    plain_sheet,
-    tiled_sheet,
+    backward_wire,
+    forward_wire,
+    tile_faces,
+    untiled_faces,
 )
 
 TOLERANCE_MM = 1e-7
@@ -92,32 +92,32 @@ class ShellBuilder:
         self.make.Add(solid, self.shell)
         return solid
 
-    def place(self, sheet: Sheet, z: float, up: bool) -> PlacedSheet:
+    def place(self, sheet: PlanarFaces, z: float, up: bool) -> PlacedFaces:
         """Add a sheet's faces at a height; ``up`` tells whether the material lies below them."""
-        return PlacedSheet(self.make, self.shell, sheet, z, up)
+        return PlacedFaces(self.make, self.shell, sheet, z, up)
 
-    def walls(self, lower: PlacedSheet, rim: int, upper: PlacedSheet, upper_rim: int, outward: bool) -> None:
+    def walls(self, lower: PlacedFaces, rim: int, upper: PlacedFaces, upper_rim: int, outward: bool) -> None:
         """Join two rims side by side; ``outward`` when the material lies inside the outlines."""
         sides = len(lower.sheet.rims[rim])
-        posts = [self._post(lower, rim, upper, upper_rim, side) for side in range(sides)]
+        posts = [self._make_post(lower, rim, upper, upper_rim, side) for side in range(sides)]
         for side in range(sides):
             below, above = lower.sheet.rims[rim][side], upper.sheet.rims[upper_rim][side]
             after = posts[(side + 1) % sides]
-            self._wall(lower, below, upper, above, posts[side], after, outward)
+            self._add_wall(lower, below, upper, above, posts[side], after, outward)
 
-    def _post(self, lower: PlacedSheet, rim: int, upper: PlacedSheet, upper_rim: int, side: int) -> Any:
+    def _make_post(self, lower: PlacedFaces, rim: int, upper: PlacedFaces, upper_rim: int, side: int) -> Any:
         """The edge from a corner of the lower rim up to the upper one's."""
         start = lower.sheet.edges[lower.sheet.rims[rim][side][0]][0]
         end = upper.sheet.edges[upper.sheet.rims[upper_rim][side][0]][0]
-        return straight_edge(
+        return make_straight_edge(
             self.make, lower.vertices[start], lower.xyz(start), upper.vertices[end], upper.xyz(end)
         )
 
-    def _wall(
+    def _add_wall(
         self,
-        lower: PlacedSheet,
+        lower: PlacedFaces,
         below: list[int],
-        upper: PlacedSheet,
+        upper: PlacedFaces,
         above: list[int],
         post: Any,
         after: Any,
@@ -127,7 +127,7 @@ class ShellBuilder:
         from OCP.TopoDS import TopoDS_Face, TopoDS_Wire
 
         run, back = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
-        surface = _surface(lower, below, upper, above)
+        surface = _wall_surface(lower, below, upper, above)
         face, wire = TopoDS_Face(), TopoDS_Wire()
         self.make.MakeFace(face, surface.geometry, TOLERANCE_MM)
         self.make.MakeWire(wire)
@@ -138,17 +138,17 @@ class ShellBuilder:
             self.make.Add(wire, upper.shapes[edge].Oriented(back))
         self.make.Add(wire, post.Oriented(back))
         if surface.round is not None:
-            self._pcurves(surface, lower, below, upper, above, (post, after))
+            self._add_parameter_curves(surface, lower, below, upper, above, (post, after))
         wire.Closed(True)
         self.make.Add(face, wire)
         self.make.Add(self.shell, face.Oriented(run if outward else back))
 
-    def _pcurves(
+    def _add_parameter_curves(
         self,
-        surface: _Surface,
-        lower: PlacedSheet,
+        surface: _WallSurface,
+        lower: PlacedFaces,
         below: list[int],
-        upper: PlacedSheet,
+        upper: PlacedFaces,
         above: list[int],
         posts: tuple[Any, Any],
     ) -> None:
@@ -176,31 +176,31 @@ class ShellBuilder:
 
 
 @dataclass(frozen=True, eq=False)
-class _Surface:
+class _WallSurface:
     """A wall's surface; for a round one the first and last angle and the length from rim to rim."""
 
     geometry: Any
     round: tuple[float, float, float] | None
 
 
-def _surface(lower: PlacedSheet, below: list[int], upper: PlacedSheet, above: list[int]) -> _Surface:
+def _wall_surface(lower: PlacedFaces, below: list[int], upper: PlacedFaces, above: list[int]) -> _WallSurface:
     start, _, centre = lower.sheet.edges[below[0]]
     a = lower.sheet.points[start]
     b = lower.sheet.points[lower.sheet.edges[below[-1]][1]]
     top = upper.sheet.points[upper.sheet.edges[above[0]][0]]
     if centre is None:
-        return _Surface(_plane(a, b, top, lower.z, upper.z), None)
+        return _WallSurface(_wall_plane(a, b, top, lower.z, upper.z), None)
     radius = float(np.hypot(a[0] - centre[0], a[1] - centre[1]))
     top_radius = float(np.hypot(top[0] - centre[0], top[1] - centre[1]))
     height = upper.z - lower.z
     first = lower.angles[below[0]]
     sweep = sum(lower.sweeps[edge] for edge in below)
     length = float(np.hypot(top_radius - radius, height))
-    geometry = _round_surface(centre, lower.z, radius, top_radius - radius, height)
-    return _Surface(geometry, (first, first + sweep, length))
+    geometry = _round_wall_surface(centre, lower.z, radius, top_radius - radius, height)
+    return _WallSurface(geometry, (first, first + sweep, length))
 
 
-def _plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
+def _wall_plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
     """The plane through two points at z and one at top_z, its normal to the right of a -> b."""
     from OCP.Geom import Geom_Plane
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
@@ -216,7 +216,7 @@ def _plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
     return Geom_Plane(axes)
 
 
-def _round_surface(centre: Point, z: float, radius: float, growth: float, height: float) -> Any:
+def _round_wall_surface(centre: Point, z: float, radius: float, growth: float, height: float) -> Any:
     from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 
@@ -226,10 +226,10 @@ def _round_surface(centre: Point, z: float, radius: float, growth: float, height
     return Geom_ConicalSurface(axes, float(np.arctan2(growth, height)), radius)
 
 
-class PlacedSheet:
+class PlacedFaces:
     """A sheet's vertices, edges and faces at a height."""
 
-    def __init__(self, make: Any, shell: Any, sheet: Sheet, z: float, up: bool) -> None:
+    def __init__(self, make: Any, shell: Any, sheet: PlanarFaces, z: float, up: bool) -> None:
         from OCP.gp import gp_Pnt
         from OCP.TopoDS import TopoDS_Vertex
 
@@ -251,7 +251,7 @@ class PlacedSheet:
     def _edge(self, make: Any, number: int) -> Any:
         start, end, centre = self.sheet.edges[number]
         if centre is None:
-            return straight_edge(
+            return make_straight_edge(
                 make, self.vertices[start], self.xyz(start), self.vertices[end], self.xyz(end)
             )
         from OCP.Geom import Geom_Circle
@@ -263,7 +263,7 @@ class PlacedSheet:
         self.angles[number], self.sweeps[number] = angle, sweep
         axes = gp_Ax2(gp_Pnt(*centre, self.z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0))
         curve = Geom_Circle(axes, float(np.hypot(x0 - centre[0], y0 - centre[1])))
-        return _edge(make, curve, self.vertices[start], self.vertices[end], angle, angle + sweep)
+        return _make_edge(make, curve, self.vertices[start], self.vertices[end], angle, angle + sweep)
 
     def _faces(self, make: Any, shell: Any, up: bool) -> None:
         from OCP.Geom import Geom_Plane
@@ -293,7 +293,7 @@ class PlacedSheet:
         return wire
 
 
-def straight_edge(
+def make_straight_edge(
     make: Any,
     start: Any,
     start_xyz: tuple[float, float, float],
@@ -305,10 +305,10 @@ def straight_edge(
 
     dx, dy, dz = (b - a for a, b in zip(start_xyz, end_xyz, strict=True))
     line = Geom_Line(gp_Pnt(*start_xyz), gp_Dir(dx, dy, dz))
-    return _edge(make, line, start, end, 0.0, float((dx * dx + dy * dy + dz * dz) ** 0.5))
+    return _make_edge(make, line, start, end, 0.0, float((dx * dx + dy * dy + dz * dz) ** 0.5))
 
 
-def _edge(make: Any, curve: Any, start: Any, end: Any, first: float, last: float) -> Any:
+def _make_edge(make: Any, curve: Any, start: Any, end: Any, first: float, last: float) -> Any:
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopoDS import TopoDS_Edge
 
@@ -320,11 +320,11 @@ def _edge(make: Any, curve: Any, start: Any, end: Any, first: float, last: float
     return edge
 
 
-def slab_solid(slab: Slab) -> Any:
+def make_slab_solid(slab: Slab) -> Any:
     """The slab as a solid (TopoDS_Solid), its volume ``slab_volume_mm3``."""
     builder = ShellBuilder()
-    bottom = builder.place(_bottom(slab), slab.bottom_mm, up=False)
-    top = builder.place(_top(slab), slab.top_mm, up=True)
+    bottom = builder.place(_bottom_faces(slab), slab.bottom_mm, up=False)
+    top = builder.place(_top_faces(slab), slab.top_mm, up=True)
     builder.walls(bottom, 0, top, 0, outward=True)
     for number in range(len(slab.through)):
         builder.walls(bottom, 1 + number, top, 1 + number, outward=False)
@@ -341,12 +341,12 @@ def slab_solid(slab: Slab) -> Any:
     return builder.solid()
 
 
-def _bottom(slab: Slab) -> Sheet:
+def _bottom_faces(slab: Slab) -> PlanarFaces:
     holes = [below for below, _ in slab.through]
-    return tiled_sheet(slab.outer, holes, [below for below, _ in slab.many_through], TILE_MARGIN_MM)
+    return tile_faces(slab.outer, holes, [below for below, _ in slab.many_through], TILE_MARGIN_MM)
 
 
-def _top(slab: Slab) -> Sheet:
+def _top_faces(slab: Slab) -> PlanarFaces:
     """The top's faces; an island's outline belongs to a face of its own, inside the ring."""
     holes = [above for _, above in slab.through]
     islands: list[int] = []
@@ -357,15 +357,15 @@ def _top(slab: Slab) -> Sheet:
             islands.append(len(holes))
     many = [above for _, above in slab.many_through] + [feature.root for feature in slab.many]
     if not islands:
-        return tiled_sheet(slab.outlines[1], holes, many, TILE_MARGIN_MM)
-    return _with_islands(slab, holes, islands)
+        return tile_faces(slab.outlines[1], holes, many, TILE_MARGIN_MM)
+    return _faces_with_islands(slab, holes, islands)
 
 
-def _with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Sheet:
+def _faces_with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> PlanarFaces:
     """Rims inside an island are cut out of it, the others out of the slab."""
     outer = slab.outlines[1]
-    sheet = plain_sheet(outer, holes)
-    boxes = boxes_of([outer, *holes])
+    sheet = untiled_faces(outer, holes)
+    boxes = bounding_boxes([outer, *holes])
 
     def inside(inner: int, outer: int) -> bool:
         low, high = boxes[outer]
@@ -374,16 +374,16 @@ def _with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Sheet:
     members = {island: [i for i in range(1, len(boxes)) if inside(i, island)] for island in islands}
     taken = {i for island in islands for i in (island, *members[island])}
     free = [i for i in range(1, len(boxes)) if i not in taken]
-    sheet.faces = [[forward(sheet.around(0)), *(backward(sheet.around(i)) for i in free)]]
+    sheet.faces = [[forward_wire(sheet.around(0)), *(backward_wire(sheet.around(i)) for i in free)]]
     for island in islands:
-        cut_out = [backward(sheet.around(i)) for i in members[island]]
-        sheet.faces.append([forward(sheet.around(island)), *cut_out])
+        cut_out = [backward_wire(sheet.around(i)) for i in members[island]]
+        sheet.faces.append([forward_wire(sheet.around(island)), *cut_out])
     return sheet
 
 
-def _add_feature(builder: ShellBuilder, top: PlacedSheet, rim: int, feature: Feature) -> None:
+def _add_feature(builder: ShellBuilder, top: PlacedFaces, rim: int, feature: Feature) -> None:
     holes = [] if feature.island is None else [feature.island[1]]
-    end = builder.place(plain_sheet(feature.tip, holes), top.z + feature.height_mm, up=True)
+    end = builder.place(untiled_faces(feature.tip, holes), top.z + feature.height_mm, up=True)
     raised = feature.height_mm > 0
     for number in range(1 + len(holes)):
         outward = raised != (number == 1)

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.triangles import TriangleMesh
 from cmpdesign.products.mold.solids.loops import Loop, Points, chorded_pair
 from cmpdesign.products.mold.solids.shells import Feature, Slab
 
 DEFLECTION_MM = 0.01
 DEFLECTION_RAD = 0.1
 # Neighbouring faces evaluate the same point to within the kernel's tolerance; no edge is this short.
-SAME_MM = 1e-5
+MERGE_TOLERANCE_MM = 1e-5
 
 
-def chorded(slab: Slab) -> Slab:
+def chorded_slab(slab: Slab) -> Slab:
     """The slab with every arc as chords: a polyhedron, whose mesh is exact and of a volume in closed form."""
     bottom, top = chorded_pair(*slab.outlines)
     return replace(
@@ -39,22 +39,22 @@ def _chorded_feature(feature: Feature) -> Feature:
     return Feature(root, tip, feature.height_mm, island)
 
 
-def mesh_of_solid(name: str, color: str, solid: Any) -> Mesh:
+def tessellate_solid(name: str, color: str, solid: Any) -> TriangleMesh:
     """Triangles of a solid, exact where it is flat; neighbouring faces share their vertices."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    from cmpdesign.products.mold.solids.measure import of_kind
+    from cmpdesign.products.mold.solids.measure import subshapes
 
     BRepMesh_IncrementalMesh(solid, DEFLECTION_MM, False, DEFLECTION_RAD, False)
     points: list[tuple[float, float, float]] = []
     corners: list[tuple[int, int, int]] = []
-    for face in of_kind(solid, TopAbs_ShapeEnum.TopAbs_FACE):
-        _add_face(face, points, corners)
-    return merged(name, color, np.array(points), np.array(corners))
+    for face in subshapes(solid, TopAbs_ShapeEnum.TopAbs_FACE):
+        _add_face_triangles(face, points, corners)
+    return merge_vertices(name, color, np.array(points), np.array(corners))
 
 
-def _add_face(
+def _add_face_triangles(
     face: Any, points: list[tuple[float, float, float]], corners: list[tuple[int, int, int]]
 ) -> None:
     from OCP.BRep import BRep_Tool
@@ -75,22 +75,22 @@ def _add_face(
         corners.append((first + a, first + c, first + b) if turned else (first + a, first + b, first + c))
 
 
-def merged(name: str, color: str, points: Points, corners: NDArray[np.int64]) -> Mesh:
-    """Points within ``SAME_MM`` are one vertex; triangles that this makes flat are left out."""
+def merge_vertices(name: str, color: str, points: Points, corners: NDArray[np.int64]) -> TriangleMesh:
+    """Points within ``MERGE_TOLERANCE_MM`` are one vertex; triangles that this makes flat are left out."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    a, b = cKDTree(points).query_pairs(SAME_MM, output_type="ndarray").T
+    a, b = cKDTree(points).query_pairs(MERGE_TOLERANCE_MM, output_type="ndarray").T
     near = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))
     _, number = connected_components(near, directed=False)
     _, first = np.unique(number, return_index=True)
     triangles = number[corners]
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
-    return Mesh(name, color, points[first], triangles[~flat].astype(np.int64))
+    return TriangleMesh(name, color, points[first], triangles[~flat].astype(np.int64))
 
 
-def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop, Points]]) -> Mesh:
+def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop, Points]]) -> TriangleMesh:
     """Convex frusta: each a lower outline with its heights (m,), an upper one with its heights."""
     points, triangles, first = [], [], 0
     for lower, lower_z, upper, upper_z in frusta:
@@ -103,4 +103,4 @@ def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop
         )
         triangles += [first + fan[:, ::-1], first + m + fan, first + sides]
         first += 2 * m
-    return Mesh(name, color, np.concatenate(points), np.concatenate(triangles))
+    return TriangleMesh(name, color, np.concatenate(points), np.concatenate(triangles))

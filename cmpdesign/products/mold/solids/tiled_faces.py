@@ -21,20 +21,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from cmpdesign.products.mold.solids.loops import Loop, Points, boxes_of, rounded_rectangle
+from cmpdesign.products.mold.solids.loops import Loop, Points, bounding_boxes, rounded_rectangle
 
 HOLES_PER_TILE = 4
 # Lines keep this distance from every corner of a hole, so that no edge is shorter.
-CLEAR_MM = 1e-4
+CORNER_CLEARANCE_MM = 1e-4
 
 Point = tuple[float, float]
 # An edge and whether it is run along its own direction.
-Step = tuple[int, bool]
-Wire = list[Step]
+DirectedEdge = tuple[int, bool]
+Wire = list[DirectedEdge]
 
 
 @dataclass
-class Sheet:
+class PlanarFaces:
     """A plane's points, edges and faces.
 
     Attributes:
@@ -85,25 +85,25 @@ class Sheet:
         return [edge for side in self.rims[rim] for edge in side]
 
 
-def forward(edges: Sequence[int]) -> Wire:
+def forward_wire(edges: Sequence[int]) -> Wire:
     return [(edge, True) for edge in edges]
 
 
-def backward(edges: Sequence[int]) -> Wire:
+def backward_wire(edges: Sequence[int]) -> Wire:
     return [(edge, False) for edge in reversed(edges)]
 
 
-def plain_sheet(outer: Loop, holes: Sequence[Loop]) -> Sheet:
+def untiled_faces(outer: Loop, holes: Sequence[Loop]) -> PlanarFaces:
     """One face with few holes; the rims are the outer loop's, then the holes'."""
-    sheet = Sheet()
+    sheet = PlanarFaces()
     for loop in (outer, *holes):
         sheet.add_rim(loop)
-    wires = [forward(sheet.around(0)), *(backward(sheet.around(i + 1)) for i in range(len(holes)))]
+    wires = [forward_wire(sheet.around(0)), *(backward_wire(sheet.around(i + 1)) for i in range(len(holes)))]
     sheet.faces.append(wires)
     return sheet
 
 
-def tiled_sheet(outer: Loop, holes: Sequence[Loop], features: Sequence[Loop], margin_mm: float) -> Sheet:
+def tile_faces(outer: Loop, holes: Sequence[Loop], features: Sequence[Loop], margin_mm: float) -> PlanarFaces:
     """A face with few holes and many features (small convex outlines that keep clear of each other).
 
     Args:
@@ -116,32 +116,32 @@ def tiled_sheet(outer: Loop, holes: Sequence[Loop], features: Sequence[Loop], ma
         A sheet whose rims are the outer loop's, the holes' and the features', in this order.
     """
     if not features:
-        return plain_sheet(outer, holes)
-    boxes = boxes_of(features)
-    sheet = Sheet()
+        return untiled_faces(outer, holes)
+    boxes = bounding_boxes(features)
+    sheet = PlanarFaces()
     if not holes:
-        Tiler(sheet, outer, features, boxes).tile()
+        Tiler(sheet, outer, features, boxes).add_tiles()
         return sheet
     for loop in (outer, *holes):
         sheet.add_rim(loop)
     low, high = boxes[:, 0].min(axis=0) - margin_mm, boxes[:, 1].max(axis=0) + margin_mm
-    ring = Tiler(sheet, rounded_rectangle(low, high, 0.0), features, boxes).tile()
+    ring = Tiler(sheet, rounded_rectangle(low, high, 0.0), features, boxes).add_tiles()
     # The box is no outline of the solid: nothing stands on it.
     box_rim = sheet.rims.pop(1 + len(holes))
     assert [edge for side in box_rim for edge in side] == ring
-    wires = [forward(sheet.around(0)), *(backward(sheet.around(i + 1)) for i in range(len(holes)))]
-    sheet.faces.append([*wires, backward(ring)])
+    wires = [forward_wire(sheet.around(0)), *(backward_wire(sheet.around(i + 1)) for i in range(len(holes)))]
+    sheet.faces.append([*wires, backward_wire(ring)])
     return sheet
 
 
-def strip_lines(frame: Loop, features: Sequence[Loop], boxes: Points) -> list[float]:
+def choose_strip_lines(frame: Loop, features: Sequence[Loop], boxes: Points) -> list[float]:
     """Heights of the lines, from below, each where it cuts the fewest features near it."""
     tallest = float((boxes[:, 1, 1] - boxes[:, 0, 1]).max())
     bottom, top = float(boxes[:, 0, 1].min()), float(boxes[:, 1, 1].max())
     corners = [frame.points[:, 1], boxes[:, :, 1].ravel(), *(loop.points[:, 1] for loop in features)]
     events = np.unique(np.round(np.concatenate(corners), 9))
     gaps = np.diff(events)
-    wide = gaps > 2 * CLEAR_MM
+    wide = gaps > 2 * CORNER_CLEARANCE_MM
     candidates, width = (events[:-1] + gaps / 2)[wide], gaps[wide]
     starts, ends = np.sort(boxes[:, 0, 1]), np.sort(boxes[:, 1, 1])
     cut = np.searchsorted(starts, candidates) - np.searchsorted(ends, candidates)
@@ -158,7 +158,7 @@ def strip_lines(frame: Loop, features: Sequence[Loop], boxes: Points) -> list[fl
 
 
 @dataclass
-class _Cut:
+class _FeatureCut:
     """A feature cut by a line: where, the two points on its rim, and its edges below and above."""
 
     left: float
@@ -175,41 +175,43 @@ class Tiler:
     Strip s lies between line s - 1 and line s; below the first line and above the last, it ends at the frame.
     """
 
-    def __init__(self, sheet: Sheet, frame: Loop, features: Sequence[Loop], boxes: Points) -> None:
+    def __init__(self, sheet: PlanarFaces, frame: Loop, features: Sequence[Loop], boxes: Points) -> None:
         self.sheet, self.frame, self.features, self.boxes = sheet, frame, features, boxes
-        self.lines = strip_lines(frame, features, boxes)
+        self.lines = choose_strip_lines(frame, features, boxes)
         # The strip that holds a feature's lower end; the line that cuts it, or -1.
         self.strip = np.searchsorted(self.lines, boxes[:, 0, 1])
         self.cut_by = np.where(np.searchsorted(self.lines, boxes[:, 1, 1]) > self.strip, self.strip, -1)
         self.uprights = [self._uprights(strip) for strip in range(len(self.lines) + 1)]
 
-    def tile(self) -> list[int]:
+    def add_tiles(self) -> list[int]:
         """Add the frame's rim, the features' rims and all tiles; the frame's edges, counter-clockwise."""
-        line_ends, feet, heads = self._frame_rim()
+        line_ends, feet, heads = self._add_frame_rim()
         around = self.sheet.around(len(self.sheet.rims) - 1)
         self._frame_edges = around
         self._at_frame = {self.sheet.edges[edge][0]: number for number, edge in enumerate(around)}
         self._first_rim = len(self.sheet.rims)
-        cuts = self._feature_rims()
+        cuts = self._add_feature_rims()
         self._rails = [
-            _Rail(self.sheet, y, ends, [*self.uprights[line], *self.uprights[line + 1]], cuts.get(line, []))
+            _StripLine(
+                self.sheet, y, ends, [*self.uprights[line], *self.uprights[line + 1]], cuts.get(line, [])
+            )
             for line, (y, ends) in enumerate(zip(self.lines, line_ends, strict=True))
         ]
         for strip in range(len(self.lines) + 1):
-            self._strip(strip, feet, heads)
+            self._add_strip_tiles(strip, feet, heads)
         return around
 
-    def _frame_rim(self) -> tuple[list[tuple[int, int]], list[int], list[int]]:
+    def _add_frame_rim(self) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         """The frame, split where lines and outer uprights end: (left, right) of lines, feet, heads."""
         cuts: list[tuple[int, Point]] = []
         for y in self.lines:
-            right, left = crossings(self.frame, y)
+            right, left = line_crossings(self.frame, y)
             cuts += [left, right]
         turned = Loop(self.frame.points[:, ::-1], self.frame.centres)
         for strip, down in ((0, True), (len(self.lines), False)):
             for x in self.uprights[strip]:
                 # With x and y exchanged, the side along which x grows is the lower one.
-                lower, upper = crossings(turned, x)
+                lower, upper = line_crossings(turned, x)
                 side, (y, _) = lower if down else upper
                 cuts.append((side, (x, y)))
         numbers = self.sheet.add_rim(self.frame, cuts)
@@ -220,22 +222,24 @@ class Tiler:
         heads_from = feet_from + len(self.uprights[0])
         return ends, numbers[feet_from:heads_from], numbers[heads_from:]
 
-    def _feature_rims(self) -> dict[int, list[_Cut]]:
+    def _add_feature_rims(self) -> dict[int, list[_FeatureCut]]:
         """Every feature's rim; the features that lines cut, by line."""
-        cuts: dict[int, list[_Cut]] = {}
+        cuts: dict[int, list[_FeatureCut]] = {}
         for number, loop in enumerate(self.features):
             line = int(self.cut_by[number])
             if line < 0:
                 self.sheet.add_rim(loop)
                 continue
-            right, left = crossings(loop, self.lines[line])
+            right, left = line_crossings(loop, self.lines[line])
             right_point, left_point = self.sheet.add_rim(loop, [right, left])
             edges = self.sheet.around(self._first_rim + number)
             starts = [self.sheet.edges[edge][0] for edge in edges]
             at_right, at_left = starts.index(right_point), starts.index(left_point)
             turned = edges[at_right:] + edges[:at_right]
             count = (at_left - at_right) % len(edges)
-            cut = _Cut(left[1][0], right[1][0], left_point, right_point, turned[count:], turned[:count])
+            cut = _FeatureCut(
+                left[1][0], right[1][0], left_point, right_point, turned[count:], turned[:count]
+            )
             cuts.setdefault(line, []).append(cut)
         return cuts
 
@@ -246,7 +250,7 @@ class Tiler:
         reach = reach[np.argsort(reach[:, 0], kind="stable")]
         places, count, end = [], 0, -np.inf
         for left, right in reach.tolist():
-            if count >= HOLES_PER_TILE and left - end > 4 * CLEAR_MM:
+            if count >= HOLES_PER_TILE and left - end > 4 * CORNER_CLEARANCE_MM:
                 places.append(self._clear_of_corners(end, left))
                 count = 0
             count += 1
@@ -256,10 +260,10 @@ class Tiler:
     def _clear_of_corners(self, left: float, right: float) -> float:
         """The middle, or a third where a corner of the frame lies above or below the middle."""
         middle = (left + right) / 2
-        taken = np.abs(self.frame.points[:, 0] - middle).min() < CLEAR_MM / 2
+        taken = np.abs(self.frame.points[:, 0] - middle).min() < CORNER_CLEARANCE_MM / 2
         return left + (right - left) / 3 if taken else middle
 
-    def _strip(self, strip: int, feet: list[int], heads: list[int]) -> None:
+    def _add_strip_tiles(self, strip: int, feet: list[int], heads: list[int]) -> None:
         lower = self._rails[strip - 1] if strip > 0 else None
         upper = self._rails[strip] if strip < len(self.lines) else None
         uprights = self.uprights[strip]
@@ -272,21 +276,21 @@ class Tiler:
         tile_of = np.searchsorted(uprights, self.boxes[inside][:, 0, 0])
         holes: list[list[Wire]] = [[] for _ in range(len(columns) + 1)]
         for number, tile in zip(inside.tolist(), tile_of.tolist(), strict=True):
-            holes[tile].append(backward(self.sheet.around(self._first_rim + number)))
+            holes[tile].append(backward_wire(self.sheet.around(self._first_rim + number)))
         places = [-np.inf, *uprights, np.inf]
         for tile, (left, right) in enumerate(pairwise(places)):
             legs = [
                 lower.path(left, right, above=True) if lower else [],
-                forward(columns[tile : tile + 1]),
-                turned_back(upper.path(left, right, above=False)) if upper else [],
-                backward(columns[max(tile - 1, 0) : tile]),
+                forward_wire(columns[tile : tile + 1]),
+                reversed_wire(upper.path(left, right, above=False)) if upper else [],
+                backward_wire(columns[max(tile - 1, 0) : tile]),
             ]
             self.sheet.faces.append([self._closed([leg for leg in legs if leg]), *holes[tile]])
 
     def _closed(self, legs: list[Wire]) -> Wire:
         """The legs in order, joined along the frame where one does not start at the other's end."""
         if not legs:
-            return forward(self._frame_edges)
+            return forward_wire(self._frame_edges)
         wire: Wire = []
         for leg, after in zip(legs, [*legs[1:], legs[0]], strict=True):
             wire += leg
@@ -295,7 +299,7 @@ class Tiler:
                 wire += self._along_frame(end, start)
         return wire
 
-    def _end(self, step: Step, first: bool = False) -> int:
+    def _end(self, step: DirectedEdge, first: bool = False) -> int:
         edge, along = step
         start, end, _ = self.sheet.edges[edge]
         return start if along == first else end
@@ -304,17 +308,22 @@ class Tiler:
         """The frame's edges from one of its points to another, counter-clockwise."""
         first, last = self._at_frame[start], self._at_frame[end]
         if last <= first:
-            return forward(self._frame_edges[first:] + self._frame_edges[:last])
-        return forward(self._frame_edges[first:last])
+            return forward_wire(self._frame_edges[first:] + self._frame_edges[:last])
+        return forward_wire(self._frame_edges[first:last])
 
 
-class _Rail:
+class _StripLine:
     """A horizontal line: edges between the features that it cuts, with points where uprights end."""
 
     def __init__(
-        self, sheet: Sheet, y: float, ends: tuple[int, int], uprights: list[float], cuts: list[_Cut]
+        self,
+        sheet: PlanarFaces,
+        y: float,
+        ends: tuple[int, int],
+        uprights: list[float],
+        cuts: list[_FeatureCut],
     ) -> None:
-        nodes: list[tuple[float, int, _Cut | None]] = [
+        nodes: list[tuple[float, int, _FeatureCut | None]] = [
             (x, sheet.point(x, y), None) for x in sorted(set(uprights))
         ]
         self._point = {x: point for x, point, _ in nodes}
@@ -322,7 +331,7 @@ class _Rail:
         nodes.append((sheet.points[ends[1]][0], ends[1], None))
         nodes.sort(key=lambda node: node[0])
         # (where it starts, a straight edge or the feature in the way), from the left.
-        self._spans: list[tuple[float, int | _Cut]] = []
+        self._spans: list[tuple[float, int | _FeatureCut]] = []
         at_x, at = sheet.points[ends[0]][0], ends[0]
         for x, point, cut in nodes:
             self._spans.append((at_x, sheet.edge(at, point)))
@@ -343,25 +352,25 @@ class _Rail:
             if isinstance(span, int):
                 wire.append((span, True))
             else:
-                wire += backward(span.above) if above else forward(span.below)
+                wire += backward_wire(span.above) if above else forward_wire(span.below)
         return wire
 
 
-def turned_back(wire: Wire) -> Wire:
+def reversed_wire(wire: Wire) -> Wire:
     """The same edges from the other end."""
     return [(edge, not along) for edge, along in reversed(wire)]
 
 
-def crossings(loop: Loop, y: float) -> tuple[tuple[int, Point], tuple[int, Point]]:
+def line_crossings(loop: Loop, y: float) -> tuple[tuple[int, Point], tuple[int, Point]]:
     """Where a convex loop crosses a horizontal line: (side, place) going up (its right), then going down."""
     heights = loop.points[:, 1]
     after = np.roll(heights, -1)
     up = int(np.flatnonzero((heights < y) & (after > y))[0])
     down = int(np.flatnonzero((heights > y) & (after < y))[0])
-    return (up, _crossing(loop, up, y)), (down, _crossing(loop, down, y))
+    return (up, _side_crossing(loop, up, y)), (down, _side_crossing(loop, down, y))
 
 
-def _crossing(loop: Loop, side: int, y: float) -> Point:
+def _side_crossing(loop: Loop, side: int, y: float) -> Point:
     start, end = loop.points[side], loop.points[(side + 1) % len(loop.points)]
     centre = loop.centres[side]
     if np.isnan(centre[0]):

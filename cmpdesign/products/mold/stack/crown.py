@@ -71,7 +71,7 @@ class Crown:
         return float(2 * (self.length_mm * segment - moment / END_SLOPE))
 
 
-def projected(xy_mm: Points, shape: str, radius_mm: float, projection: str) -> Points:
+def project_on_crown(xy_mm: Points, shape: str, radius_mm: float, projection: str) -> Points:
     """Where a flat pattern's points lie in plan once it is on the crown.
 
     "equidistant" keeps the lengths from the apex (sphere: the azimuthal equidistant projection; cylinder: the

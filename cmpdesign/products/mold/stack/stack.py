@@ -24,17 +24,17 @@ from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.mold.solids.loops import Loop, Points, circle, polygon, rounded_rectangle
-from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, projected
+from cmpdesign.products.mold.solids.loops import Loop, Points, circle_loop, polygon_loop, rounded_rectangle
+from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, project_on_crown
 from cmpdesign.products.mold.stack.silicones import Silicone, load_silicone
 
-LAYERS = ("base", "marker", "cover")
+SILICONE_LAYERS = ("base", "marker", "cover")
 # A crown's foot keeps this distance to the pattern and to the pad's edge.
 FOOT_MM = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class MoldStack:
     """A mold's dimensions; lengths of the mold, shrinkage already added.
 
     Attributes:
@@ -81,7 +81,7 @@ class Stack:
 
     def edges(self, layer: int) -> tuple[Loop, Loop]:
         """The pad's edge at the lower and the upper face of a layer; drafted, so that it opens upwards."""
-        nominal = polygon(self.outline_mm * self.silicones[layer].scale)
+        nominal = polygon_loop(self.outline_mm * self.silicones[layer].scale)
         low = self.lean * sum(self.thickness_mm[:layer])
         return nominal.moved(low), nominal.moved(low + self.lean * self.thickness_mm[layer])
 
@@ -95,7 +95,7 @@ class Stack:
         scaled = xy_mm * self.silicones[1].scale
         if self.crown is None:
             return scaled
-        return projected(scaled, self.crown.shape, self.crown.radius_mm, self.options.projection)
+        return project_on_crown(scaled, self.crown.shape, self.crown.radius_mm, self.options.projection)
 
     @cached_property
     def colors(self) -> tuple[int, ...]:
@@ -121,10 +121,10 @@ class Stack:
     def holes(self, clearance: bool = True) -> list[Loop]:
         """The pin holes; in the base they hold the pins tight, elsewhere they have clearance."""
         diameter = self.pin_diameter_mm + (self.options.clearance_mm if clearance else 0.0)
-        return [circle(place, diameter) for place in self.pins_mm]
+        return [circle_loop(place, diameter) for place in self.pins_mm]
 
 
-def stack_of(design: Design, layout: Layout) -> Stack:
+def make_stack(design: Design, layout: Layout) -> MoldStack:
     """The dimensions of a design's mold.
 
     Raises:
@@ -139,14 +139,14 @@ def stack_of(design: Design, layout: Layout) -> Stack:
     diameter = option.pin_diameter_mm or design.fiducials.diameter_mm
     crown, outline = None, layout.outline_mm
     if option.crown != "none":
-        crown, outline = _crowned(option, layout, marker.scale)
-    return Stack(option, layout, (base, marker, cover), outline, crown, pins, diameter)
+        crown, outline = _fit_crown(option, layout, marker.scale)
+    return MoldStack(option, layout, (base, marker, cover), outline, crown, pins, diameter)
 
 
-def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
+def _fit_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
     """The crown that just carries the pattern, and the round or rectangular pad around it."""
-    from cmpdesign.layout.outline import circle as round_outline
-    from cmpdesign.layout.outline import rectangle
+    from cmpdesign.layout.outline import circle_outline as round_outline
+    from cmpdesign.layout.outline import rectangle_outline
 
     if option.crown_radius_mm is None:
         raise DesignError(f'mold.crown = "{option.crown}" needs mold.crown_radius_mm')
@@ -175,7 +175,7 @@ def _crowned(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, 
     height = Crown("cylinder", radius, reach, np.inf).height_mm
     length = float(np.abs(points[:, 1]).max()) + FOOT_MM + height / END_SLOPE
     crown = Crown("cylinder", radius, reach, length)
-    return crown, rectangle(2 * (reach / scale + edge), 2 * (length / scale + edge))
+    return crown, rectangle_outline(2 * (reach / scale + edge), 2 * (length / scale + edge))
 
 
 def crown_edge_mm(option: MoldOptions, layout: Layout) -> float:

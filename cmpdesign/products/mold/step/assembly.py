@@ -10,18 +10,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cmpdesign.products.mold.step.text import (
-    SHARED,
+    SHARED_ENTITIES,
     Direction,
-    Entities,
-    Product,
+    StepEntities,
+    StepProduct,
     add_context,
     add_product,
-    data_of,
+    data_section,
 )
 
 
 @dataclass(frozen=True)
-class Place:
+class PartPlace:
     """A part's place in an assembly: first turned about the x axis (if ``turned``), then moved.
 
     Attributes:
@@ -42,7 +42,7 @@ class Assembly:
     """A named group of places and further groups."""
 
     name: str
-    places: Sequence[Place]
+    places: Sequence[PartPlace]
     groups: Sequence[Assembly] = ()
 
 
@@ -53,20 +53,22 @@ def assembly_to_step(assembly: Assembly, files: Mapping[str, bytes]) -> bytes:
         assembly: what lies where.
         files: of each part's name, what ``solid_to_step`` wrote.
     """
-    entities = Entities()
-    products = {name: _take_over(files[name], entities) for name in dict.fromkeys(_parts_of(assembly))}
+    entities = StepEntities()
+    products = {
+        name: _add_part_entities(files[name], entities) for name in dict.fromkeys(_part_names(assembly))
+    }
     _add_assembly(assembly, products, entities)
     return entities.file(assembly.name)
 
 
-def _parts_of(assembly: Assembly) -> list[str]:
-    inner = [name for group in assembly.groups for name in _parts_of(group)]
+def _part_names(assembly: Assembly) -> list[str]:
+    inner = [name for group in assembly.groups for name in _part_names(group)]
     return [place.part for place in assembly.places] + inner
 
 
-def _take_over(part: bytes, entities: Entities) -> Product:
+def _add_part_entities(part: bytes, entities: StepEntities) -> StepProduct:
     """A part's entities but the shared ones, numbered on from the last one here."""
-    text, shared = data_of(part), len(SHARED)
+    text, shared = data_section(part), len(SHARED_ENTITIES)
     text = text[text.index(f"#{shared + 1} = ") :]
     shift = entities.last - shared
     last = int(text[text.rindex("\n#") + 2 :].partition(" ")[0])
@@ -75,10 +77,12 @@ def _take_over(part: bytes, entities: Entities) -> Product:
     pieces = re.split(r"#(\d+)", text)
     pieces[1::2] = [new[number] for number in pieces[1::2]]
     entities.take_over("".join(pieces), last + shift)
-    return Product.ending_at(entities.last)
+    return StepProduct.ending_at(entities.last)
 
 
-def _add_assembly(assembly: Assembly, products: Mapping[str, Product], entities: Entities) -> Product:
+def _add_assembly(
+    assembly: Assembly, products: Mapping[str, StepProduct], entities: StepEntities
+) -> StepProduct:
     members = [(products[p.part], p.name, p.xyz_mm, p.turned) for p in assembly.places]
     for group in assembly.groups:
         members.append((_add_assembly(group, products, entities), group.name, (0.0, 0.0, 0.0), False))
@@ -90,11 +94,11 @@ def _add_assembly(assembly: Assembly, products: Mapping[str, Product], entities:
     return own
 
 
-def _add_axes(entities: Entities, xyz_mm: Direction, turned: bool) -> int:
+def _add_axes(entities: StepEntities, xyz_mm: Direction, turned: bool) -> int:
     return entities.axes(xyz_mm, (0.0, 0.0, -1.0 if turned else 1.0), (1.0, 0.0, 0.0))
 
 
-def _add_usage(own: Product, member: Product, name: str, axes: int, entities: Entities) -> None:
+def _add_usage(own: StepProduct, member: StepProduct, name: str, axes: int, entities: StepEntities) -> None:
     """The member, its origin brought to ``axes``."""
     usage = entities.add(
         f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{entities.last + 1}','{name}','',"

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from cmpdesign.products.mold.step.text import Direction, Entities, real, references
+from cmpdesign.products.mold.step.text import Direction, StepEntities, format_real, format_references
 
 
-def add_solid(solid: Any, entities: Entities) -> int:
+def add_solid(solid: Any, entities: StepEntities) -> int:
     """The number of a solid's MANIFOLD_SOLID_BREP.
 
     Args:
@@ -25,16 +25,16 @@ def add_solid(solid: Any, entities: Entities) -> int:
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS
 
-    shells = list(_within(solid, TopAbs_ShapeEnum.TopAbs_SHELL))
+    shells = list(_explore(solid, TopAbs_ShapeEnum.TopAbs_SHELL))
     if len(shells) != 1:
         raise RuntimeError(f"STEP: a solid has {len(shells)} shells, not one")
-    boundary = _Boundary(entities)
-    faces = [boundary.face(TopoDS.Face(face)) for face in _within(solid, TopAbs_ShapeEnum.TopAbs_FACE)]
-    shell = entities.add(f"CLOSED_SHELL('',({references(faces)}))")
+    boundary = _BoundaryWriter(entities)
+    faces = [boundary.face(TopoDS.Face(face)) for face in _explore(solid, TopAbs_ShapeEnum.TopAbs_FACE)]
+    shell = entities.add(f"CLOSED_SHELL('',({format_references(faces)}))")
     return entities.add(f"MANIFOLD_SOLID_BREP('',#{shell})")
 
 
-def _within(shape: Any, kind: Any) -> Iterator[Any]:
+def _explore(shape: Any, kind: Any) -> Iterator[Any]:
     from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(shape, kind)
@@ -43,10 +43,10 @@ def _within(shape: Any, kind: Any) -> Iterator[Any]:
         explorer.Next()
 
 
-class _Boundary:
+class _BoundaryWriter:
     """Knows the numbers of the edges and vertices met so far."""
 
-    def __init__(self, entities: Entities) -> None:
+    def __init__(self, entities: StepEntities) -> None:
         from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
         from OCP.TopAbs import TopAbs_Orientation
 
@@ -60,7 +60,7 @@ class _Boundary:
         from OCP.BRep import BRep_Tool
         from OCP.TopoDS import TopoDS, TopoDS_Iterator
 
-        surface, as_written = _surface(BRep_Tool.Surface_s(face), self.entities)
+        surface, as_written = _add_surface(BRep_Tool.Surface_s(face), self.entities)
         outward = face.Orientation() == self.forward
         plain = TopoDS.Face(face.Oriented(self.forward))
         bounds = []
@@ -68,11 +68,11 @@ class _Boundary:
         while wires.More():
             wire = TopoDS.Wire(wires.Value())
             loop = self.loop(TopoDS.Wire(wire.Oriented(self.forward)), plain)
-            along = _logical(wire.Orientation() == self.forward)
+            along = _step_logical(wire.Orientation() == self.forward)
             bounds.append(self.entities.add(f"FACE_BOUND('',#{loop},{along})"))
             wires.Next()
-        sense = _logical(outward == as_written)
-        return self.entities.add(f"ADVANCED_FACE('',({references(bounds)}),#{surface},{sense})")
+        sense = _step_logical(outward == as_written)
+        return self.entities.add(f"ADVANCED_FACE('',({format_references(bounds)}),#{surface},{sense})")
 
     def loop(self, wire: Any, face: Any) -> int:
         """A wire's edges, each beginning where the last one ends."""
@@ -84,10 +84,10 @@ class _Boundary:
             edge = explorer.Current()
             number = self.edge(edge)
             if number:
-                along = _logical(edge.Orientation() == self.forward)
+                along = _step_logical(edge.Orientation() == self.forward)
                 steps.append(self.entities.add(f"ORIENTED_EDGE('',*,*,#{number},{along})"))
             explorer.Next()
-        return self.entities.add(f"EDGE_LOOP('',({references(steps)}))")
+        return self.entities.add(f"EDGE_LOOP('',({format_references(steps)}))")
 
     def edge(self, edge: Any) -> int:
         """0 for an edge without length, such as a sphere's pole, which a file leaves out."""
@@ -105,7 +105,7 @@ class _Boundary:
             return 0
         # Orientation aside: from the curve's lower parameter to its higher one.
         start, end = self.vertex(TopExp.FirstVertex_s(edge)), self.vertex(TopExp.LastVertex_s(edge))
-        return self.entities.add(f"EDGE_CURVE('',#{start},#{end},#{_curve(curve, self.entities)},.T.)")
+        return self.entities.add(f"EDGE_CURVE('',#{start},#{end},#{_add_curve(curve, self.entities)},.T.)")
 
     def vertex(self, vertex: Any) -> int:
         from OCP.BRep import BRep_Tool
@@ -117,7 +117,7 @@ class _Boundary:
         return self.vertex_numbers[place]
 
 
-def _curve(curve: Any, entities: Entities) -> int:
+def _add_curve(curve: Any, entities: StepEntities) -> int:
     kind = type(curve).__name__
     if kind == "Geom_Line":
         line = curve.Position()
@@ -125,14 +125,16 @@ def _curve(curve: Any, entities: Entities) -> int:
         vector = entities.share(f"VECTOR('',#{along},1.)")
         return entities.add(f"LINE('',#{entities.point(*_xyz(line.Location()))},#{vector})")
     if kind == "Geom_Circle":
-        return entities.add(f"CIRCLE('',#{_axes(curve.Position(), entities)},{real(curve.Radius())})")
+        return entities.add(
+            f"CIRCLE('',#{_add_axes(curve.Position(), entities)},{format_real(curve.Radius())})"
+        )
     if kind == "Geom_Ellipse":
-        radii = f"{real(curve.MajorRadius())},{real(curve.MinorRadius())}"
-        return entities.add(f"ELLIPSE('',#{_axes(curve.Position(), entities)},{radii})")
+        radii = f"{format_real(curve.MajorRadius())},{format_real(curve.MinorRadius())}"
+        return entities.add(f"ELLIPSE('',#{_add_axes(curve.Position(), entities)},{radii})")
     raise RuntimeError(f"STEP: an edge is a {kind}, no line, circle or ellipse")
 
 
-def _surface(surface: Any, entities: Entities) -> tuple[int, bool]:
+def _add_surface(surface: Any, entities: StepEntities) -> tuple[int, bool]:
     """A surface's number, and whether its normal in the file is the kernel's."""
     kind = type(surface).__name__
     if kind not in ("Geom_Plane", "Geom_CylindricalSurface", "Geom_ConicalSurface", "Geom_SphericalSurface"):
@@ -143,17 +145,17 @@ def _surface(surface: Any, entities: Entities) -> tuple[int, bool]:
     if kind == "Geom_ConicalSurface":
         # A file's cones widen along their axis.
         angle = surface.SemiAngle()
-        axes = _axes(position, entities, flip=angle < 0)
-        text = f"CONICAL_SURFACE('',#{axes},{real(surface.RefRadius())},{real(abs(angle))})"
+        axes = _add_axes(position, entities, flip=angle < 0)
+        text = f"CONICAL_SURFACE('',#{axes},{format_real(surface.RefRadius())},{format_real(abs(angle))})"
     elif kind == "Geom_Plane":
-        text = f"PLANE('',#{_axes(position, entities)})"
+        text = f"PLANE('',#{_add_axes(position, entities)})"
     else:
         name = "CYLINDRICAL_SURFACE" if kind == "Geom_CylindricalSurface" else "SPHERICAL_SURFACE"
-        text = f"{name}('',#{_axes(position, entities)},{real(surface.Radius())})"
+        text = f"{name}('',#{_add_axes(position, entities)},{format_real(surface.Radius())})"
     return entities.add(text), direct
 
 
-def _axes(position: Any, entities: Entities, flip: bool = False) -> int:
+def _add_axes(position: Any, entities: StepEntities, flip: bool = False) -> int:
     z = _xyz(position.Direction())
     if flip:
         z = (-z[0], -z[1], -z[2])
@@ -164,5 +166,5 @@ def _xyz(of: Any) -> Direction:
     return of.X(), of.Y(), of.Z()
 
 
-def _logical(value: bool) -> str:
+def _step_logical(value: bool) -> str:
     return ".T." if value else ".F."

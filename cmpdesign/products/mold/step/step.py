@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.products.mold.step.shape import add_solid
-from cmpdesign.products.mold.step.text import Entities, add_context, add_product, real
+from cmpdesign.products.mold.step.text import StepEntities, add_context, add_product, format_real
 
 PART = "ADVANCED_BREP_SHAPE_REPRESENTATION"
 
 
 @dataclass(frozen=True)
-class Solid:
+class NamedSolid:
     """A named, colored solid.
 
     Attributes:
@@ -29,13 +29,13 @@ class Solid:
     shape: Any
 
 
-def solid_to_step(solid: Solid) -> bytes:
+def solid_to_step(solid: NamedSolid) -> bytes:
     """A part's file.
 
     Raises:
         RuntimeError: a solid that ``add_solid`` cannot write.
     """
-    entities = Entities()
+    entities = StepEntities()
     body = add_solid(solid.shape, entities)
     context = add_context(entities)
     _add_color(solid.color, body, context, entities)
@@ -43,8 +43,8 @@ def solid_to_step(solid: Solid) -> bytes:
     return entities.file(solid.name)
 
 
-def _add_color(color: str, body: int, context: int, entities: Entities) -> None:
-    red, green, blue = (real(int(color[i : i + 2], 16) / 255) for i in (1, 3, 5))
+def _add_color(color: str, body: int, context: int, entities: StepEntities) -> None:
+    red, green, blue = (format_real(int(color[i : i + 2], 16) / 255) for i in (1, 3, 5))
     number = entities.add(f"COLOUR_RGB('',{red},{green},{blue})")
     number = entities.add(f"FILL_AREA_STYLE_COLOUR('',#{number})")
     number = entities.add(f"FILL_AREA_STYLE('',(#{number}))")
@@ -57,7 +57,7 @@ def _add_color(color: str, body: int, context: int, entities: Entities) -> None:
 
 
 @contextmanager
-def _silent() -> Any:
+def _silenced_output() -> Any:
     """The kernel's reader reports every file on standard output; it must not."""
     from OCP.Message import Message
 
@@ -76,7 +76,7 @@ def read_step(data: bytes) -> Any:
     """The file's shape (TopoDS_Shape), mm, as the kernel's own reader finds it."""
     from OCP.STEPControl import STEPControl_Reader
 
-    with _silent(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
+    with _silenced_output(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
         path = Path(folder) / "part.step"
         path.write_bytes(data)
         reader = STEPControl_Reader()

@@ -18,7 +18,7 @@ _TAIL = "ENDSEC;\nEND-ISO-10303-21;\n"
 
 # What every file begins with; all its products share it.
 CONTEXT, _LENGTH, _ANGLE, _SOLID_ANGLE, _UNCERTAINTY = 2, 3, 4, 5, 6
-SHARED = (
+SHARED_ENTITIES = (
     f"APPLICATION_PROTOCOL_DEFINITION('international standard',"
     f"'ap242_managed_model_based_3d_engineering',2013,#{CONTEXT})",
     "APPLICATION_CONTEXT('Managed model based 3d engineering')",
@@ -35,7 +35,7 @@ Direction = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Product:
+class StepProduct:
     """Numbers of a product's definition, its shape's representation and the origin in it."""
 
     definition: int
@@ -43,19 +43,19 @@ class Product:
     origin: int
 
     @classmethod
-    def ending_at(cls, last: int) -> Product:
+    def ending_at(cls, last: int) -> StepProduct:
         """The one whose last entity is this: what ``add_product`` adds is always as many."""
         return cls(last - 2, last - 8, last - 9)
 
 
-class Entities:
-    """A file's entities, numbered one after the other from 1; the first are ``SHARED``."""
+class StepEntities:
+    """A file's entities, numbered one after the other from 1; the first are ``SHARED_ENTITIES``."""
 
     def __init__(self) -> None:
         self.last = 0
         self._texts: list[str] = []
         self._known: dict[str, int] = {}
-        for text in SHARED:
+        for text in SHARED_ENTITIES:
             self.add(text)
 
     def add(self, text: str) -> int:
@@ -77,10 +77,10 @@ class Entities:
         self.last = last
 
     def point(self, x: float, y: float, z: float) -> int:
-        return self.share(f"CARTESIAN_POINT('',({real(x)},{real(y)},{real(z)}))")
+        return self.share(f"CARTESIAN_POINT('',({format_real(x)},{format_real(y)},{format_real(z)}))")
 
     def direction(self, x: float, y: float, z: float) -> int:
-        return self.share(f"DIRECTION('',({real(x)},{real(y)},{real(z)}))")
+        return self.share(f"DIRECTION('',({format_real(x)},{format_real(y)},{format_real(z)}))")
 
     def axes(self, point: Direction, z: Direction, x: Direction) -> int:
         """A place, its z and its x axis."""
@@ -92,12 +92,12 @@ class Entities:
         return "".join([_HEAD.format(name=name), *self._texts, _TAIL]).encode("ascii")
 
 
-def data_of(file: bytes) -> str:
-    """The entities of a file that ``Entities.file`` wrote."""
+def data_section(file: bytes) -> str:
+    """The entities of a file that ``StepEntities.file`` wrote."""
     return file.decode("ascii").partition("\nDATA;\n")[2].removesuffix(_TAIL)
 
 
-def real(value: float) -> str:
+def format_real(value: float) -> str:
     """Twelve digits, always a point; a zero has no sign."""
     text = f"{value:.12G}"
     if "E" in text:
@@ -108,13 +108,13 @@ def real(value: float) -> str:
     return "0." if text == "-0" else f"{text}."
 
 
-def references(numbers: Sequence[int]) -> str:
+def format_references(numbers: Sequence[int]) -> str:
     """A list of entities, in lines of a moderate length."""
     lines = (numbers[start : start + _IN_A_LINE] for start in range(0, len(numbers), _IN_A_LINE))
     return ",\n".join(",".join(f"#{number}" for number in line) for line in lines)
 
 
-def add_context(entities: Entities) -> int:
+def add_context(entities: StepEntities) -> int:
     """A space of its own for one product's shape, in mm."""
     return entities.add(
         f"( GEOMETRIC_REPRESENTATION_CONTEXT(3) GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{_UNCERTAINTY})) "
@@ -123,10 +123,12 @@ def add_context(entities: Entities) -> int:
     )
 
 
-def add_product(name: str, kind: str, items: Sequence[int], context: int, entities: Entities) -> Product:
+def add_product(
+    name: str, kind: str, items: Sequence[int], context: int, entities: StepEntities
+) -> StepProduct:
     """A product whose shape is a representation of ``kind`` of these items and of its own origin."""
     origin = entities.axes((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    representation = entities.add(f"{kind}('',({references((origin, *items))}),#{context})")
+    representation = entities.add(f"{kind}('',({format_references((origin, *items))}),#{context})")
     of_product = entities.add(f"PRODUCT_CONTEXT('',#{CONTEXT},'mechanical')")
     product = entities.add(f"PRODUCT('{name}','{name}','',(#{of_product}))")
     entities.add(f"PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,(#{product}))")
@@ -135,6 +137,6 @@ def add_product(name: str, kind: str, items: Sequence[int], context: int, entiti
     definition = entities.add(f"PRODUCT_DEFINITION('design','',#{formation},#{view})")
     shape = entities.add(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})")
     entities.add(f"SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation})")
-    added = Product(definition, representation, origin)
-    assert added == Product.ending_at(entities.last)
+    added = StepProduct(definition, representation, origin)
+    assert added == StepProduct.ending_at(entities.last)
     return added

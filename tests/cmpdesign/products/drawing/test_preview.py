@@ -9,7 +9,7 @@ import pytest
 from cmpdesign.design.design import Design, load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.drawing.preview import LONG_SIDE_PX, MARGIN_PX, TITLE_PX, draw_preview, preview_png
 
@@ -18,7 +18,7 @@ def layout(pattern: str, **more: object) -> Layout:
     return build_layout(Design(pattern=pattern, layers=15, pitch_mm=1.5, **more))
 
 
-@pytest.mark.parametrize("pattern", list(patterns()))
+@pytest.mark.parametrize("pattern", list(registered_patterns()))
 def test_every_cell_has_its_color_at_its_centre(pattern: str) -> None:
     built = layout(pattern)
     image = draw_preview(built)

@@ -12,7 +12,7 @@ import svgelements
 from cmpdesign.design.design import Design, load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
-from cmpdesign.patterns import patterns
+from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.drawing.svg import layout_to_svg, scale_length_mm
 
@@ -39,7 +39,7 @@ def corners_mm(path: svgelements.Path) -> np.ndarray:
     return np.array([(p.end.x, p.end.y) for p in path[:-1]]) / PX_PER_MM
 
 
-@pytest.mark.parametrize("pattern", list(patterns()))
+@pytest.mark.parametrize("pattern", list(registered_patterns()))
 def test_every_cell_is_where_the_layout_says(pattern: str) -> None:
     built = layout(pattern, rotation_deg=11)
     groups = read(layout_to_svg(built))

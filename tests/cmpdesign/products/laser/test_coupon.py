@@ -15,13 +15,13 @@ from typer.testing import CliRunner, Result
 from cmpdesign.cli import app
 from cmpdesign.design.design import load_design
 from cmpdesign.products.laser.coupon.design import Coupon, coupon_to_json, design_coupon, load_coupon
-from cmpdesign.products.laser.coupon.job import coupon as coupon_drawing
+from cmpdesign.products.laser.coupon.job import coupon_job as coupon_drawing
 from cmpdesign.products.laser.coupon.photo import read_coupon
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
-from cmpdesign.products.laser.setup import complete
+from cmpdesign.products.laser.setup import complete_setup
 from tests.support.laser_tools import coupon_photo, groups_of, run_gcode
 
-PIECE = design_coupon(complete(load_design("honeycomb").laser))
+PIECE = design_coupon(complete_setup(load_design("honeycomb").laser))
 CUT = {patch.name: (0.10 + 0.02 * i, 0.12 + 0.015 * i) for i, patch in enumerate(PIECE.patches)}
 
 
@@ -57,7 +57,7 @@ def test_the_kerf_is_read_back(conditions: dict[str, Any]) -> None:
 
 
 def test_the_drawing_cuts_what_the_file_says() -> None:
-    setup = complete(load_design("honeycomb").laser)
+    setup = complete_setup(load_design("honeycomb").laser)
     drawing, text = coupon_drawing(setup)
     assert text == coupon_to_json(PIECE)
     names = [one.name for one in drawing.passes]
@@ -65,7 +65,7 @@ def test_the_drawing_cuts_what_the_file_says() -> None:
     origin = drawing.fiducials_mm[0]
     for patch, one in zip(PIECE.patches, drawing.passes[1:], strict=False):
         assert (one.power_percent, one.repeats) == (patch.power_percent, patch.passes)
-        strokes = groups_of(run_gcode(drawing_to_gcode(drawing.only(one))))[: len(patch.openings)]
+        strokes = groups_of(run_gcode(drawing_to_gcode(drawing.with_one_pass(one))))[: len(patch.openings)]
         for opening, stroke in zip(patch.openings, strokes, strict=True):
             low, high = stroke[:, :2].min(axis=0) - origin, stroke[:, :2].max(axis=0) - origin
             np.testing.assert_allclose((low + high) / 2, (opening.x_mm, opening.y_mm), atol=1e-3)

@@ -17,12 +17,12 @@ import pytest
 import svgelements
 
 from cmpdesign.cli import app
-from cmpdesign.products.laser.formats.drawing import Drawing, job_drawing
+from cmpdesign.products.laser.formats.drawing import LaserDrawing, job_drawing
 from cmpdesign.products.laser.formats.dxf import drawing_to_dxf
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
 from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
-from cmpdesign.products.laser.job import Job
+from cmpdesign.products.laser.job import LaserJob
 from tests.support.laser_tools import Points, groups_of, made_job, run_gcode
 
 WITH_OUTLINE = {"laser__outline": "true", "laser__passes": "2"}
@@ -35,13 +35,13 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 @cache
-def drawn(number: int) -> tuple[Job, Drawing]:
+def drawn(number: int) -> tuple[LaserJob, LaserDrawing]:
     name, options = CASES[number]
     job = made_job(name, **options)
     return job, job_drawing(job)
 
 
-def same_paths(found: list[Points], drawing: Drawing, name: str) -> None:
+def same_paths(found: list[Points], drawing: LaserDrawing, name: str) -> None:
     """The same points in the same order, to a tenth of a micrometre."""
     expected = [path for one in drawing.passes if one.name == name for path in one.walls]
     assert len(found) == len(expected) > 0
@@ -157,7 +157,7 @@ def test_lightburn_fills_a_hatched_pocket() -> None:
 def test_gcode_burns_the_paths(case: int) -> None:
     job, drawing = drawn(case)
     for one in job.passes:
-        text = drawing_to_gcode(drawing.only(one))
+        text = drawing_to_gcode(drawing.with_one_pass(one))
         burn = run_gcode(text)
         assert burn.ended_dark and not burn.pauses
         assert burn.feeds == {60 * one.speed_mm_s}
@@ -186,7 +186,7 @@ def test_gcode_waits_for_filling_between_passes() -> None:
 
 def test_gcode_of_a_pocket_turns_its_lines() -> None:
     job = made_job(laser__mode="pocket", laser__passes="3", laser__hatch_turn_deg="60", layers="2")
-    burn = run_gcode(drawing_to_gcode(job_drawing(job).only(job.passes[1])))
+    burn = run_gcode(drawing_to_gcode(job_drawing(job).with_one_pass(job.passes[1])))
     lines = [stroke for stroke in groups_of(burn) if len(stroke) == 1]
     angles = {
         round(np.degrees(np.arctan2(y1 - y0, x1 - x0)) % 180) % 180
@@ -199,7 +199,7 @@ def test_gcode_of_a_pocket_turns_its_lines() -> None:
 def test_pygcode_reads_it() -> None:
     """Another interpreter agrees on every place."""
     job, drawing = drawn(0)
-    text = drawing_to_gcode(drawing.only(job.passes[-2]))
+    text = drawing_to_gcode(drawing.with_one_pass(job.passes[-2]))
     places = []
     for line in text.splitlines():
         for code in pygcode.Line(line).block.gcodes:

@@ -19,16 +19,16 @@ from cmpdesign.cli import app
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.laser.as_made_svg import as_made_svg
-from cmpdesign.products.laser.figures import timing
+from cmpdesign.products.laser.figures import pass_timing
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
-from cmpdesign.products.laser.job import Job
+from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.library import load_machine, load_material, machines, materials
-from cmpdesign.products.laser.paths.order import ordered, shortest_pause
-from cmpdesign.products.laser.paths.strokes import ragged
+from cmpdesign.products.laser.paths.order import order_cells, shortest_pause
+from cmpdesign.products.laser.paths.strokes import ragged_strokes
 from cmpdesign.products.laser.paths.timing import move_times_s
-from cmpdesign.products.laser.paths.tour import length_mm, short_tour
-from cmpdesign.products.laser.refuse import duplicates, open_paths
+from cmpdesign.products.laser.paths.tour import find_short_tour, tour_length_mm
+from cmpdesign.products.laser.refuse import count_duplicate_paths, count_open_paths
 from extractor import Extractor
 from extractor.layout.layout_file import parse_layout
 from tests.support.laser_tools import Points, groups_of, made_job, run_gcode
@@ -121,11 +121,11 @@ def test_bad_jobs_are_refused(settings_: list[str], expected: str, tmp_path: Pat
 
 def test_double_and_flat_paths_are_found() -> None:
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
-    twice = ragged([square, np.roll(square, 2, axis=0)[::-1], square + 0.01], [0, 1, 2], closed=True)
-    assert duplicates(twice) == 1 and open_paths(twice) == 0
-    flat = ragged([square, np.array([(0, 0), (1, 1), (2, 2)], dtype=float)], [0, 1], closed=True)
-    assert open_paths(flat) == 1 and duplicates(flat) == 0
-    assert open_paths(ragged([square], [0], closed=False)) == 1
+    twice = ragged_strokes([square, np.roll(square, 2, axis=0)[::-1], square + 0.01], [0, 1, 2], closed=True)
+    assert count_duplicate_paths(twice) == 1 and count_open_paths(twice) == 0
+    flat = ragged_strokes([square, np.array([(0, 0), (1, 1), (2, 2)], dtype=float)], [0, 1], closed=True)
+    assert count_open_paths(flat) == 1 and count_duplicate_paths(flat) == 0
+    assert count_open_paths(ragged_strokes([square], [0], closed=False)) == 1
 
 
 def test_every_machine_and_material_reads_and_names_its_sources() -> None:
@@ -171,7 +171,7 @@ def test_own_machine_and_material_files(tmp_path: Path) -> None:
 def test_a_tour_visits_every_cell_once(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     entries = rng.uniform(0, 20, (count, 1, 2)) + rng.uniform(0, 0.5, (count, 3, 2))
-    order, entry = short_tour(entries)
+    order, entry = find_short_tour(entries)
     assert sorted(order.tolist()) == list(range(count))
     assert ((entry >= 0) & (entry < 3)).all()
 
@@ -182,13 +182,13 @@ def test_a_small_tour_is_the_shortest() -> None:
     rng = np.random.default_rng(5)
     for _ in range(5):
         entries = rng.uniform(0, 10, (6, 1, 2)) + rng.uniform(-0.5, 0.5, (6, 2, 2))
-        order, entry = short_tour(entries)
+        order, entry = find_short_tour(entries)
         ways = [
-            length_mm(entries, np.array(p), np.array(q))
+            tour_length_mm(entries, np.array(p), np.array(q))
             for p in permutations(range(6))
             for q in product(range(2), repeat=6)
         ]
-        assert length_mm(entries, order, entry) <= 1.12 * min(ways)
+        assert tour_length_mm(entries, order, entry) <= 1.12 * min(ways)
 
 
 def test_orders() -> None:
@@ -197,10 +197,13 @@ def test_orders() -> None:
     assert one.cavities is not None
     centres, found = one.cavities.nominal_mm.mean(axis=1), {}
     for name in ("travel", "heat", "given"):
-        order, entry = ordered(one.cavities.entries_mm, name)  # type: ignore[arg-type]
+        order, entry = order_cells(one.cavities.entries_mm, name)  # type: ignore[arg-type]
         assert sorted(order.tolist()) == list(range(len(centres)))
         steps = np.arange(len(order), dtype=float)
-        found[name] = length_mm(one.cavities.entries_mm, order, entry), shortest_pause(order, centres, steps)
+        found[name] = (
+            tour_length_mm(one.cavities.entries_mm, order, entry),
+            shortest_pause(order, centres, steps),
+        )
     assert found["travel"][0] <= found["given"][0] < 0.5 * found["heat"][0]
     assert found["heat"][1] >= 4 > found["travel"][1] == 1
     assert order.tolist() == list(range(len(order)))
@@ -211,7 +214,7 @@ def test_times_are_those_of_the_moves() -> None:
     assert move_times_s(np.array([0.1]), 50.0, 1000.0)[0] == pytest.approx(0.02)
     job = made_job(laser__passes="3")
     one, machine = job.cell_passes[0], job.setup.machine
-    burn = run_gcode(drawing_to_gcode(job_drawing(job).only(one)))
+    burn = run_gcode(drawing_to_gcode(job_drawing(job).with_one_pass(one)))
 
     def length(moves: Any) -> Any:
         return np.hypot(*(np.array(moves)[:, 2:4] - np.array(moves)[:, :2]).T)
@@ -219,12 +222,12 @@ def test_times_are_those_of_the_moves() -> None:
     accel = machine.acceleration_mm_s2.value
     total = move_times_s(length(burn.burnt), one.speed_mm_s, accel).sum()
     total += move_times_s(length(burn.dark), machine.travel_mm_s.value, accel).sum()
-    found = timing(job, one)
+    found = pass_timing(job, one)
     assert found.time_s == pytest.approx(total, abs=2e-3)
     assert found.burn_mm == pytest.approx(length(burn.burnt).sum(), abs=1e-2)
 
 
-def drawn_from_gcode(job: Job) -> str:
+def drawn_from_gcode(job: LaserJob) -> str:
     """The pattern in its inks, from nothing but each pass' program and the kerf."""
     low, high = job.outline_mm.min(axis=0), job.outline_mm.max(axis=0)
     radii = np.array([job.front.x_mm, job.front.y_mm])
@@ -237,7 +240,7 @@ def drawn_from_gcode(job: Job) -> str:
     shapes.append(path(job.outline_mm, inks["black"]))
     for one in job.cell_passes:
         assert one.color is not None
-        for stroke in groups_of(run_gcode(drawing_to_gcode(job_drawing(job).only(one)))):
+        for stroke in groups_of(run_gcode(drawing_to_gcode(job_drawing(job).with_one_pass(one)))):
             line = shapely.LineString(np.vstack([stroke[:, :2], stroke[-1:, 2:]]) / radii)
             rim = shapely.buffer(line, 1.0, quad_segs=16).exterior
             shapes.append(path(shapely.get_coordinates(rim) * radii, inks[COLORS[one.color]]))
@@ -247,7 +250,7 @@ def drawn_from_gcode(job: Job) -> str:
     return head + "".join(shapes) + "</svg>"
 
 
-def seen(svg: str, job: Job) -> tuple[Points, Points, int]:
+def seen(svg: str, job: LaserJob) -> tuple[Points, Points, int]:
     """Extracted and true marker places in px of a rendered drawing, and how many ids are wrong."""
     png = resvg_py.svg_to_bytes(
         svg_string=svg, dpi=int(25.4 * PX_PER_MM), skip_system_fonts=True, background="#808080"

@@ -11,14 +11,19 @@ from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
 from cmpdesign.patterns.colors import BLACK
-from cmpdesign.products.laser.as_made import as_made
+from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
-from cmpdesign.products.laser.paths.beam import Beam
-from cmpdesign.products.laser.paths.cavities import Cavities, burnt_areas_mm2, burnt_outlines_mm, cavities
-from cmpdesign.products.laser.paths.corners import balanced_spur, sliver, spur_gain
-from cmpdesign.products.laser.paths.fill import hatch, rings
-from cmpdesign.products.laser.paths.kerf import inset, inset_outline, outset_outline, polygon_areas
+from cmpdesign.products.laser.paths.beam import BeamFootprint
+from cmpdesign.products.laser.paths.cavities import (
+    Cavities,
+    burnt_areas_mm2,
+    burnt_outlines_mm,
+    make_cavities,
+)
+from cmpdesign.products.laser.paths.corners import balanced_spur_length, corner_residue_area, spur_area
+from cmpdesign.products.laser.paths.fill import hatch_strokes, ring_strokes
+from cmpdesign.products.laser.paths.kerf import inset_outline, inset_polygons, outset_outline, polygon_areas
 from tests.support.laser_tools import PIXEL_MM, Points, filled, groups_of, made_job, run_gcode, swept
 
 TRIANGLE = 1.5 * np.array([(0, 0), (1, 0), (0.5, np.sqrt(0.75))])
@@ -33,7 +38,7 @@ def triangles(draw: st.DrawFn) -> Points:
     return (TRIANGLE @ turn.T * (1, aspect))[None]
 
 
-def by_shapely(made: Cavities, beam: Beam) -> shapely.Polygon:
+def by_shapely(made: Cavities, beam: BeamFootprint) -> shapely.Polygon:
     """The burn of the first cavity, by a general-purpose buffer of the path and its spurs."""
     path = shapely.Polygon(beam.units(made.path_mm[0]))
     ends = [(beam.units(p), beam.units(t)) for p, t in zip(made.path_mm[0], made.tip_mm[0], strict=True)]
@@ -45,8 +50,8 @@ def by_shapely(made: Cavities, beam: Beam) -> shapely.Polygon:
 @settings(max_examples=40, deadline=None)
 @given(triangles(), st.floats(0.02, 0.25), st.floats(0.02, 0.25), st.sampled_from(["plain", "overcut"]))
 def test_burnt_areas_and_outlines_are_exact(cell: Points, kerf_x: float, kerf_y: float, corner: str) -> None:
-    front = Beam.of_kerf(kerf_x, kerf_y)
-    made = cavities(np.arange(1), cell, front, corner)  # type: ignore[arg-type]
+    front = BeamFootprint.of_kerf(kerf_x, kerf_y)
+    made = make_cavities(np.arange(1), cell, front, corner)  # type: ignore[arg-type]
     for beam in (front, front.at_depth(0.2, 1.0)):
         expected = by_shapely(made, beam)
         assert burnt_areas_mm2(made, beam)[0] == pytest.approx(expected.area, rel=1e-4)
@@ -59,13 +64,13 @@ def test_burnt_areas_and_outlines_are_exact(cell: Points, kerf_x: float, kerf_y:
 @settings(max_examples=40, deadline=None)
 @given(triangles(), st.floats(0.02, 0.25), st.floats(0.02, 0.25))
 def test_the_path_touches_every_side_from_inside(cell: Points, kerf_x: float, kerf_y: float) -> None:
-    beam = Beam.of_kerf(kerf_x, kerf_y)
-    path, exists = inset(cell, beam)
+    beam = BeamFootprint.of_kerf(kerf_x, kerf_y)
+    path, exists = inset_polygons(cell, beam)
     assert exists.all()
     general = inset_outline(cell[0], beam)
     assert len(general) == 1
     assert shapely.hausdorff_distance(shapely.LinearRing(general[0]), shapely.LinearRing(path[0])) < 1e-9
-    burnt = shapely.Polygon(burnt_outlines_mm(cavities(np.arange(1), cell, beam, "plain"), beam)[0])
+    burnt = shapely.Polygon(burnt_outlines_mm(make_cavities(np.arange(1), cell, beam, "plain"), beam)[0])
     nominal = shapely.Polygon(cell[0])
     outside = shapely.distance(shapely.points(shapely.get_coordinates(burnt)), nominal)
     assert outside.max() < 1e-9
@@ -76,15 +81,15 @@ def test_the_path_touches_every_side_from_inside(cell: Points, kerf_x: float, ke
 @given(st.floats(0.1, 3.0))
 def test_a_balanced_spur_burns_what_it_leaves(angle: float) -> None:
     half = np.array([angle / 2])
-    length = balanced_spur(half)
-    assert spur_gain(half, length) == pytest.approx(sliver(half), rel=1e-6, abs=1e-12)
+    length = balanced_spur_length(half)
+    assert spur_area(half, length) == pytest.approx(corner_residue_area(half), rel=1e-6, abs=1e-12)
     assert 0 <= length[0] < 1 / np.sin(half[0])
 
 
 def test_three_corners_lose_what_the_formula_says() -> None:
     for radius in (0.015, 0.05, 0.125):
-        beam = Beam(radius, radius)
-        made = cavities(np.arange(1), TRIANGLE[None], beam, "plain")
+        beam = BeamFootprint(radius, radius)
+        made = make_cavities(np.arange(1), TRIANGLE[None], beam, "plain")
         lost = polygon_areas(TRIANGLE[None]) - burnt_areas_mm2(made, beam)
         assert lost[0] == pytest.approx(2.0546 * radius**2, rel=1e-3)
 
@@ -97,11 +102,11 @@ def test_three_corners_lose_what_the_formula_says() -> None:
 def test_areas_are_nominal(name: str, corner: str, kerf_mm: float) -> None:
     """Within 0.6 % of the nominal cells of 1.5 mm: plain up to 0.1 mm, overcut up to 0.25 mm of kerf."""
     job = made_job(name, laser__corner=corner, laser__kerf_mm=str(kerf_mm), laser__depth_mm="0.2mm")
-    for one in as_made(job):
+    for one in measure_as_made(job):
         assert abs(one.front.area_error_percent) < 0.6
     if name == "honeycomb" and corner == "plain":
         wider = made_job(name, laser__corner=corner, laser__kerf_mm="0.25", laser__depth_mm="0.2mm")
-        assert as_made(wider)[0].front.area_error_percent == pytest.approx(
+        assert measure_as_made(wider)[0].front.area_error_percent == pytest.approx(
             -100 * 2.0546 * 0.125**2 / 0.97428, rel=1e-3
         )
 
@@ -109,7 +114,7 @@ def test_areas_are_nominal(name: str, corner: str, kerf_mm: float) -> None:
 def test_corner_losses_are_as_stated() -> None:
     """Up to half a kerf of a 60 degree corner by plain paths, about two thirds of that with spurs."""
     plain, spurred = (
-        as_made(made_job(laser__corner=c, laser__kerf_mm="0.2", laser__depth_mm="0.1"))[0].front
+        measure_as_made(made_job(laser__corner=c, laser__kerf_mm="0.2", laser__depth_mm="0.1"))[0].front
         for c in ("plain", "overcut")
     )
     assert plain.corner_loss_mm == pytest.approx(0.1, abs=1e-6)
@@ -129,11 +134,11 @@ def test_predictions_agree_with_a_raster_sweep_of_the_gcode(
     """Area within 0.5 % and webs within 3 micrometres, at both faces, of pixels of 2 micrometres."""
     kerf = {"laser__kerf_x_mm": str(kerf_mm[0]), "laser__kerf_y_mm": str(kerf_mm[1])}
     job = made_job(laser__corner=corner, layers="2", laser__depth_mm="0.2", laser__taper_deg="1", **kerf)
-    drawing, figures = job_drawing(job), as_made(job)
+    drawing, figures = job_drawing(job), measure_as_made(job)
     for face, beam in (("front", job.front), ("back", job.back)):
         filled_before: list[Points] = []
         for one, predicted in zip(job.cell_passes, figures, strict=True):
-            strokes = groups_of(run_gcode(drawing_to_gcode(drawing.only(one))))
+            strokes = groups_of(run_gcode(drawing_to_gcode(drawing.with_one_pass(one))))
             swept_cells = [pixels_of(stroke, beam.kerf_mm) for stroke in strokes]
             figure = getattr(predicted, face)
             nominal = polygon_areas(one.cavities.nominal_mm).sum()  # type: ignore[union-attr]
@@ -170,9 +175,9 @@ def smallest_gap(one: Points, others: list[Points]) -> float:
 @pytest.mark.parametrize("angle_deg", [0.0, 67.0, 134.0])
 def test_hatches_clear_the_pocket_and_stay_inside(angle_deg: float) -> None:
     cells = np.concatenate([TRIANGLE[None], TRIANGLE[None] @ np.diag([-1, -1])])
-    beam = Beam.of_kerf(0.16, 0.12)
-    made = cavities(np.arange(2), cells, beam, "plain")
-    lines = hatch(made.path_mm, 0.1, angle_deg)
+    beam = BeamFootprint.of_kerf(0.16, 0.12)
+    made = make_cavities(np.arange(2), cells, beam, "plain")
+    lines = hatch_strokes(made.path_mm, 0.1, angle_deg)
     assert set(lines.owner.tolist()) == {0, 1} and not lines.closed
     for cell in range(2):
         segments = [line for line, owner in zip(lines, lines.owner, strict=True) if owner == cell]
@@ -192,9 +197,9 @@ def test_hatches_clear_the_pocket_and_stay_inside(angle_deg: float) -> None:
 
 
 def test_rings_clear_the_pocket_from_the_inside_out() -> None:
-    beam = Beam.of_kerf(0.16, 0.12)
-    made = cavities(np.arange(2), np.concatenate([TRIANGLE[None], TRIANGLE[None] + 3]), beam, "plain")
-    inner = rings(made.path_mm, 0.06)
+    beam = BeamFootprint.of_kerf(0.16, 0.12)
+    made = make_cavities(np.arange(2), np.concatenate([TRIANGLE[None], TRIANGLE[None] + 3]), beam, "plain")
+    inner = ring_strokes(made.path_mm, 0.06)
     assert inner.closed and list(inner.owner) == sorted(inner.owner)
     areas = [shapely.Polygon(ring).area for ring, owner in zip(inner, inner.owner, strict=True) if owner == 0]
     assert areas == sorted(areas) and len(areas) > 3
@@ -205,7 +210,7 @@ def test_rings_clear_the_pocket_from_the_inside_out() -> None:
 
 
 def test_an_outline_is_cut_from_outside() -> None:
-    beam = Beam.of_kerf(0.2, 0.1)
+    beam = BeamFootprint.of_kerf(0.2, 0.1)
     star = np.array(
         [
             (np.cos(a) * r, np.sin(a) * r)

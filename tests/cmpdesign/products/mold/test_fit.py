@@ -12,14 +12,14 @@ import pytest
 from cmpdesign import build_layout, load_design
 from cmpdesign.products.mold import make
 from cmpdesign.products.mold.checks import facet_sag_mm
-from cmpdesign.products.mold.pad import _cavities
-from cmpdesign.products.mold.parts import Part, parts_of
-from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, bosses
-from cmpdesign.products.mold.shapes.dished import dished_sheet
-from cmpdesign.products.mold.solids.measure import distance_mm, of_kind, overlap_mm3, volume_mm3
-from cmpdesign.products.mold.solids.shells import Slab, slab_solid
-from cmpdesign.products.mold.stack.stack import Stack, stack_of
-from cmpdesign.products.mold.step.assembly import Place
+from cmpdesign.products.mold.pad import _cavity_dish
+from cmpdesign.products.mold.parts import Part, make_parts
+from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, boss_features
+from cmpdesign.products.mold.shapes.dished import dished_sheet_solid
+from cmpdesign.products.mold.solids.measure import distance_mm, overlap_mm3, subshapes, volume_mm3
+from cmpdesign.products.mold.solids.shells import Slab, make_slab_solid
+from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
+from cmpdesign.products.mold.step.assembly import PartPlace
 
 DESIGNS = {
     "honeycomb": {"layers": "2", "mold.clearance_mm": "0.16"},
@@ -38,10 +38,10 @@ GROUPS = ("1-base", "2-emboss-red", "3-fill-red", "-cover")
 @cache
 def parts(name: str) -> dict[str, Part]:
     design = load_design("honeycomb", DESIGNS[name])
-    return {part.name: part for part in parts_of(stack_of(design, build_layout(design)))}
+    return {part.name: part for part in make_parts(make_stack(design, build_layout(design)))}
 
 
-def stack(name: str) -> Stack:
+def stack(name: str) -> MoldStack:
     return parts(name)["base"].stack
 
 
@@ -58,18 +58,18 @@ def put(name: str, part: str, xyz_mm: tuple[float, float, float], turned: bool) 
     return BRepBuilderAPI_Transform(parts(name)[part].solid, move, True).Shape()
 
 
-def groups(name: str) -> dict[str, list[Place]]:
+def groups(name: str) -> dict[str, list[PartPlace]]:
     """The places of each step, moved from where they stand side by side to the mold's own frame."""
     found = {}
-    for group in make.assembly_of(stack(name), list(parts(name).values())).groups:
+    for group in make.make_assembly(stack(name), list(parts(name).values())).groups:
         x = group.places[0].xyz_mm[0]
-        moved = [Place(p.part, p.name, (p.xyz_mm[0] - x, *p.xyz_mm[1:]), p.turned) for p in group.places]
+        moved = [PartPlace(p.part, p.name, (p.xyz_mm[0] - x, *p.xyz_mm[1:]), p.turned) for p in group.places]
         if group.name.endswith(GROUPS):
             found[group.name] = moved
     return found
 
 
-def solid(name: str, place: Place) -> Any:
+def solid(name: str, place: PartPlace) -> Any:
     x, y, z = place.xyz_mm
     return put(name, place.part, (round(x, 9), y, z), place.turned)
 
@@ -87,7 +87,7 @@ def near(shape: Any, other: Any, reach_mm: float) -> Any:
     around.Enlarge(reach_mm)
     builder, compound = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(compound)
-    for face in of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+    for face in subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         box = Bnd_Box()
         BRepBndLib.Add_s(face, box)
         if not box.IsOut(around):
@@ -99,7 +99,7 @@ def standing_wall(shape: Any) -> Any:
     """A pin's longest face: its cylinder without the chamfered ends."""
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    return max(of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE), key=area_mm2)
+    return max(subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE), key=area_mm2)
 
 
 def area_mm2(face: Any) -> float:
@@ -170,7 +170,7 @@ def land_mm(shape: Any, lowest: bool) -> float:
     from OCP.TopoDS import TopoDS
 
     areas: dict[float, float] = {}
-    for face in of_kind(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+    for face in subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         surface = BRepAdaptor_Surface(TopoDS.Face(face), False)
         if surface.GetType() != GeomAbs_SurfaceType.GeomAbs_Plane:
             continue
@@ -189,10 +189,10 @@ def black_layer(name: str) -> Any:
     mold = stack(name)
     edges, thickness = mold.edges(1), mold.thickness_mm[1]
     if mold.crown is not None:
-        layer = dished_sheet(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), _cavities(mold))
+        layer = dished_sheet_solid(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), _cavity_dish(mold))
     else:
-        pairs = [(b.tip, b.root) for color in mold.colors for b in bosses(mold, mold.cells(color))]
-        layer = slab_solid(Slab(edges[0], 0.0, thickness, many_through=pairs, outer_top=edges[1]))
+        pairs = [(b.tip, b.root) for color in mold.colors for b in boss_features(mold, mold.cells(color))]
+        layer = make_slab_solid(Slab(edges[0], 0.0, thickness, many_through=pairs, outer_top=edges[1]))
     return moved_up(layer, mold.z_base_mm)
 
 
@@ -231,7 +231,7 @@ def test_stencil_holes_keep_their_clearance_to_the_cavities(name: str) -> None:
     assert wanted * slope - 1e-6 <= found <= wanted + 1e-6
 
 
-def hole_walls(stencil: Any, mold: Stack) -> Any:
+def hole_walls(stencil: Any, mold: MoldStack) -> Any:
     """The walls of its holes over the pattern: the steep faces there."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRep import BRep_Builder
@@ -244,7 +244,7 @@ def hole_walls(stencil: Any, mold: Stack) -> Any:
     (left, bottom), (right, top) = mold.marker_xy_mm.min(axis=0), mold.marker_xy_mm.max(axis=0)
     builder, compound = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(compound)
-    for face in of_kind(stencil, TopAbs_ShapeEnum.TopAbs_FACE):
+    for face in subshapes(stencil, TopAbs_ShapeEnum.TopAbs_FACE):
         surface = BRepAdaptor_Surface(TopoDS.Face(face), False)
         steep = surface.GetType() != GeomAbs_SurfaceType.GeomAbs_Plane
         steep = steep or abs(surface.Plane().Axis().Direction().Z()) < 0.3
@@ -260,7 +260,7 @@ def hole_walls(stencil: Any, mold: Stack) -> Any:
 @pytest.mark.parametrize("name", ["honeycomb", "square"])
 def test_bosses_stand_on_the_base_layer(name: str) -> None:
     mold = stack(name)
-    layer = slab_solid(Slab(mold.edges(0)[0], 0.0, mold.z_base_mm, outer_top=mold.edges(0)[1]))
+    layer = make_slab_solid(Slab(mold.edges(0)[0], 0.0, mold.z_base_mm, outer_top=mold.edges(0)[1]))
     plate = put(name, "boss-red", (0.0, 0.0, mold.z_marker_mm), True)
     assert distance_mm(near(plate, layer, 0.1), layer) == pytest.approx(0, abs=1e-7)
     assert overlap_mm3(plate, layer) == pytest.approx(0, abs=1e-9)
@@ -283,11 +283,11 @@ def test_bosses_sink_into_a_crowned_base_layer_by_the_facets_sag_at_most(name: s
 def test_plates_volume_is_what_the_cavities_lack() -> None:
     mold = stack("honeycomb")
     plain = Slab(mold.edges(1)[0], 0.0, mold.thickness_mm[1], outer_top=mold.edges(1)[1])
-    missing = volume_mm3(slab_solid(plain)) - volume_mm3(black_layer("honeycomb"))
+    missing = volume_mm3(make_slab_solid(plain)) - volume_mm3(black_layer("honeycomb"))
     standing = 0.0
     for color in ("red", "green", "blue", "white"):
         slab = parts("honeycomb")[f"boss-{color}"].slab
         assert slab is not None
         bare = Slab(slab.outer, slab.bottom_mm, slab.top_mm, slab.through)
-        standing += volume_mm3(parts("honeycomb")[f"boss-{color}"].solid) - volume_mm3(slab_solid(bare))
+        standing += volume_mm3(parts("honeycomb")[f"boss-{color}"].solid) - volume_mm3(make_slab_solid(bare))
     assert missing == pytest.approx(standing, rel=1e-9)

@@ -11,26 +11,26 @@ import numpy as np
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.products.mesh.picture import ABOVE, BELOW, View, draw_meshes
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
-from cmpdesign.products.mesh.triangles import Mesh
+from cmpdesign.products.mesh.triangles import TriangleMesh
 from cmpdesign.products.mold import meshes as product
-from cmpdesign.products.mold.job_sheet import job_sheet
-from cmpdesign.products.mold.meshes import make_meshes, part_mesh
+from cmpdesign.products.mold.job_sheet import job_sheet_html
+from cmpdesign.products.mold.meshes import make_meshes, make_part_mesh
 from cmpdesign.products.mold.pad import pad_meshes
-from cmpdesign.products.mold.parts import parts_of
-from cmpdesign.products.mold.pictures import exploded
-from cmpdesign.products.mold.stack.stack import stack_of
-from cmpdesign.products.registry import Made
+from cmpdesign.products.mold.parts import make_parts
+from cmpdesign.products.mold.pictures import exploded_meshes
+from cmpdesign.products.mold.stack.stack import make_stack
+from cmpdesign.products.registry import ProductFiles
 
 
 @pytest.fixture(scope="module")
-def made() -> Made:
+def made() -> ProductFiles:
     design = load_design("honeycomb", {"layers": "2"})
     return make_meshes(design, build_layout(design))
 
 
-def content(made: Made, name: str) -> bytes:
+def content(made: ProductFiles, name: str) -> bytes:
     data = made.files[f"mesh/{name}"]
     assert isinstance(data, bytes)
     return data
@@ -43,7 +43,7 @@ def trimesh_of(data: bytes, kind: str) -> Mapping[str, object]:
     return dict(scene.geometry) if isinstance(scene, trimesh.Scene) else {"mesh": scene}
 
 
-def test_every_stl_is_watertight_and_of_its_volume(made: Made) -> None:
+def test_every_stl_is_watertight_and_of_its_volume(made: ProductFiles) -> None:
     names = [name.removeprefix("mesh/") for name in made.files if name.endswith(".stl")]
     assert len(names) == 13 + 7
     for name in names:
@@ -53,7 +53,7 @@ def test_every_stl_is_watertight_and_of_its_volume(made: Made) -> None:
         assert body.volume == pytest.approx(figures["volume_mm3"], rel=1e-4), name  # type: ignore[attr-defined]
 
 
-def test_volumes_are_the_analytic_ones(made: Made) -> None:
+def test_volumes_are_the_analytic_ones(made: ProductFiles) -> None:
     for name, figures in made.figures.items():
         tolerance = 5e-3 if name == "mold/pin" else 1e-7
         assert figures["volume_mm3"] == pytest.approx(figures["analytic_mm3"], rel=tolerance), name
@@ -61,24 +61,24 @@ def test_volumes_are_the_analytic_ones(made: Made) -> None:
 
 def test_layers_fill_the_pad_without_gap_or_overlap() -> None:
     design = load_design("round", {"layers": "3"})
-    stack = stack_of(design, build_layout(design))
+    stack = make_stack(design, build_layout(design))
     volumes = {mesh.name: mesh.volume_mm3() for mesh, _ in pad_meshes(stack)}
     middle = sum(volumes[name] for name in ("black", "red", "green", "blue", "white"))
     outline = stack.layout.outline_mm
-    from cmpdesign.products.mold.solids.loops import frustum_volume_mm3, polygon
+    from cmpdesign.products.mold.solids.loops import frustum_volume_mm3, polygon_loop
 
-    edge = polygon(outline).moved(stack.lean * 4.0)
+    edge = polygon_loop(outline).moved(stack.lean * 4.0)
     assert middle == pytest.approx(frustum_volume_mm3(edge, edge.moved(stack.lean * 0.5), 0.5), rel=1e-9)
 
 
-def test_glb_is_in_metres_and_named(made: Made) -> None:
+def test_glb_is_in_metres_and_named(made: ProductFiles) -> None:
     bodies = trimesh_of(content(made, "pad.glb"), "glb")
     assert set(bodies) == {"base", "black", "red", "green", "blue", "white", "cover"}
     height = max(float(body.bounds[1][1]) for body in bodies.values())  # type: ignore[attr-defined]
     assert height == pytest.approx(0.005, rel=1e-6)
 
 
-def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: Made) -> None:
+def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: ProductFiles) -> None:
     names = [name for name, _, _ in read_3mf(content(made, "pad.3mf"))]
     assert names == ["base", "black", "red", "green", "blue", "white", "cover"]
     assert len(read_3mf(content(made, "mold.3mf"))) == 13
@@ -86,27 +86,27 @@ def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: Made) 
 
 def test_an_open_mesh_is_refused() -> None:
     points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1.0)])
-    tent = Mesh("tent", "#ff0000", points, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
+    tent = TriangleMesh("tent", "#ff0000", points, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
     with pytest.raises(RuntimeError, match="tent: the mesh is not closed"):
         meshes_to_3mf([tent], "tent")
     with pytest.raises(Exception, match="watertight False"):
-        product._checked("tent", tent, tent.volume_mm3(), 1e-9, {})
+        product._add_checked_figures("tent", tent, tent.volume_mm3(), 1e-9, {})
 
 
 @pytest.mark.parametrize("crown", ["sphere", "cylinder"])
 def test_crowned_meshes_are_closed(crown: str) -> None:
     design = load_design("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
-    stack = stack_of(design, build_layout(design))
+    stack = make_stack(design, build_layout(design))
     for mesh, volume in pad_meshes(stack):
-        product._checked(mesh.name, mesh, volume, 1e-9, {})
-    for part in parts_of(stack):
-        product._checked(part.name, *part_mesh(part), {})
+        product._add_checked_figures(mesh.name, mesh, volume, 1e-9, {})
+    for part in make_parts(stack):
+        product._add_checked_figures(part.name, *make_part_mesh(part), {})
 
 
 def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
     design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
-    stack = stack_of(design, build_layout(design))
-    page = job_sheet("dome", stack, parts_of(stack), [])
+    stack = make_stack(design, build_layout(design))
+    page = job_sheet_html("dome", stack, make_parts(stack), [])
     assert "flush" not in page and "wipe along the dome" in page
     # The white cell alone would be a tenth of a milligram.
     assert page.count("<td class=n>2.00 g</td>") == 7
@@ -114,8 +114,10 @@ def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
 
 def test_pictures_show_bosses_from_above_only() -> None:
     design = load_design("honeycomb", {"layers": "2"})
-    plate = next(part for part in parts_of(stack_of(design, build_layout(design))) if part.name == "boss-red")
-    mesh = part_mesh(plate)[0]
+    plate = next(
+        part for part in make_parts(make_stack(design, build_layout(design))) if part.name == "boss-red"
+    )
+    mesh = make_part_mesh(plate)[0]
     above, below = (draw_meshes([mesh], view, (160, 120)) for view in (ABOVE, BELOW))
     assert above.shape == (120, 160, 3)
     # The middle of the back is plain; bosses throw lines and shades.
@@ -123,7 +125,7 @@ def test_pictures_show_bosses_from_above_only() -> None:
     assert spread[0] > 30 and spread[1] == 0
 
 
-def test_every_part_has_its_pictures(made: Made) -> None:
+def test_every_part_has_its_pictures(made: ProductFiles) -> None:
     parts = {name.removeprefix("mold/") for name in made.figures if name.startswith("mold/")}
     assert set(made.pictures) == {"exploded"} | {f"{p}-{side}" for p in parts for side in ("above", "below")}
     for name, picture in made.pictures.items():
@@ -136,8 +138,8 @@ def test_every_part_has_its_pictures(made: Made) -> None:
 
 def test_exploded_parts_lie_above_each_other_and_apart() -> None:
     design = load_design("honeycomb", {"layers": "2"})
-    parts = parts_of(stack_of(design, build_layout(design)))
-    groups = exploded(parts, [part_mesh(part)[0] for part in parts])
+    parts = make_parts(make_stack(design, build_layout(design)))
+    groups = exploded_meshes(parts, [make_part_mesh(part)[0] for part in parts])
     assert list(groups)[:3] == ["base", "pin", "frame"] and len(groups["pin"]) == 4
     ends = [
         (min(m.points[:, 2].min() for m in g), max(m.points[:, 2].max() for m in g)) for g in groups.values()
@@ -148,7 +150,7 @@ def test_exploded_parts_lie_above_each_other_and_apart() -> None:
     assert np.ptp(x[z < z.min() + 1e-6]) < 0.5 * np.ptp(x[z > z.max() - 1e-6])
 
 
-def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
+def test_job_sheet_says_how_much_to_mix(made: ProductFiles) -> None:
     page = made.files["mesh/job-sheet.html"]
     assert isinstance(page, str)
     for word in ("boss-red", "Solaris", "mm³", "exploded.png", "draw it off flush"):
@@ -163,8 +165,8 @@ def test_job_sheet_says_how_much_to_mix(made: Made) -> None:
 def test_a_steep_face_is_drawn_in_its_shade_not_as_an_outline(run: float) -> None:
     """Its depth changes by ``run`` pixels from one pixel to the next."""
     corners = np.array([(0, 0, 0), (0, 10, 0), (-10 * run, 10, 10), (-10 * run, 0, 10)], dtype=float)
-    face = Mesh("face", "#ffffff", corners, np.array([(0, 1, 2), (0, 2, 3)]))
-    picture = draw_meshes([face], View(0.0, 0.0), (100, 100)).astype(float)
+    face = TriangleMesh("face", "#ffffff", corners, np.array([(0, 1, 2), (0, 2, 3)]))
+    picture = draw_meshes([face], ViewDirection(0.0, 0.0), (100, 100)).astype(float)
     inside = picture[10:90, 10:90, 0]
     assert np.ptp(inside) == 0
     # An edge before something far behind it is still outlined.

@@ -14,17 +14,23 @@ from hypothesis import strategies as st
 from cmpdesign import build_layout, load_design
 from cmpdesign.errors import DesignError
 from cmpdesign.products.mold import finish, make, pad
-from cmpdesign.products.mold.checks import check_mold, refuse_impossible
+from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.meshes import make_meshes
-from cmpdesign.products.mold.parts import Part, parts_of
+from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes import caps
 from cmpdesign.products.mold.solids import shells
-from cmpdesign.products.mold.solids.loops import Loop, circle, frustum_volume_mm3, polygon, rounded
-from cmpdesign.products.mold.solids.measure import drafts_deg, measure, of_kind
-from cmpdesign.products.mold.solids.shells import Feature, Slab, slab_solid, slab_volume_mm3
-from cmpdesign.products.mold.solids.tiled_faces import tiled_sheet
-from cmpdesign.products.mold.stack.stack import Stack, stack_of
-from cmpdesign.products.mold.step.step import Solid, read_step, solid_to_step
+from cmpdesign.products.mold.solids.loops import (
+    Loop,
+    circle_loop,
+    frustum_volume_mm3,
+    polygon_loop,
+    rounded_polygon,
+)
+from cmpdesign.products.mold.solids.measure import drafts_deg, measure_solid, subshapes
+from cmpdesign.products.mold.solids.shells import Feature, Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.tiled_faces import tile_faces
+from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
+from cmpdesign.products.mold.step.step import NamedSolid, read_step, solid_to_step
 from cmpdesign.products.registry import Maker
 
 DESIGNS = {
@@ -42,19 +48,19 @@ DESIGNS = {
 }  # fmt: skip
 
 
-def stack(**values: str) -> Stack:
+def stack(**values: str) -> MoldStack:
     design = load_design("honeycomb", values)
-    return stack_of(design, build_layout(design))
+    return make_stack(design, build_layout(design))
 
 
 def parts(**values: str) -> dict[str, Part]:
-    return {part.name: part for part in parts_of(stack(**values))}
+    return {part.name: part for part in make_parts(stack(**values))}
 
 
 @pytest.mark.parametrize("name", DESIGNS)
 def test_every_solid_is_valid_closed_and_of_its_volume(name: str) -> None:
     for part in parts(**DESIGNS[name]).values():
-        found = measure(part.solid)
+        found = measure_solid(part.solid)
         assert found.valid and found.closed, part.name
         assert found.volume_mm3 == pytest.approx(part.volume_mm3, rel=1e-9), part.name
 
@@ -63,8 +69,8 @@ def test_every_solid_is_valid_closed_and_of_its_volume(name: str) -> None:
 def test_solids_read_back_from_step_are_equal(name: str) -> None:
     """Every kind of part: faces, volume, area and centre, and still valid and closed."""
     for kind, part in one_of_each_kind(name).items():
-        again = read_step(solid_to_step(Solid(part.name, part.color, part.solid)))
-        found, before = measure(again), measure(part.solid)
+        again = read_step(solid_to_step(NamedSolid(part.name, part.color, part.solid)))
+        found, before = measure_solid(again), measure_solid(part.solid)
         assert found.valid and found.closed and found.faces == before.faces, kind
         assert found.volume_mm3 == pytest.approx(part.volume_mm3, rel=1e-9), kind
         for now, then in zip(volume_and_centre(again), volume_and_centre(part.solid), strict=True):
@@ -90,7 +96,7 @@ def test_volume_check_can_fail() -> None:
     lost = Slab(
         part.slab.outer, part.slab.bottom_mm, part.slab.top_mm, part.slab.through, (), part.slab.many[1:]
     )
-    assert abs(measure(slab_solid(lost)).volume_mm3 / part.volume_mm3 - 1) > 1e-5
+    assert abs(measure_solid(make_slab_solid(lost)).volume_mm3 / part.volume_mm3 - 1) > 1e-5
 
 
 @pytest.mark.parametrize(("draft", "lean"), [("2", 2.0), ("5", 5.0), ("0", 0.0)])
@@ -98,9 +104,9 @@ def test_draft_is_measured_on_the_faces(draft: str, lean: float) -> None:
     values = {"layers": "2", "mold.draft_deg": draft}
     for name in ("base", "boss-red", "frame", "cover"):
         part = parts(**values)[name]
-        assert drafts_deg(part.solid, *part.pulled) == pytest.approx((lean, lean), abs=1e-6), name
+        assert drafts_deg(part.solid, *part.pull_box_mm) == pytest.approx((lean, lean), abs=1e-6), name
     stencil = parts(**values)["stencil-red"]
-    assert drafts_deg(stencil.solid, *stencil.pulled) == pytest.approx((10, 10), abs=1e-6)
+    assert drafts_deg(stencil.solid, *stencil.pull_box_mm) == pytest.approx((10, 10), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["square", "shrinking", "sphere", "cylinder"])
@@ -108,7 +114,7 @@ def test_every_kind_of_part_has_its_draft(name: str) -> None:
     """Between slanted outlines a wall leans a little more or less than the draft, downhill or uphill."""
     crowned = name in ("sphere", "cylinder")
     for kind, part in one_of_each_kind(name).items():
-        low, high = drafts_deg(part.solid, *part.pulled)
+        low, high = drafts_deg(part.solid, *part.pull_box_mm)
         if kind == "pin":
             continue
         wanted = {"stencil": 10.0, "lid": 5.0}.get(kind, 2.0)
@@ -207,11 +213,11 @@ def test_resin_that_inhibits_the_cure_is_reported() -> None:
 def test_findings_that_warn_do_not_refuse() -> None:
     findings = check_mold(stack(layers="2", **{"mold.draft_deg": "0", "mold.gap_mm": "0.03"}))
     assert {finding.severity for finding in findings} == {"warning"}
-    refuse_impossible(findings)
+    require_no_errors(findings)
 
 
 loops = st.builds(
-    lambda n, size, radius, turn, x, y: rounded(
+    lambda n, size, radius, turn, x, y: rounded_polygon(
         size * np.stack([np.cos(turn + 2 * np.pi * np.arange(n) / n), np.sin(turn + 2 * np.pi * np.arange(n)
         / n)], -1) + (x, y),
         radius * size,
@@ -228,12 +234,12 @@ def test_tiles_cover_any_sheet_exactly(shapes: list[Loop], columns: int, framed:
         loop.shifted(1.5 * (n % columns) + 0.7 * (n // columns % 2), 1.5 * (n // columns))
         for n, loop in enumerate(shapes)
     ]
-    outer = polygon(np.array([(-3, -3), (14, -3), (14, 38), (-3, 38.0)]))
-    holes = [circle(np.array([12.5, 36.0]), 1.0)] if framed else []
+    outer = polygon_loop(np.array([(-3, -3), (14, -3), (14, 38), (-3, 38.0)]))
+    holes = [circle_loop(np.array([12.5, 36.0]), 1.0)] if framed else []
     slab = Slab(
         outer, -1.0, 0.0, [(h, h) for h in holes], (), [Feature(f, f.moved(-0.01), 0.5) for f in features]
     )
-    found = measure(slab_solid(slab))
+    found = measure_solid(make_slab_solid(slab))
     assert found.valid and found.closed
     assert found.volume_mm3 == pytest.approx(slab_volume_mm3(slab), rel=1e-11)
 
@@ -241,13 +247,13 @@ def test_tiles_cover_any_sheet_exactly(shapes: list[Loop], columns: int, framed:
 def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
     for pattern in ("honeycomb", "round", "elliptical"):
         mold = stack(layers="12", pattern=pattern, rotation_deg="7")
-        roots = [rounded(cell, 0.01).moved(-0.05) for cell in mold.cells(0)]
-        sheet = tiled_sheet(mold.block, mold.holes(), roots, 0.05)
+        roots = [rounded_polygon(cell, 0.01).moved(-0.05) for cell in mold.cells(0)]
+        sheet = tile_faces(mold.block, mold.holes(), roots, 0.05)
         assert max(len(wires) for wires in sheet.faces) <= 20, pattern
 
 
 def test_frustum_of_circles() -> None:
-    lower, upper = circle(np.zeros(2), 4.0), circle(np.zeros(2), 2.0)
+    lower, upper = circle_loop(np.zeros(2), 4.0), circle_loop(np.zeros(2), 2.0)
     assert frustum_volume_mm3(lower, upper, 3.0) == pytest.approx(np.pi * 3 * (4 + 2 + 1) / 3, rel=1e-14)
 
 
@@ -255,13 +261,13 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
     design = load_design("honeycomb", {"layers": "3"})
     layout = build_layout(design)
     alone = make.make_mold(design, layout)
-    monkeypatch.setattr(finish, "BOSSES_OF_TWO", 0)
+    monkeypatch.setattr(finish, "MIN_BOSSES_FOR_TWO", 0)
     helped: list[object] = []
     process = finish.subprocess.Popen
     monkeypatch.setattr(
         finish.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
     )
-    monkeypatch.setattr(finish, "cores", lambda: 2)
+    monkeypatch.setattr(finish, "available_cores", lambda: 2)
     together = make.make_mold(design, layout)
     assert len(helped) == 1
     assert list(together.files.items()) == list(alone.files.items())
@@ -270,8 +276,8 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     design = load_design("honeycomb", {"layers": "2"})
-    monkeypatch.setattr(finish, "BOSSES_OF_TWO", 0)
-    monkeypatch.setattr(finish, "cores", lambda: 2)
+    monkeypatch.setattr(finish, "MIN_BOSSES_FOR_TWO", 0)
+    monkeypatch.setattr(finish, "available_cores", lambda: 2)
     monkeypatch.setattr(finish, "__name__", "cmpdesign.mold.absent")
     with pytest.raises(RuntimeError, match=r"(?s)the second process failed: .*No module named"):
         make.make_mold(design, build_layout(design))
@@ -285,10 +291,10 @@ def test_assembly_holds_every_part_where_it_is_used() -> None:
     numbers = [int(n) for n in re.findall(rb"^#(\d+) = ", content, flags=re.MULTILINE)]
     assert numbers == list(range(1, len(numbers) + 1))
     assert {int(n) for n in re.findall(rb"#(\d+)", content)} == set(numbers)
-    mold = stack_of(design, layout)
-    described = parts_of(mold)
+    mold = make_stack(design, layout)
+    described = make_parts(mold)
     by_name = {part.name: part for part in described}
-    places = [p for group in make.assembly_of(mold, described).groups for p in group.places]
+    places = [p for group in make.make_assembly(mold, described).groups for p in group.places]
     found = solids_of(read_step(content))
     assert len(found) == len(places)
     for solid, place in zip(found, places, strict=True):
@@ -302,7 +308,7 @@ def test_assembly_holds_every_part_where_it_is_used() -> None:
 def solids_of(shape: object) -> list[object]:
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    return of_kind(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+    return subshapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
 
 
 def volume_and_centre(shape: object) -> tuple[float, np.ndarray]:

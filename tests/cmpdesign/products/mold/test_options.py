@@ -9,8 +9,8 @@ from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.sheet_options import SheetOptions
 from cmpdesign.products.mold.checks import check_mold
 from cmpdesign.products.mold.make import mold_figures
-from cmpdesign.products.mold.parts import parts_of
-from cmpdesign.products.mold.stack.stack import stack_of
+from cmpdesign.products.mold.parts import make_parts
+from cmpdesign.products.mold.stack.stack import make_stack
 from cmpdesign.products.sheet.print_sheet import make_print_sheet
 
 CROWNS = {
@@ -33,8 +33,8 @@ SHEET = {"page": "letter", "pads": "2", "bleed_mm": "1"}
 def made_of(**values: str) -> tuple[object, list[str]]:
     """What the parts come to, from closed forms, and what is said of them."""
     design = load_design("honeycomb", {"layers": "3", **values})
-    stack = stack_of(design, build_layout(design))
-    parts = [(part.name, round(part.z_mm, 9), round(part.volume_mm3, 9)) for part in parts_of(stack)]
+    stack = make_stack(design, build_layout(design))
+    parts = [(part.name, round(part.z_mm, 9), round(part.volume_mm3, 9)) for part in make_parts(stack)]
     return (parts, mold_figures(stack)["pour_mm3"]), [str(finding) for finding in check_mold(stack)]
 
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from cmpdesign import build_layout, load_design
-from cmpdesign.products.mold.parts import parts_of
-from cmpdesign.products.mold.solids.measure import measure, volume_mm3
-from cmpdesign.products.mold.stack.stack import stack_of
-from cmpdesign.products.mold.step.step import Solid, read_step, solid_to_step
-from cmpdesign.products.mold.step.text import real
+from cmpdesign.products.mold.parts import make_parts
+from cmpdesign.products.mold.solids.measure import measure_solid, volume_mm3
+from cmpdesign.products.mold.stack.stack import make_stack
+from cmpdesign.products.mold.step.step import NamedSolid, read_step, solid_to_step
+from cmpdesign.products.mold.step.text import format_real
 
 CROWNS = ("flat", "sphere", "cylinder")
 
@@ -21,7 +21,7 @@ CROWNS = ("flat", "sphere", "cylinder")
 def solids(crown: str) -> dict[str, Any]:
     values = {"mold.crown": crown, "mold.crown_radius_mm": "12"} if crown != "flat" else {}
     design = load_design("honeycomb", {"layers": "2", **values})
-    return {part.name: part.solid for part in parts_of(stack_of(design, build_layout(design)))}
+    return {part.name: part.solid for part in make_parts(make_stack(design, build_layout(design)))}
 
 
 def entities(file: bytes) -> dict[int, tuple[str, str]]:
@@ -43,7 +43,7 @@ def refers(rest: str) -> list[int]:
 def test_every_shell_is_closed_in_the_text(crown: str) -> None:
     """Every edge is run once each way, and every loop's edges begin where the last one ended."""
     for name, solid in solids(crown).items():
-        file = entities(solid_to_step(Solid(name, "#808080", solid)))
+        file = entities(solid_to_step(NamedSolid(name, "#808080", solid)))
         ends = {number: refers(rest)[:2] for number, rest in of_kind(file, "EDGE_CURVE").items()}
         steps = {
             n: (refers(rest)[0], rest.endswith(".T.")) for n, rest in of_kind(file, "ORIENTED_EDGE").items()
@@ -66,7 +66,7 @@ def test_every_shell_is_closed_in_the_text(crown: str) -> None:
 
 
 def test_geometry_that_many_use_is_written_once() -> None:
-    file = entities(solid_to_step(Solid("plate", "#808080", solids("flat")["boss-red"])))
+    file = entities(solid_to_step(NamedSolid("plate", "#808080", solids("flat")["boss-red"])))
     for kind in ("CARTESIAN_POINT", "DIRECTION", "VECTOR"):
         texts = list(of_kind(file, kind).values())
         assert len(texts) == len(set(texts)), kind
@@ -107,8 +107,8 @@ def test_solids_that_were_moved_or_mirrored_are_read_back(change: str) -> None:
         return point.X(), point.Y(), point.Z()
 
     solid = ball_with(change)
-    again = read_step(solid_to_step(Solid("ball", "#808080", solid)))
-    found = measure(again)
+    again = read_step(solid_to_step(NamedSolid("ball", "#808080", solid)))
+    found = measure_solid(again)
     assert found.valid and found.closed and found.volume_mm3 > 0
     assert found.volume_mm3 == pytest.approx(volume_mm3(solid), rel=1e-7)
     assert centre(again) == pytest.approx(centre(solid), abs=1e-7)
@@ -117,7 +117,7 @@ def test_solids_that_were_moved_or_mirrored_are_read_back(change: str) -> None:
 @pytest.mark.parametrize("change", ["as it is", "mirrored"])
 def test_faces_know_which_side_of_their_surface_is_outside(change: str) -> None:
     """A file's spheres and cones have their normal outward: that is the ball's outside and the bore's inside."""
-    file = entities(solid_to_step(Solid("ball", "#808080", ball_with(change))))
+    file = entities(solid_to_step(NamedSolid("ball", "#808080", ball_with(change))))
     senses = {file[refers(rest)[-1]][0]: rest[-3:] for rest in of_kind(file, "ADVANCED_FACE").values()}
     assert senses == {"SPHERICAL_SURFACE": ".T.", "CONICAL_SURFACE": ".F."}
 
@@ -129,11 +129,11 @@ def test_what_cannot_be_written_is_refused() -> None:
     from OCP.TopExp import TopExp_Explorer
 
     with pytest.raises(RuntimeError, match="a face is a Geom_ToroidalSurface, no plane"):
-        solid_to_step(Solid("ring", "#808080", BRepPrimAPI_MakeTorus(3.0, 1.0).Solid()))
+        solid_to_step(NamedSolid("ring", "#808080", BRepPrimAPI_MakeTorus(3.0, 1.0).Solid()))
     shell = BRepAlgoAPI_Cut(BRepPrimAPI_MakeSphere(2.0).Shape(), BRepPrimAPI_MakeSphere(1.0).Shape()).Shape()
     hollow = TopExp_Explorer(shell, TopAbs_ShapeEnum.TopAbs_SOLID).Current()
     with pytest.raises(RuntimeError, match="2 shells, not one"):
-        solid_to_step(Solid("hollow", "#808080", hollow))
+        solid_to_step(NamedSolid("hollow", "#808080", hollow))
 
 
 @pytest.mark.parametrize(
@@ -149,4 +149,4 @@ def test_what_cannot_be_written_is_refused() -> None:
     ],
 )
 def test_reals_always_have_a_point(value: float, text: str) -> None:
-    assert real(value) == text
+    assert format_real(value) == text

@@ -20,7 +20,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.sheet.key import SheetKey, parse_key
 from cmpdesign.products.sheet.print_sheet import make_print_sheet
-from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_bars, measured
+from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_sheet_bars, measure_sheet
 from cmpdesign.products.sheet.verdict import PERSPECTIVE_TOLERANCE_MM
 
 DPI = 200.0
@@ -70,9 +70,9 @@ def warped(image: Pixels, matrix: np.ndarray[Any, Any]) -> Pixels:
 
 
 def reading(image: Pixels, dpi: float | None = DPI) -> SheetReading:
-    found = find_bars(image)
+    found = find_sheet_bars(image)
     assert isinstance(found, SheetBars), found
-    return measured(found, None if dpi is None else (dpi, dpi))
+    return measure_sheet(found, None if dpi is None else (dpi, dpi))
 
 
 @pytest.mark.parametrize("printed", ["scan", "pdf_scan"])
@@ -109,11 +109,11 @@ def test_without_resolution_the_ratio_is_known(scan: Pixels) -> None:
 
 def test_what_cannot_be_read_says_why(scan: Pixels) -> None:
     blank = np.full_like(scan, 255)
-    assert "no print sheet's code" in str(find_bars(blank))
+    assert "no print sheet's code" in str(find_sheet_bars(blank))
     covered = scan.copy()
     height = covered.shape[0]
     covered[: int(height - 34 / 25.4 * DPI)] = 255
-    assert "a scale bar" in str(find_bars(covered))
+    assert "a scale bar" in str(find_sheet_bars(covered))
 
 
 def test_keys_survive_odd_names() -> None:
