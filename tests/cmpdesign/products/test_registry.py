@@ -40,7 +40,7 @@ def with_ruler(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ModuleType("ruler")
     module.ruler = ruler  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "ruler", module)
-    monkeypatch.setattr(products, "PRODUCT_COLUMNS", {"ruler": Product("ruler:ruler", "ruler/"), **PRODUCTS})
+    monkeypatch.setattr(products, "PRODUCTS", {"ruler": Product("ruler:ruler", "ruler/"), **PRODUCTS})
 
 
 def make(only: str) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
@@ -67,7 +67,7 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
     module = ModuleType("camera")
     module.make = lambda design, layout: ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "camera", module)
-    monkeypatch.setattr(products, "PRODUCT_COLUMNS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
+    monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
     files, _ = make("camera")
     assert set(files) == {"a.txt", "preview.png"}
     data = files["preview.png"]

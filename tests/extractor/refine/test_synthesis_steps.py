@@ -126,7 +126,7 @@ def test_once_dirt_has_moved_markers_no_step_is_taken_around_many(
         return plain(self, *given)
 
     monkeypatch.setattr("extractor.refine.synthesis_steps.unconverged_markers", look)
-    monkeypatch.setattr("extractor.refine.synthesis_steps.effort", lambda *_: 0.1)
+    monkeypatch.setattr("extractor.refine.synthesis_steps.step_effort", lambda *_: 0.1)
     monkeypatch.setattr(SynthesisSolver, "_partial_step", counted)
     monkeypatch.setitem(SCHEDULES, "balanced", SCHEDULES["balanced"]._replace(patience=5))
     Extractor(extractor("round").layout).extract(shown("round").image)
