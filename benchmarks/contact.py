@@ -16,7 +16,7 @@ from rich.table import Table
 
 from benchmarks.support.machine import conditions_text, write_json
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
-from cmpdesign.contact.layer.green import green_kernels
+from cmpdesign.contact.elastic_layer.green import green_kernels
 from cmpdesign.scene import standard_layout
 
 Array = NDArray[np.float64]

@@ -31,9 +31,9 @@ from benchmarks.suites.scoring.reading import (
     warm_up,
 )
 from benchmarks.suites.scoring.report import result_line
-from benchmarks.suites.stress.drawn import RANDOM_KINDS
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage
 from benchmarks.suites.stress.kinds import StressCase
+from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from extractor import Markers
 
 IMAGES, SEED = 2100, 5000

@@ -23,10 +23,10 @@ from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.job import LaserJob, LaserPass, make_job
+from cmpdesign.products.laser.make import make_laser
 from cmpdesign.products.laser.paths.beam import Points
 from cmpdesign.products.laser.paths.order import order_cells
 from cmpdesign.products.laser.paths.strokes import loop_strokes
-from cmpdesign.products.laser.product import make_laser
 from cmpdesign.products.laser.setup import complete_setup
 
 VPYPE_HOME = Path(sys.prefix) / "vpype"

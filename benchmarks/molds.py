@@ -29,7 +29,7 @@ from cmpdesign import build_layout, load_design
 from cmpdesign.patterns.colors import RED
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.solids.measure import measure_solid
-from cmpdesign.products.mold.solids.shells import Feature, Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import Feature, Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.stack.stack import make_stack
 from cmpdesign.products.mold.step.step import NamedSolid, read_step, solid_to_step
 

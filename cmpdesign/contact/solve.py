@@ -16,9 +16,9 @@ from cmpdesign.contact.friction.increment import (
     state_without_contact,
 )
 from cmpdesign.contact.grid import make_contact_grid
+from cmpdesign.contact.make_result import contact_from_state
 from cmpdesign.contact.motion import Motion
-from cmpdesign.contact.objects.objects import Indenter
-from cmpdesign.contact.report import contact_from_state
+from cmpdesign.contact.objects.indenters import Indenter
 from cmpdesign.contact.result import Contact
 
 

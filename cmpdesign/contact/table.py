@@ -15,7 +15,7 @@ from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import ContactError
 from cmpdesign.contact.motion import Motion
 from cmpdesign.contact.objects.heightmap import HeightMap
-from cmpdesign.contact.objects.objects import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
+from cmpdesign.contact.objects.indenters import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
 from cmpdesign.contact.result import Contact
 from cmpdesign.contact.solve import solve
 from cmpdesign.units import parse_angle_deg, parse_length_mm

@@ -38,7 +38,7 @@ def trials(options: RunOptions) -> list[Trial]:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The first angle, in steps of ``STEP_DEG``, at which a cell is lost."""
-    from cmpdesign.evaluate.measures.cells import is_numbering_kept, is_shape_recognised
+    from cmpdesign.evaluate.measures.single_cells import is_numbering_kept, is_shape_recognised
 
     holds, limit = (
         (is_shape_recognised, change_limit_deg)

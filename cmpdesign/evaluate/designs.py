@@ -69,7 +69,7 @@ def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One design under one contact; the place and the light are the same for all designs."""
-    from cmpdesign.evaluate.measures.shapes import measure_reconstruction
+    from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
     from cmpdesign.evaluate.simulated.conditions import sample_conditions
 
     one = _instrument(values["sensor"], values["design"], values["preset"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article
-from cmpdesign.evaluate.measures import cube
+from cmpdesign.evaluate import article_results as article
+from cmpdesign.evaluate.measures import pressed_cube as cube
 from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
 from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
 from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surface
@@ -44,7 +44,7 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """One object or cube at one place, with both patterns."""
     if "mode" in values:
         return cube.work(values)
-    from cmpdesign.evaluate.measures.shapes import measure_reconstruction
+    from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
     from cmpdesign.evaluate.simulated.conditions import mean_conditions
     from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate import article
+from cmpdesign.evaluate import article_results as article
 from cmpdesign.evaluate.report.statistics import SuccessShare, sample_statistics
 from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
 from cmpdesign.evaluate.simulated.contacts import ContactLoad, PlacedSurface, place_surface

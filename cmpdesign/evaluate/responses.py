@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article
-from cmpdesign.evaluate.measures import cube
+from cmpdesign.evaluate import article_results as article
+from cmpdesign.evaluate.measures import pressed_cube as cube
 from cmpdesign.evaluate.precision import cube_trials
 from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
 from cmpdesign.evaluate.runner import RunOptions, Trial

@@ -66,7 +66,7 @@ PRODUCTS: Mapping[str, Product] = {
     "layout": Product("cmpdesign.products.registry:_make_layout", "layout.json", usual=True),
     # The preview and the report are no ``Maker``s: they show what the others made and measured.
     PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
-    "laser": Product("cmpdesign.products.laser.product:make_laser", "laser/"),
+    "laser": Product("cmpdesign.products.laser.make:make_laser", "laser/"),
     "mold": Product("cmpdesign.products.mold.make:make_mold", "mold/"),
     "mesh": Product("cmpdesign.products.mold.meshes:make_meshes", "mesh/"),
     "print": Product("cmpdesign.products.sheet.print_sheet:make_print_sheet", "print/"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cmpdesign.scene.bounds.bound import cramer_rao
+from cmpdesign.scene.bounds.gridline_bound import cramer_rao
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.drawing.render import Rendered, render

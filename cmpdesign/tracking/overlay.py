@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.files.video import CODECS, VideoWriter
+from cmpdesign.files.video_writer import CODECS, VideoWriter
 
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference

@@ -22,9 +22,9 @@ from benchmarks.damage import (
 )
 from benchmarks.suites.scoring.reading import cached_extractor, read_case
 from benchmarks.suites.stress.conditions import BY_NAME
-from benchmarks.suites.stress.drawn import RANDOM_KINDS
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
 from benchmarks.suites.stress.kinds import make_frame
+from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 
 IMAGES, SEED = 42, 60000  # every kind in every pattern, twice
 

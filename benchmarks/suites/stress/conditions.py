@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from benchmarks.suites.stress.around import AROUND_KINDS
 from benchmarks.suites.stress.damage import DIRT_KINDS, MISSING_KINDS, NO_WHITE_KINDS
-from benchmarks.suites.stress.drawn import RANDOM_KINDS
 from benchmarks.suites.stress.empty import EMPTY_KINDS
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.imaging import IMAGING_KINDS, LIGHT_KINDS
 from benchmarks.suites.stress.kinds import ConditionKind, StressCase, make_frame
+from benchmarks.suites.stress.random_damage import RANDOM_KINDS
+from benchmarks.suites.stress.surroundings import AROUND_KINDS
 from benchmarks.suites.stress.view import SURFACE_KINDS, VIEW_KINDS
 
 KINDS = (

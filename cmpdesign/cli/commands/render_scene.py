@@ -64,7 +64,7 @@ def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
 
 def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.scene import render, save_truths
-    from cmpdesign.scene.files.film import open_frame_writer
+    from cmpdesign.scene.files.frame_writer import open_frame_writer
 
     film = open_frame_writer(output, file.fps or 1.0, file.size_px, file.bits)
     truths: list[Truth] = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.running import exit_with_status, require_positive, run_with_progress
+from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 

@@ -15,14 +15,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.contact.elastic_layer.green import green_kernels
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
 from cmpdesign.contact.elastomer import Elastomer
-from cmpdesign.contact.friction.allowed import CoulombTractions, PressureTractions
-from cmpdesign.contact.friction.quadratic import minimise
+from cmpdesign.contact.friction.admissible import CoulombTractions, PressureTractions
+from cmpdesign.contact.friction.quadratic_program import minimise
 from cmpdesign.contact.grid import ContactGrid
-from cmpdesign.contact.layer.green import green_kernels
-from cmpdesign.contact.layer.operator import ComplianceOperator
 from cmpdesign.contact.motion import Motion
-from cmpdesign.contact.objects.objects import Indenter
+from cmpdesign.contact.objects.indenters import Indenter
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

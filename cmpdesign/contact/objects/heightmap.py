@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact.errors import ContactError, require
-from cmpdesign.contact.objects.objects import Indenter
+from cmpdesign.contact.objects.indenters import Indenter
 
 Array = NDArray[np.float64]
 

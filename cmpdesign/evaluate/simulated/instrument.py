@@ -132,8 +132,8 @@ class Instrument:
 
 def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
     """A square pattern's reader for one view: which way its rows run there is known from rest."""
-    from cmpdesign.evaluate.square.contours import SquareReader
-    from cmpdesign.evaluate.square.saddles import SaddleReader
+    from cmpdesign.evaluate.square.contour_reader import SquareReader
+    from cmpdesign.evaluate.square.saddle_reader import SaddleReader
 
     step_mm = instrument.pitch_mm
     cross = np.array([[0, 0, 0], [step_mm, 0, 0], [0, -step_mm, 0]])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.as_made import burnt_cell_outlines_mm
-from cmpdesign.products.laser.formats.palette import format_mm
+from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.paths.beam import Points
 

@@ -7,7 +7,7 @@ from html import escape
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
 from cmpdesign.products.laser.figures import PassTiming
-from cmpdesign.products.laser.formats.palette import format_mm
+from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.formats.svg import path_data
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 

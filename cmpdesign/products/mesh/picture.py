@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 
 Floats = NDArray[np.float64]
 OVERSAMPLING = 2
@@ -74,7 +74,7 @@ def draw_meshes(
     """(height, width, 3) uint8 BGR."""
     import cv2
 
-    from cmpdesign.products.mesh.raster import fill_depth_buffer
+    from cmpdesign.products.mesh.depth_buffer import fill_depth_buffer
 
     width, height = (OVERSAMPLING * side for side in size_px)
     framing = Framing.of(meshes, view, (width, height))

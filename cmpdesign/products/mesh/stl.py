@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER_BYTES = 80

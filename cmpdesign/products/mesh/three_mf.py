@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 
 # The library's identifiers and the package's dates are random by default; these follow from the names.
 _NAMESPACE = uuid.UUID("6f9a3c1e-6f0e-5f5b-9d54-6d6f6c64cafe")

@@ -13,7 +13,7 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.products.mesh.glb import meshes_to_glb
 from cmpdesign.products.mesh.stl import mesh_to_stl
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import job_sheet_html
@@ -21,7 +21,7 @@ from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.pictures import mold_pictures
 from cmpdesign.products.mold.solids.loops import bounding_boxes
-from cmpdesign.products.mold.solids.shells import make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.solids.tessellate import chorded_slab, tessellate_solid
 from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.registry import ProductFiles
@@ -69,7 +69,7 @@ def make_part_mesh(part: Part) -> tuple[TriangleMesh, float, float]:
         return tessellate_solid(part.name, part.color, part.solid), part.volume_mm3, SMOOTH_TOLERANCE
     slab = chorded_slab(part.slab)
     if part.crown:
-        from cmpdesign.products.mold.shapes.dished import (
+        from cmpdesign.products.mold.shapes.dished_solids import (
             dished_plate_solid,
             dished_sheet_solid,
             dished_volume_mm3,

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.shapes.dish import Dish, make_bare_dish, make_dish
-from cmpdesign.products.mold.shapes.dished import dished_sheet_solid, dished_volume_mm3
+from cmpdesign.products.mold.shapes.dished_solids import dished_sheet_solid, dished_volume_mm3
 from cmpdesign.products.mold.solids.loops import Loop, chorded_pair, frustum_volume_mm3
-from cmpdesign.products.mold.solids.shells import Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.solids.tessellate import frusta_mesh, tessellate_solid
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
 

@@ -15,10 +15,14 @@ import numpy as np
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.mold.shapes.bosses import boss_features, stencil_hole_outlines
 from cmpdesign.products.mold.shapes.dish import Dish, make_dish
-from cmpdesign.products.mold.shapes.dished import dished_plate_solid, dished_sheet_solid, dished_volume_mm3
+from cmpdesign.products.mold.shapes.dished_solids import (
+    dished_plate_solid,
+    dished_sheet_solid,
+    dished_volume_mm3,
+)
 from cmpdesign.products.mold.solids.loops import Loop, Points, circle_loop, polygon_loop, rounded_offset
 from cmpdesign.products.mold.solids.pins import pin_solid, pin_volume_mm3
-from cmpdesign.products.mold.solids.shells import Feature, Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import Feature, Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.stack.stack import MoldStack
 
 # A vent widens towards the outside, so that its plug is torn off at the pad.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, ViewDirection, draw_label, draw_meshes
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.parts import Part
 
 Image = NDArray[np.uint8]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.bounds.bound import _inverse_blocks
+from cmpdesign.scene.bounds.gridline_bound import _inverse_blocks
 from cmpdesign.scene.drawing.render import render, render_truth
 from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.errors import SceneError

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.plain import pitch_mm
 from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
-from cmpdesign.scene.drawing.folds import update_hidden_parts
+from cmpdesign.scene.drawing.occlusion import update_hidden_parts
 from cmpdesign.scene.drawing.paths import join_segments, project_polygons
 from cmpdesign.scene.drawing.view import SceneView, scene_views
 from cmpdesign.scene.errors import SceneError

@@ -17,7 +17,7 @@ from cmpdesign.scene.camera.plain import (
     project_by_homography,
     to_pinhole,
 )
-from cmpdesign.scene.drawing.folds import Occlusion, find_occlusion, is_hidden
+from cmpdesign.scene.drawing.occlusion import Occlusion, find_occlusion, is_hidden
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.surface import fold_check_points, jacobian_determinant, require_no_fold
 from cmpdesign.scene.scene import Scene

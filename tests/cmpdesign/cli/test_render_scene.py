@@ -15,7 +15,7 @@ from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import load_truth, load_truths, render, standard_layout
-from cmpdesign.scene.files.film import open_frame_writer
+from cmpdesign.scene.files.frame_writer import open_frame_writer
 from tests.support.scene_texts import MOVING, SIZE, scene_writer
 
 

@@ -9,8 +9,8 @@ import skfem
 from numpy.typing import NDArray
 
 from cmpdesign.contact import Elastomer
-from cmpdesign.contact.layer.green import green_kernels
-from cmpdesign.contact.layer.operator import ComplianceOperator
+from cmpdesign.contact.elastic_layer.green import green_kernels
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
 from cmpdesign.contact.strain import LINEAR_STRAIN_LIMIT, largest_strain
 
 Array = NDArray[np.float64]

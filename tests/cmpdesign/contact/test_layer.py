@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cmpdesign.contact import ContactError, Elastomer
-from cmpdesign.contact.layer.green import KERNEL_REACH_THICKNESSES, green_kernels
-from cmpdesign.contact.layer.kernels import layer_compliances
-from cmpdesign.contact.layer.operator import ComplianceOperator
+from cmpdesign.contact.elastic_layer.green import KERNEL_REACH_THICKNESSES, green_kernels
+from cmpdesign.contact.elastic_layer.kernels import layer_compliances
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
 
 Array = NDArray[np.float64]
 POISSONS = (0.0, 0.25, 0.3, 0.45, 0.49, 0.4999)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from cmpdesign.contact import Elastomer
-from cmpdesign.contact.layer.green import green_kernels
-from cmpdesign.contact.layer.operator import ComplianceOperator
+from cmpdesign.contact.elastic_layer.green import green_kernels
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
 
 Array = NDArray[np.float64]
 HALF_WIDTH = 3.6  # of the block, in thicknesses; by there the layer is at rest

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmpdesign.evaluate import angles
-from cmpdesign.evaluate.measures.cells import (
+from cmpdesign.evaluate.measures.single_cells import (
     bend_corner,
     draw_cell,
     find_cell_corners,

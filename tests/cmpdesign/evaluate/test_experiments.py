@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.evaluate.measures.cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
+from cmpdesign.evaluate.measures.pressed_cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
 from cmpdesign.evaluate.reliability import METHODS, is_successful, judge_places
 from cmpdesign.evaluate.simulated.conditions import mean_conditions, sample_conditions
 from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmpdesign.evaluate.article import change_percent
-from cmpdesign.evaluate.measures.edges import (
+from cmpdesign.evaluate.article_results import change_percent
+from cmpdesign.evaluate.measures.edge_points import (
     circumscribed_square_mm,
     edge_points,
     mean_extent_mm,

@@ -17,7 +17,7 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from cmpdesign.scene.bounds.bound import edge_information
+from cmpdesign.scene.bounds.gridline_bound import edge_information
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.drawing.render import render_truth
 

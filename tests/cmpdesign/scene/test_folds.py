@@ -24,7 +24,7 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
-from cmpdesign.scene.drawing.folds import update_hidden_parts
+from cmpdesign.scene.drawing.occlusion import update_hidden_parts
 from cmpdesign.scene.drawing.patches import ground_patches, subdivide_triangle
 from cmpdesign.scene.drawing.view import single_view
 

@@ -10,8 +10,8 @@ import pytest
 
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Optics, Scene, Sensor, render, standard_layout, standard_scene
-from cmpdesign.scene.bounds.bound import cramer_rao
 from cmpdesign.scene.bounds.exact_bound import exact_bound
+from cmpdesign.scene.bounds.gridline_bound import cramer_rao
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.parts.light import Light
 from cmpdesign.scene.parts.surface import Press, Twist, composed

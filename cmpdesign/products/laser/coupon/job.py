@@ -17,7 +17,7 @@ from cmpdesign.products.laser.coupon.design import (
     design_coupon,
 )
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
-from cmpdesign.products.laser.formats.palette import LASER_LAYERS
+from cmpdesign.products.laser.formats.laser_layers import LASER_LAYERS
 from cmpdesign.products.laser.job import CIRCLE_POINTS, LaserPass
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import make_cavities

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmpdesign.products.laser.formats.palette import LaserLayer, job_layers
+from cmpdesign.products.laser.formats.laser_layers import LaserLayer, job_layers
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.beam import Points
 from cmpdesign.products.laser.setup import LaserSetup

@@ -9,7 +9,7 @@ from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
-from cmpdesign.products.laser.formats.palette import TOOL_LAYER, LaserLayer
+from cmpdesign.products.laser.formats.laser_layers import TOOL_LAYER, LaserLayer
 
 MILLIMETRES, METRIC = 4, 1
 _ENTITIES = "  0\nSECTION\n  2\nENTITIES\n"

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from cmpdesign import __version__
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
-from cmpdesign.products.laser.formats.palette import format_mm
+from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserPass
 from cmpdesign.products.laser.paths.strokes import Strokes
 

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
-from cmpdesign.products.laser.formats.palette import TOOL_LAYER, LaserLayer, format_mm
+from cmpdesign.products.laser.formats.laser_layers import TOOL_LAYER, LaserLayer, format_mm
 from cmpdesign.products.laser.job import LaserPass
 
 APP_VERSION = "1.7.08"

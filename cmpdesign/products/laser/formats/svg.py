@@ -9,7 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
-from cmpdesign.products.laser.formats.palette import format_mm, hex_color
+from cmpdesign.products.laser.formats.laser_layers import format_mm, hex_color
 from cmpdesign.products.laser.paths.strokes import Strokes
 
 

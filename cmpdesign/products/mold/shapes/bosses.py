@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmpdesign.products.mold.solids.loops import Loop, Points, inset_cells
-from cmpdesign.products.mold.solids.shells import Feature
+from cmpdesign.products.mold.solids.slab_shells import Feature
 from cmpdesign.products.mold.stack.stack import MoldStack
 
 # A stencil's hole widens upwards, so that the paste lets go when it is lifted.

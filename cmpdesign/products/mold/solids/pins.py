@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.mold.solids.loops import circle_loop
-from cmpdesign.products.mold.solids.shells import ShellBuilder
+from cmpdesign.products.mold.solids.slab_shells import ShellBuilder
 from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.solids.loops import Loop, Points, chorded_pair
-from cmpdesign.products.mold.solids.shells import Feature, Slab
+from cmpdesign.products.mold.solids.slab_shells import Feature, Slab
 
 DEFLECTION_MM = 0.01
 DEFLECTION_RAD = 0.1

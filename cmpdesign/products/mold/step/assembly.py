@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from cmpdesign.products.mold.step.text import (
+from cmpdesign.products.mold.step.entities import (
     SHARED_ENTITIES,
     Direction,
     StepEntities,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from cmpdesign.products.mold.step.text import Direction, StepEntities, format_real, format_references
+from cmpdesign.products.mold.step.entities import Direction, StepEntities, format_real, format_references
 
 
 def add_solid(solid: Any, entities: StepEntities) -> int:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.products.mold.step.entities import StepEntities, add_context, add_product, format_real
 from cmpdesign.products.mold.step.shape import add_solid
-from cmpdesign.products.mold.step.text import StepEntities, add_context, add_product, format_real
 
 PART = "ADVANCED_BREP_SHAPE_REPRESENTATION"
 

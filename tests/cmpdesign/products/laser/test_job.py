@@ -19,6 +19,7 @@ from cmpdesign.cli import app
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.laser.as_made_svg import as_made_svg
+from cmpdesign.products.laser.checks import count_duplicate_paths, count_open_paths
 from cmpdesign.products.laser.figures import pass_timing
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
@@ -28,7 +29,6 @@ from cmpdesign.products.laser.paths.order import order_cells, shortest_pause
 from cmpdesign.products.laser.paths.strokes import ragged_strokes
 from cmpdesign.products.laser.paths.timing import move_times_s
 from cmpdesign.products.laser.paths.tour import find_short_tour, tour_length_mm
-from cmpdesign.products.laser.refuse import count_duplicate_paths, count_open_paths
 from extractor import Extractor
 from extractor.layout.layout_file import parse_layout
 from tests.support.laser_tools import Points, groups_of, made_job, run_gcode

@@ -15,9 +15,9 @@ from cmpdesign.products.mold.checks import facet_sag_mm
 from cmpdesign.products.mold.pad import _cavity_dish
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, boss_features
-from cmpdesign.products.mold.shapes.dished import dished_sheet_solid
+from cmpdesign.products.mold.shapes.dished_solids import dished_sheet_solid
 from cmpdesign.products.mold.solids.measure import distance_mm, overlap_mm3, subshapes, volume_mm3
-from cmpdesign.products.mold.solids.shells import Slab, make_slab_solid
+from cmpdesign.products.mold.solids.slab_shells import Slab, make_slab_solid
 from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.mold.step.assembly import PartPlace
 

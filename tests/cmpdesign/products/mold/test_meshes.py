@@ -13,7 +13,7 @@ import pytest
 from cmpdesign import build_layout, load_design
 from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
-from cmpdesign.products.mesh.triangles import TriangleMesh
+from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold import meshes as product
 from cmpdesign.products.mold.job_sheet import job_sheet_html
 from cmpdesign.products.mold.meshes import make_meshes, make_part_mesh

@@ -18,7 +18,7 @@ from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.meshes import make_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes import caps
-from cmpdesign.products.mold.solids import shells
+from cmpdesign.products.mold.solids import slab_shells as shells
 from cmpdesign.products.mold.solids.loops import (
     Loop,
     circle_loop,
@@ -27,7 +27,7 @@ from cmpdesign.products.mold.solids.loops import (
     rounded_polygon,
 )
 from cmpdesign.products.mold.solids.measure import drafts_deg, measure_solid, subshapes
-from cmpdesign.products.mold.solids.shells import Feature, Slab, make_slab_solid, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import Feature, Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.solids.tiled_faces import tile_faces
 from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.mold.step.step import NamedSolid, read_step, solid_to_step

@@ -12,8 +12,8 @@ from cmpdesign import build_layout, load_design
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.solids.measure import measure_solid, volume_mm3
 from cmpdesign.products.mold.stack.stack import make_stack
+from cmpdesign.products.mold.step.entities import format_real
 from cmpdesign.products.mold.step.step import NamedSolid, read_step, solid_to_step
-from cmpdesign.products.mold.step.text import format_real
 
 CROWNS = ("flat", "sphere", "cylinder")
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.files.video import CODECS, VideoWriter
+from cmpdesign.files.video_writer import CODECS, VideoWriter
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 

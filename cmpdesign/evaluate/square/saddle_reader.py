@@ -13,7 +13,7 @@ from heapq import heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.square.contours import SquareReader, refine_corners
+from cmpdesign.evaluate.square.contour_reader import SquareReader, refine_corners
 
 Points = NDArray[np.float64]
 LatticePlace = tuple[int, int]  # row, column

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.layer.green import GreenKernels
-from cmpdesign.contact.layer.inverse import InversePreconditioner
+from cmpdesign.contact.elastic_layer.green import GreenKernels
+from cmpdesign.contact.elastic_layer.inverse import InversePreconditioner
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -59,7 +59,7 @@ class ComplianceOperator:
 
         In single precision if the traction is.
         """
-        from cmpdesign.contact.layer.spectra import update_load_spectra
+        from cmpdesign.contact.elastic_layer.spectra import update_load_spectra
 
         spectra = self._spectra[traction_mpa.dtype]
         waves = self._forward_transform(traction_mpa)

@@ -9,7 +9,7 @@ import numpy as np
 from cmpdesign.products.mold.shapes.dish import Dish
 from cmpdesign.products.mold.solids.facets import FacetBuilder
 from cmpdesign.products.mold.solids.loops import Loop, Points, polygon_loop
-from cmpdesign.products.mold.solids.shells import ShellBuilder, Slab, slab_volume_mm3
+from cmpdesign.products.mold.solids.slab_shells import ShellBuilder, Slab, slab_volume_mm3
 from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
 
 Wires = list[list[int]]

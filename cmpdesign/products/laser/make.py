@@ -9,6 +9,7 @@ from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
+from cmpdesign.products.laser.checks import as_made_findings, path_findings, require_no_errors, setup_findings
 from cmpdesign.products.laser.coupon.job import coupon_job
 from cmpdesign.products.laser.figures import job_figures, pass_timing
 from cmpdesign.products.laser.formats.drawing import LaserDrawing, job_drawing
@@ -18,7 +19,6 @@ from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.job import make_job
 from cmpdesign.products.laser.job_sheet import job_sheet_html
-from cmpdesign.products.laser.refuse import as_made_findings, path_findings, require_no_errors, setup_findings
 from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.products.registry import ProductFiles
 

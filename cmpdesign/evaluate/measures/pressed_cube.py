@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.measures.edges import (
+from cmpdesign.evaluate.measures.edge_points import (
     circumscribed_square_mm,
     edge_points,
     mean_extent_mm,

@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.contact.elastic_layer.kernels import layer_compliances
 from cmpdesign.contact.elastomer import Elastomer
-from cmpdesign.contact.layer.kernels import layer_compliances
 
 Array = NDArray[np.float64]
 # Thicknesses within which the kernels fade to 2e-4 of their value at one thickness: they go with exp(-0.739 r / h), as

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.friction.allowed import ActiveSet, AdmissibleTractions
-from cmpdesign.contact.layer.operator import ComplianceOperator
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
+from cmpdesign.contact.friction.admissible import ActiveSet, AdmissibleTractions
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

@@ -179,7 +179,7 @@ def update_hidden_parts(planes: Planes, folds: Occlusion, texture: Planes, blur_
         texture: (n, height, width) the same sums for the flat layout, of ``folds.texture_size``.
         blur_px: the optics' blur.
     """
-    from cmpdesign.scene.drawing.folds_compiled import occlusion_residual
+    from cmpdesign.scene.drawing.occlusion_compiled import occlusion_residual
 
     uv = folds.texels_from_layout(folds.corners_mm)
     height, width = planes.shape[1:]
@@ -216,7 +216,7 @@ def _pixel_response(distance: Points, blur_px: float) -> Points:
 
 def is_hidden(folds: Occlusion, xyd: Points, facing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(N,) which points, x and y in px of the area and depth in mm, lie behind another part or ``facing`` away."""
-    from cmpdesign.scene.drawing.folds_compiled import nearest_depth
+    from cmpdesign.scene.drawing.occlusion_compiled import nearest_depth
 
     tile = np.floor((xyd[:, :2] + 0.5) / TILE_PX) * TILE_PX
     asked = (tile[:, None] == folds.tiles).all(axis=2).any(axis=1)

@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.contact.layer.green import GreenKernels
-from cmpdesign.contact.layer.kernels import layer_compliances
+from cmpdesign.contact.elastic_layer.green import GreenKernels
+from cmpdesign.contact.elastic_layer.kernels import layer_compliances
 
 Single = NDArray[np.float32]
 
