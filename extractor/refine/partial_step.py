@@ -155,9 +155,9 @@ def partial_step(
         xy=xy, lines=lines, bend=drawn_bend, contrasts=contrasts, black=black, sums=sums
     )
     measured, guiding, beyond, maps, rough, stepped, diagonal = markers
-    where = {"xy": xy, "measured": measured, "guiding": guiding, "beyond": beyond, "maps": maps}
+    where = {"xy": xy, "measured": measured, "reliable": guiding, "beyond": beyond, "maps": maps}
     bend, loose, joined, use, foot, aside = gridlines
-    how = {"bend": bend, "loose": loose, "rough": rough, "strides": stepped}
+    how = {"bend": bend, "bend_variance": loose, "roughness": rough, "normalized_steps": stepped}
     reading = reading._replace(lines=lines, contrasts=contrasts, foot=foot, weight=use, dot_gain_offset=aside)
     return fit._replace(**where, **how, information=Information(diagonal, joined), reading=reading), drawing
 

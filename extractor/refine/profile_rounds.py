@@ -52,7 +52,7 @@ def profile_step(
     reading = GridlineReading(
         lines, across.contrasts, foot, across.clearance, use, aside, fit.sigma, fit.noise, False
     )
-    return with_solution(fit, step, loose=loose, swelling=swelling, reading=reading), trusted
+    return with_solution(fit, step, bend_variance=loose, dot_gain=swelling, reading=reading), trusted
 
 
 @compiled
