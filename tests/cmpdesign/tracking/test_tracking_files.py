@@ -122,7 +122,7 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
 
 
 def test_jitter_at_rest_is_the_noise_of_resting_markers(made: Path, tmp_path: Path) -> None:
-    from tracking_scenes import shot
+    from tests.support.tracking_scenes import shot
 
     (tmp_path / "rest").mkdir()
     found = []

@@ -1,0 +1,179 @@
+"""Break the code at random places, one at a time, and count how many of these faults the tests notice.
+
+    .venv/bin/python tools/mutations.py --seed 1 --count 10
+    .venv/bin/python tools/mutations.py --only extractor.layout.lattice:layer_of:0
+
+A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (one more; a threshold by half) in a function. The
+faults are made in a copy of the checkout. Compiled code is cached by file, so the copy's caches are emptied for each fault in the extractor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parent.parent
+SWAPPED: dict[type, type] = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Lt: ast.GtE, ast.GtE: ast.Lt,
+    ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+}  # fmt: skip
+SIGNS: dict[type, str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Lt: "<", ast.GtE: ">=",
+    ast.Gt: ">", ast.LtE: "<=", ast.Eq: "==", ast.NotEq: "!=",
+}  # fmt: skip
+
+
+class Place(NamedTuple):
+    """A place that can be broken: the k-th of a function (dotted module, function's name)."""
+
+    module: str
+    function: str
+    k: int
+
+    def __str__(self) -> str:
+        return f"{self.module}:{self.function}:{self.k}"
+
+
+def path_of(module: str, root: Path) -> Path:
+    path = root / module.replace(".", "/")
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def functions(text: str) -> Iterator[ast.FunctionDef]:
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef):
+            yield node
+        elif isinstance(node, ast.ClassDef):
+            yield from (item for item in node.body if isinstance(item, ast.FunctionDef))
+
+
+def breakable(function: ast.FunctionDef) -> list[ast.expr]:
+    """The function's nodes that can be broken, in the order of its text."""
+    nodes: list[ast.expr] = []
+    for statement in function.body:
+        for node in ast.walk(statement):
+            swapped = isinstance(node, ast.BinOp) and type(node.op) in SWAPPED
+            compared = isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPPED
+            number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+            if swapped or compared or number:
+                nodes.append(node)  # type: ignore[arg-type]
+    return sorted(nodes, key=lambda node: (node.lineno, node.col_offset, type(node).__name__))
+
+
+def broken(text: str, place: Place) -> str:
+    """The module's text with the place broken.
+
+    Raises:
+        KeyError: there is no such place.
+    """
+    for function in functions(text):
+        if function.name == place.function and place.k < len(breakable(function)):
+            node = breakable(function)[place.k]
+            break
+    else:
+        raise KeyError(str(place))
+    lines = text.split("\n")
+    if isinstance(node, ast.Constant):
+        assert isinstance(node.value, int | float)
+        new = repr(node.value + 1 if isinstance(node.value, int) else node.value * 1.5 or 0.5)
+        row = lines[node.lineno - 1].encode()
+        lines[node.lineno - 1] = (row[: node.col_offset] + new.encode() + row[node.end_col_offset :]).decode()
+        return "\n".join(lines)
+    left = node.left  # type: ignore[attr-defined]
+    operator = type(node.op if isinstance(node, ast.BinOp) else node.ops[0])  # type: ignore[attr-defined]
+    at = left.end_lineno - 1
+    while SIGNS[operator] not in lines[at][left.end_col_offset if at == left.end_lineno - 1 else 0 :]:
+        at += 1
+    start = left.end_col_offset if at == left.end_lineno - 1 else 0
+    tail = lines[at][start:].replace(SIGNS[operator], SIGNS[SWAPPED[operator]], 1)
+    lines[at] = lines[at][:start] + tail
+    return "\n".join(lines)
+
+
+def places(root: Path) -> list[Place]:
+    """Every place of both packages."""
+    found = []
+    for package in ("extractor", "cmpdesign"):
+        for path in sorted((root / package).rglob("*.py")):
+            module = ".".join(path.relative_to(root).with_suffix("").parts)
+            for function in functions(path.read_text(encoding="utf-8")):
+                found += [Place(module, function.name, k) for k in range(len(breakable(function)))]
+    return found
+
+
+def notices(place: Place, root: Path, limit_s: float) -> str:
+    """What the tests say of one fault: "noticed by ..." or "not noticed"."""
+    path = path_of(place.module, root)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(broken(text, place), encoding="utf-8")
+    package = place.module.partition(".")[0]
+    if package == "extractor":
+        for cache in (root / "extractor").rglob("*.nb[ic]"):
+            cache.unlink()
+    files = sorted((root / "tests").rglob("test_*.py"), key=lambda file: relevance(file, place, root))
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, files)]
+    try:
+        result = subprocess.run(
+            command, cwd=root, capture_output=True, text=True, timeout=limit_s, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"not noticed in {limit_s:.0f} s"
+    finally:
+        path.write_text(text, encoding="utf-8")
+    if result.returncode == 0:
+        return "not noticed"
+    said = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return "noticed by " + (
+        said[0].partition(" ")[2].partition(" - ")[0] if said else "the collection of tests"
+    )
+
+
+def relevance(file: Path, place: Place, root: Path) -> tuple[int, str]:
+    """Tests that name the module come first, then those of the package, then the others."""
+    text = file.read_text(encoding="utf-8")
+    package = place.module.partition(".")[0]
+    parts = set(place.module.split(".")) & set(file.relative_to(root).with_suffix("").parts)
+    rank = (
+        0
+        if place.module in text
+        else 1
+        if len(parts) > 1
+        else 2
+        if f"import {package}" in text or f"from {package}" in text
+        else 3
+    )
+    return (rank, str(file))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--only", nargs="*", default=[], help="module:function:k")
+    parser.add_argument("--limit-s", type=float, default=900)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        copy = Path(name) / "copy"
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", "out", ".git"))
+        chosen = [Place(*word.split(":")[:2], int(word.split(":")[2])) for word in options.only]
+        chosen = chosen or random.Random(options.seed).sample(places(copy), options.count)
+        counts = 0
+        for place in chosen:
+            said = notices(place, copy, options.limit_s)
+            counts += said.startswith("noticed")
+            print(f"{place}  {said}", flush=True)
+        print(f"{counts} of {len(chosen)} noticed")
+
+
+if __name__ == "__main__":
+    os.environ.pop("PYTHONPATH", None)
+    main()
