@@ -3,8 +3,9 @@
     .venv/bin/python tools/mutations.py --seed 1 --count 10
     .venv/bin/python tools/mutations.py --only extractor.layout.lattice:layer_of:0
 
-A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (one more; a threshold by half) in a function. The
-faults are made in a copy of the checkout. Compiled code is cached by file, so the copy's caches are emptied for each fault in the extractor.
+A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (a whole number becomes one more,
+another half as much again). The faults are made in a copy of the checkout. Compiled code is cached by file, so the
+copy's caches are emptied for every fault in the extractor.
 """
 
 from __future__ import annotations
