@@ -5,7 +5,7 @@
 
 A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (a whole number becomes one more,
 another half as much again). The faults are made in a copy of the checkout. Compiled code is cached by file, so the
-copy's caches are emptied for every fault in the extractor.
+copy's caches of what imports the broken module are emptied.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import argparse
 import ast
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -111,14 +112,30 @@ def places(root: Path) -> list[Place]:
     return found
 
 
+def users(module: str, root: Path) -> set[str]:
+    """The module and all that import it, directly or not: what was compiled with it inlined."""
+    texts = {
+        ".".join(path.relative_to(root).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for package in ("extractor", "cmpdesign")
+        for path in (root / package).rglob("*.py")
+    }
+    found, new = set(), {module}
+    while new:
+        found |= new
+        names = [name for old in new for name in (old, old.rpartition(".")[2])]
+        word = re.compile("|".join(rf"(from|import) \.?{re.escape(name)}\b" for name in names))
+        new = {other for other, text in texts.items() if word.search(text)} - found
+    return found
+
+
 def notices(place: Place, root: Path, limit_s: float) -> str:
     """What the tests say of one fault: "noticed by ..." or "not noticed"."""
     path = path_of(place.module, root)
     text = path.read_text(encoding="utf-8")
     path.write_text(broken(text, place), encoding="utf-8")
-    package = place.module.partition(".")[0]
-    if package == "extractor":
-        for cache in (root / "extractor").rglob("*.nb[ic]"):
+    for module in users(place.module, root):
+        source = path_of(module, root)
+        for cache in (source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ic]"):
             cache.unlink()
     files = sorted((root / "tests").rglob("test_*.py"), key=lambda file: relevance(file, place, root))
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, files)]
@@ -164,7 +181,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         copy = Path(name) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", "out", ".git"))
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", "out", ".git"))  # with caches
         chosen = [Place(*word.split(":")[:2], int(word.split(":")[2])) for word in options.only]
         chosen = chosen or random.Random(options.seed).sample(places(copy), options.count)
         counts = 0
