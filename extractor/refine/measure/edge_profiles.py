@@ -30,7 +30,7 @@ CLEARANCE_COLUMNS = (
 
 
 @compiled
-def channel_projections(lines, contrasts, xy, cells, edge_cells, levels, black, frame_x, frame_y, scale):  # type: ignore[no-untyped-def]
+def channel_projections(lines, contrasts, xy, cells, edge_cells, levels, black, frame):  # type: ignore[no-untyped-def]
     """(E, 4) weights of the channels and offset that make a color 1 before and 0 beyond the gridline (along its
     normal), and (E, 4) the room beside it."""
     weights, room = np.zeros((lines.shape[0], 4)), np.zeros((lines.shape[0], CLEARANCE_COLUMNS))
@@ -41,9 +41,8 @@ def channel_projections(lines, contrasts, xy, cells, edge_cells, levels, black, 
             continue
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         x0, y0 = lines[e, X], lines[e, Y]
-        fill_monomials(
-            (x0 + 0.5 * length * ux - frame_x) / scale, (y0 + 0.5 * length * uy - frame_y) / scale, terms
-        )
+        middle_x, middle_y = x0 + 0.5 * length * ux, y0 + 0.5 * length * uy
+        fill_monomials((middle_x - frame.x) / frame.scale, (middle_y - frame.y) / frame.scale, terms)
         foot = 0.0
         for channel in range(3):
             weights[e, channel] = contrasts[e, channel] / strength

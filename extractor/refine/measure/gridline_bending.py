@@ -14,7 +14,10 @@ eliminated from a gridline's sums before the markers are solved, and follow afte
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.synthesis.gridlines import FIRST_RING, KNOWN, LENGTH, UX, UY
@@ -59,6 +62,20 @@ MIN_SIGNIFICANCE = 3.0  # standard deviations that bending must exceed its noise
 MAX_BEND = 0.3  # b and s, in units of the gridline's length
 
 
+class MarkerRows(NamedTuple):
+    """The four markers in a row along each edge.
+
+    Attributes:
+        edges: (E, 2) marker ids of the two in the middle.
+        next_markers: (E, 2) marker ids of the one before and the one after, -1 for none.
+        third_differences: (E, 2) the layout's own third difference of the four, in units of its mean edge.
+    """
+
+    edges: NDArray[np.int32]
+    next_markers: NDArray[np.int32]
+    third_differences: NDArray[np.float64]
+
+
 @inlined
 def _update_ordered_pairs(low, high):  # type: ignore[no-untyped-def]
     """Swap what stands the wrong way round."""
@@ -87,14 +104,14 @@ def _update_sorted_lanes(column):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def measure_roughness(xy, maps, diagonal, edges, ahead, third, spokes, near, which):  # type: ignore[no-untyped-def]
+def measure_roughness(xy, maps, diagonal, rows, spokes, near, which):  # type: ignore[no-untyped-def]
     """(M,) px^2: how rough the markers are around each of ``gridlines`` (M,) bool, from the squared third
     differences along
     the gridlines at it and at its neighbours, less what their noise and the layout itself explain; 0 elsewhere.
 
     Their median: one marker that dirt has moved does not make its gridlines free to follow it.
     """
-    square = _squared_third_differences(xy, maps, edges, ahead, third)
+    square = _squared_third_differences(xy, maps, rows)
     # what is hardly trusted where it bends must not be taken for noise
     noise = THIRD_DIFFERENCE_NOISE * 2.0 / np.median(diagonal[:, 0] + diagonal[:, 2])
     own, known, above = np.full(spokes.shape, np.nan), np.zeros(len(spokes)), np.zeros(len(spokes))
@@ -160,8 +177,9 @@ def third_difference(xy, maps, edges, ahead, third, e):  # type: ignore[no-untyp
 
 
 @compiled
-def _squared_third_differences(xy, maps, edges, ahead, third):  # type: ignore[no-untyped-def]
-    """(E,) squared, px^2, NaN where one of the four markers is not known."""
+def _squared_third_differences(xy, maps, rows):  # type: ignore[no-untyped-def]
+    """(E,) px^2, NaN where one of the four markers is not known."""
+    edges, ahead, third = rows.edges, rows.next_markers, rows.third_differences
     out = np.full(edges.shape[0], np.nan)
     for e in range(edges.shape[0]):
         if ahead[e, 0] >= 0 and ahead[e, 1] >= 0:
@@ -181,7 +199,7 @@ def bending_gridlines(rough, bend, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def estimate_bend_variance(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
+def estimate_bend_variance(sums, gradients, bend, rough, use, lines, edges, variance):  # type: ignore[no-untyped-def]
     """(E,) px^2, the variance of b and s, by what the gridlines around show, as far as they are in use (E,), and by how
     rough (M,) their ends are."""
     count = rough.shape[0]
@@ -195,7 +213,8 @@ def estimate_bend_variance(sums, to_a, to_b, off, bend, rough, use, lines, edges
         left = sums[e, CC] - by_a * ac - by_b * bc
         if not left > 1e-3 * sums[e, CC]:
             continue
-        b = bend[e, 0] + (sums[e, C] - off[e] * sums[e, SHARE_C] - by_a * to_a[e] - by_b * to_b[e]) / left
+        pull = sums[e, C] - gradients.level_shift[e] * sums[e, SHARE_C]
+        b = bend[e, 0] + (pull - by_a * gradients.start[e] - by_b * gradients.end[e]) / left
         for side in range(2):
             m = edges[e, side]
             total[m] += use[e] * b * b
@@ -215,7 +234,7 @@ def estimate_bend_variance(sums, to_a, to_b, off, bend, rough, use, lines, edges
 
 
 @compiled
-def update_without_bending(sums, to_a, to_b, off, bend, loose, variance):  # type: ignore[no-untyped-def]
+def update_without_bending(sums, gradients, bend, loose, variance):  # type: ignore[no-untyped-def]
     """Take what bending explains out of the gridlines' sums and votes, in place; (E, 6) what their bending is: by
     itself, and against a shift of the start and of the end towards the normal.
 
@@ -228,8 +247,8 @@ def update_without_bending(sums, to_a, to_b, off, bend, loose, variance):  # typ
         sums[e, READ_AA], sums[e, READ_BB] = sums[e, AA], sums[e, BB]
         if sums[e, AA] == 0.0:
             continue
-        c = sums[e, C] - off[e] * sums[e, SHARE_C]
-        d = sums[e, D] - off[e] * sums[e, SHARE_D]
+        c = sums[e, C] - gradients.level_shift[e] * sums[e, SHARE_C]
+        d = sums[e, D] - gradients.level_shift[e] * sums[e, SHARE_D]
         k[0, 0], k[0, 1], k[1, 0], k[1, 1] = sums[e, AC], sums[e, AD], sums[e, BC], sums[e, BD]
         x, y = -bend[e, 0], -bend[e, 1]
         if loose[e] > 0.0:
@@ -244,8 +263,8 @@ def update_without_bending(sums, to_a, to_b, off, bend, loose, variance):  # typ
         kept[e, 0], kept[e, 1] = x, y
         sums[e, MISFIT] -= 2.0 * (x * c + y * d)
         sums[e, MISFIT] += x * x * sums[e, CC] + 2.0 * x * y * sums[e, CD] + y * y * sums[e, DD]
-        to_a[e] -= k[0, 0] * x + k[0, 1] * y
-        to_b[e] -= k[1, 0] * x + k[1, 1] * y
+        gradients.start[e] -= k[0, 0] * x + k[0, 1] * y
+        gradients.end[e] -= k[1, 0] * x + k[1, 1] * y
         sums[e, AA] -= k[0, 0] * kept[e, 2] + k[0, 1] * kept[e, 3]
         sums[e, AB] -= k[1, 0] * kept[e, 2] + k[1, 1] * kept[e, 3]
         sums[e, BB] -= k[1, 0] * kept[e, 4] + k[1, 1] * kept[e, 5]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY, X, Y
@@ -39,6 +42,20 @@ MIN_MARKER_WEIGHT = 0.3  # of the gridlines around a marker, for it to be believ
 CONTRAST_TO_BLUR = 1.79
 
 
+class ShiftGradients(NamedTuple):
+    """Gradients of the log-likelihood by shifts of the gridlines' ends, times the noise's variance.
+
+    Attributes:
+        start, end: (E,) gray levels^2 / px, by a shift of the start and of the end along the normal (-uy, ux).
+        level_shift: (E,) gray levels^2, the change of the levels of both sides together times the contrast; 0 where
+            levels stay as they are.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    level_shift: NDArray[np.float64]
+
+
 @compiled
 def chord_midpoints(lines):  # type: ignore[no-untyped-def]
     """(E, 2) the middle of each gridline's chord."""
@@ -50,34 +67,42 @@ def chord_midpoints(lines):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def shift_gradients(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them; and
-    the change of the levels of both sides together, times the contrast.
+def shift_gradients(sums, contrasts, edge_cells, change, middle, frame):  # type: ignore[no-untyped-def]
+    """The gradients by shifts of the gridlines' ends: of the residual less the part that new levels explain.
 
-    ``cell_change`` (K, 3) and ``black_change`` (3, 10) are the changes of the levels and of the black's polynomial.
+    Args:
+        sums: (E, 24), as ``accumulate_residual_sums`` gives them.
+        contrasts: (E, 3) gray levels.
+        edge_cells: (E, 2) the drawn cells on both sides, -1 for none.
+        change: ``LevelChange`` since the pattern was drawn.
+        middle: (E, 2) px, the middles of the chords.
+        frame: ``PolynomialFrame`` of the black polynomial.
+
+    Returns:
+        ``ShiftGradients``.
     """
     count = sums.shape[0]
-    to_a, to_b, off = np.zeros(count), np.zeros(count), np.zeros(count)
-    terms = np.empty(black_change.shape[1])
+    start, end, level_shift = np.zeros(count), np.zeros(count), np.zeros(count)
+    terms = np.empty(change.black.shape[1])
     for e in range(count):
         if sums[e, AA] == 0.0:
             continue
-        fill_monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
+        fill_monomials((middle[e, 0] - frame.x) / frame.scale, (middle[e, 1] - frame.y) / frame.scale, terms)
         for channel in range(3):
-            change = 0.0
+            both_sides = 0.0
             for k in range(terms.shape[0]):
-                change += 2.0 * terms[k] * black_change[channel, k]
+                both_sides += 2.0 * terms[k] * change.black[channel, k]
             for side in range(2):
                 if edge_cells[e, side] >= 0:
-                    change += cell_change[edge_cells[e, side], channel]
-            off[e] += contrasts[e, channel] * change
-        to_a[e] = sums[e, A] - off[e] * sums[e, SHARE_A]
-        to_b[e] = sums[e, B] - off[e] * sums[e, SHARE_B]
-    return to_a, to_b, off
+                    both_sides += change.cell[edge_cells[e, side], channel]
+            level_shift[e] += contrasts[e, channel] * both_sides
+        start[e] = sums[e, A] - level_shift[e] * sums[e, SHARE_A]
+        end[e] = sums[e, B] - level_shift[e] * sums[e, SHARE_B]
+    return ShiftGradients(start, end, level_shift)
 
 
 @compiled
-def gridline_misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
+def gridline_misfits(sums, gradients, values, least):  # type: ignore[no-untyped-def]
     """(E,) the mean squared residual of gridlines once they are moved, a place; NaN where there are no more than
     ``min_places`` places, each of which adds so many ``values``."""
     out = np.full(sums.shape[0], np.nan)
@@ -86,7 +111,8 @@ def gridline_misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untype
             continue
         aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
         determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
-        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
+        start, end = gradients.start[e], gradients.end[e]
+        explained = (bb * start**2 - 2 * ab * start * end + aa * end**2) / determinant
         out[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
     return out
 
@@ -127,7 +153,7 @@ def _noise_from_misfits(misfit, use, usual):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def weigh_gridlines(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
+def weigh_gridlines(sums, gradients, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; their usual misfit, and
     the noise (NaN where nothing was read).
 
@@ -135,7 +161,7 @@ def weigh_gridlines(sums, to_a, to_b, pardon, values, least, unjudged):  # type:
     ``default_weight``; a
     misfit of less than its ``pardon`` (E,) is always forgiven.
     """
-    misfit = gridline_misfits(sums, to_a, to_b, values, least)
+    misfit = gridline_misfits(sums, gradients, values, least)
     usual = median_of_misfits(misfit)
     use = misfit_weights(sums, misfit, usual, pardon, values, unjudged)
     return use, usual, _noise_from_misfits(misfit, use, usual)

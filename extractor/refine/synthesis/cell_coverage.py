@@ -11,7 +11,10 @@ pixel near its middle, so that float32 does, and all is done for many at once, w
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import inlined_no_refcount
 from extractor.numeric.gaussian import NORMAL_REACH, fill_corner_terms, normal_cdf, wedge_correlation
@@ -26,6 +29,20 @@ PX, PY = 0, COLUMN  # columns of pixels: their places
 SIDE_COLUMNS = 9  # numbers
 REACH_FLOAT32 = np.float32(NORMAL_REACH)
 STEPS = np.arange(COLUMN, dtype=np.float32)
+
+
+class CellOutline(NamedTuple):
+    """The sides and corners of one cell.
+
+    Attributes:
+        side: (3, 9), as ``fill_sides`` gives them, in units of the blur.
+        corners: (3, 9) float32, as ``fill_corners`` gives them.
+        far: in units of the blur, the distance from a side's chord beyond which a pixel's share no longer changes.
+    """
+
+    side: NDArray[np.float64]
+    corners: NDArray[np.float32]
+    far: float
 
 
 @inlined_no_refcount
@@ -202,12 +219,12 @@ def is_small(side):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def fill_coverage(places, count, x0, y0, side, corners, far, sides, shares):  # type: ignore[no-untyped-def]
+def fill_coverage(places, count, x0, y0, outline, sides, shares):  # type: ignore[no-untyped-def]
     """Fill in the shares of a cell in the pixels that are laid out in ``places``, which count from (x0, y0)."""
     padded = padded_count(count)
     for k in range(3):
-        _fill_distances(places, padded, side[k], x0, y0, far, sides[k * COLUMN :])
-    if is_small(side):
-        _fill_three_side_coverage(sides, corners, padded, shares)
+        _fill_distances(places, padded, outline.side[k], x0, y0, outline.far, sides[k * COLUMN :])
+    if is_small(outline.side):
+        _fill_three_side_coverage(sides, outline.corners, padded, shares)
     else:
-        _fill_two_side_coverage(sides, corners, padded, shares)
+        _fill_two_side_coverage(sides, outline.corners, padded, shares)

@@ -17,7 +17,7 @@ MIN_SINE = 0.2  # of a corner: a sharper one is moved no farther
 
 
 @compiled
-def measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma):  # type: ignore[no-untyped-def]
+def measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma):  # type: ignore[no-untyped-def]
     """By how much the sides of all cells have moved outward, px; 0 where it is little, or few gridlines are seen.
 
     That is the median of what these show, by their sums (E, 24) and votes (E,) for moving their starts and ends.
@@ -29,14 +29,15 @@ def measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma):  # type: i
     for e in some:
         outward = _outward_sign(contrasts, edge_cells, e)
         if outward != 0.0:
-            off[count] = outward * (to_a[e] + to_b[e]) / (sums[e, AA] + 2.0 * sums[e, AB] + sums[e, BB])
+            gradient = gradients.start[e] + gradients.end[e]
+            off[count] = outward * gradient / (sums[e, AA] + 2.0 * sums[e, AB] + sums[e, BB])
             count += 1
     swelling = np.median(off[:count]) if count > MIN_GRIDLINES else 0.0
     return swelling if abs(swelling) > MIN_DOT_GAIN * sigma else 0.0
 
 
 @compiled
-def update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, swelling):  # type: ignore[no-untyped-def]
+def update_without_dot_gain(sums, gradients, contrasts, edge_cells, swelling):  # type: ignore[no-untyped-def]
     """(E,) px, by how much gridlines lie off towards their normal for that; it is taken out of their sums and votes, in
     place."""
     aside = np.zeros(sums.shape[0])
@@ -47,9 +48,9 @@ def update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, swelling): 
             continue
         off = swelling * _outward_sign(contrasts, edge_cells, e)
         by_a, by_b = sums[e, AA] + sums[e, AB], sums[e, AB] + sums[e, BB]
-        sums[e, MISFIT] -= off * (2.0 * (to_a[e] + to_b[e]) - off * (by_a + by_b))
-        to_a[e] -= off * by_a
-        to_b[e] -= off * by_b
+        sums[e, MISFIT] -= off * (2.0 * (gradients.start[e] + gradients.end[e]) - off * (by_a + by_b))
+        gradients.start[e] -= off * by_a
+        gradients.end[e] -= off * by_b
         sums[e, C] -= off * (sums[e, AC] + sums[e, BC])
         sums[e, D] -= off * (sums[e, AD] + sums[e, BD])
         aside[e] = off

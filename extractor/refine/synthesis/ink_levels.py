@@ -42,6 +42,44 @@ class InkLevels(NamedTuple):
     is_outlier: NDArray[np.bool_]
 
 
+class InkCells(NamedTuple):
+    """The cells of the pattern by ink.
+
+    Attributes:
+        cells: (K, 3) marker ids of the drawn cells.
+        black_cells: (B, 3) marker ids of the black cells.
+        color: (K,) inks of the drawn cells.
+    """
+
+    cells: NDArray[np.int32]
+    black_cells: NDArray[np.int32]
+    color: NDArray[np.int32]
+
+
+class InkPolynomials(NamedTuple):
+    """The inks as polynomials over the image.
+
+    Attributes:
+        coefficients: (5, 3, 10) by ink and channel.
+        variance: (5,) gray levels^2, of the cells about the polynomials beyond noise.
+    """
+
+    coefficients: NDArray[np.float64]
+    variance: NDArray[np.float64]
+
+
+class LevelChange(NamedTuple):
+    """A change of the inks' levels.
+
+    Attributes:
+        cell: (K, 3) gray levels, of the drawn cells over black.
+        black: (3, 10) of the black polynomial.
+    """
+
+    cell: NDArray[np.float64]
+    black: NDArray[np.float64]
+
+
 @compiled
 def fill_monomials(x, y, out):  # type: ignore[no-untyped-def]
     """Write the ten terms at (x, y)."""
@@ -182,9 +220,10 @@ def _robust_polynomial(terms, values, noise, count, rounds):  # type: ignore[no-
 
 
 @compiled
-def _fill_levels(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
-    """Fill in the cells' levels over black and their slopes."""
-    terms = np.empty(TERMS)
+def _fill_levels(own, place, color, noise, inks, scale, levels):  # type: ignore[no-untyped-def]
+    """Fill in the cells' levels over black and their slopes, in ``levels``, the outliers of which are known."""
+    terms, fields, spreads = np.empty(TERMS), inks.coefficients, inks.variance
+    cell, slope, strange = levels.cell, levels.slope, levels.is_outlier
     for i in range(own.shape[0]):
         x, y = place[i, 0], place[i, 1]
         if not np.isfinite(x):
@@ -236,32 +275,35 @@ def _ink_samples(values, place, color, ink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cell_centroids(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
+def _cell_centroids(xy, cells, frame):  # type: ignore[no-untyped-def]
+    """(K, 2) the centroids of cells in the frame of the polynomials, NaN where a corner is unknown."""
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
         a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
-        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - x0) / scale
-        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - y0) / scale
+        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - frame.x) / frame.scale
+        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - frame.y) / frame.scale
     return out
 
 
 @compiled
-def smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """``InkLevels``, one by one, from the cells' own ones.
+def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no-untyped-def]
+    """The inks' levels, smoothed over the cells of each ink.
 
     Args:
-        drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
+        drawn: (K, 4) own levels of the drawn cells and their numbers of pixels, as ``cell_means`` gives them.
         black: (B, 4) the same for the black cells.
-        xy: (M, 2) the markers, NaN where unknown.
-        noise: grey levels.
-        x0, y0, scale: the frame of the polynomials.
+        xy: (M, 2) px, the markers, NaN where unknown.
+        pattern: ``InkCells``.
+        noise: gray levels.
+        frame: ``PolynomialFrame``.
+
+    Returns:
+        ``InkLevels``.
     """
     fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
-    strange = np.zeros(drawn.shape[0], np.bool_)
-    place, place_black = (
-        _cell_centroids(xy, cells, x0, y0, scale),
-        _cell_centroids(xy, black_cells, x0, y0, scale),
-    )
+    strange, color = np.zeros(drawn.shape[0], np.bool_), pattern.color
+    place = _cell_centroids(xy, pattern.cells, frame)
+    place_black = _cell_centroids(xy, pattern.black_cells, frame)
     for ink in range(INKS):
         if ink == BLACK:
             terms, own, number = _ink_samples(black, place_black, color, ink)
@@ -283,8 +325,9 @@ def smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, 
             for i in range(n):
                 strange[number[i]] = odd[i]
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
-    _fill_levels(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
-    return cell, slope, fields[BLACK], strange
+    levels = InkLevels(cell, slope, fields[BLACK], strange)
+    _fill_levels(drawn, place, color, noise, InkPolynomials(fields, spreads), frame.scale, levels)
+    return levels
 
 
 @compiled
@@ -299,11 +342,11 @@ def level_change(before, now):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def black_levels_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
+def black_levels_at(black, xy, frame):  # type: ignore[no-untyped-def]
     """(K, 3): the black's polynomial at the points (K, 2) px."""
     out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
     for i in range(xy.shape[0]):
-        fill_monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
+        fill_monomials((xy[i, 0] - frame.x) / frame.scale, (xy[i, 1] - frame.y) / frame.scale, terms)
         for channel in range(3):
             for k in range(TERMS):
                 out[i, channel] += terms[k] * black[channel, k]

@@ -6,7 +6,10 @@ its two ends as 1 - t and t: the gradient of the log-likelihood, and its curvatu
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, inlined_no_refcount, vectorized_no_refcount
 from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y
@@ -44,6 +47,37 @@ C0, C1, C2, C3, C4, C5 = _density_terms()
 P1, P3, P5 = np.float32(15 / 16), np.float32(-5 / 8), np.float32(3 / 16)
 END = np.float32(0.42)
 END_BELL = 0.3989
+
+
+class DrawnGridlines(NamedTuple):
+    """Gridlines as they are drawn.
+
+    Attributes:
+        lines: (E, 8), as ``gridlines`` gives them.
+        contrasts: (E, 3) gray levels, the level on the side of (uy, -ux) less that on the side of (-uy, ux).
+        black: (E, 3) gray levels, the black under the middles of the chords.
+        is_bending: (E,) bool, gridlines with two more unknowns for their bending.
+    """
+
+    lines: NDArray[np.float64]
+    contrasts: NDArray[np.float64]
+    black: NDArray[np.float64]
+    is_bending: NDArray[np.bool_]
+
+
+class RowBuffers(NamedTuple):
+    """Memory for the pixels of one gridline.
+
+    Attributes:
+        first: (n,) int64, the first pixels of the rows. rows: their columns. weights: six columns of the pixels.
+        projections: (n,) the residual along the contrast. squares: (n,) its square over all channels.
+    """
+
+    first: NDArray[np.int64]
+    rows: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    projections: NDArray[np.float32]
+    squares: NDArray[np.float32]
 
 
 @compiled
@@ -230,33 +264,39 @@ def _fill_residual(image, model, area, residual):  # type: ignore[no-untyped-def
 
 
 @compiled
-def accumulate_residual_sums(image, model, lines, contrasts, black, sigma, box, loose, residual):  # type: ignore[no-untyped-def]
-    """(E, 24) sums over the pixels near each gridline; the columns are named above.
+def accumulate_residual_sums(image, model, drawn, sigma, box, residual):  # type: ignore[no-untyped-def]
+    """Sums over the pixels near each gridline.
 
-    AA, AB, BB: squared derivatives of the drawing by the gridline's offset at its ends; A, B: derivative times
-    residual (image - model - black, the last at the gridline's middle); SHARE: derivative times the share of a side,
-    per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma. C and D
-    likewise are for the bending of the gridlines that are ``bend_variance`` (E,) bool, 0 elsewhere. ``residual`` is
-    room for
-    the pixels in the box.
+    Args:
+        image: (H, W, 3) uint8.
+        model: (H, W, 3) float32, the pattern over black.
+        drawn: ``DrawnGridlines`` in the model.
+        sigma: px, the blur.
+        box: (4,) px, x from, y from, x to, y to: the drawn part of the image.
+        residual: (H * W * 3,) float32, overwritten with image - model.
+
+    Returns:
+        (E, 24), the columns are named above. AA, AB, BB: squared derivatives of the drawing by the gridline's offset
+        at both ends; A, B: derivative times residual (image - model - black, the last at the gridline's middle); SHARE:
+        derivative times the share of a side, per unit of contrast; MISFIT: squared residual of PIXELS; BLUR: residual
+        times the derivative by sigma. C and D are the same for the bending of gridlines that bend, 0 elsewhere.
     """
-    out = np.zeros((lines.shape[0], SUMS))
-    area = _band_box(lines, BAND * sigma, box)
+    sums = np.zeros((drawn.lines.shape[0], SUMS))
+    area = _band_box(drawn.lines, BAND * sigma, box)
     _fill_residual(image, model, area, residual)
-    at, rows, weights = (
-        np.empty(CHUNK, np.int64),
-        np.empty(4 * CHUNK, np.float32),
-        np.empty(6 * CHUNK, np.float32),
-    )
-    room = at, rows, weights, np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
-    _accumulate_gridline_sums(residual, lines, contrasts, black, sigma, area, loose, room, out)
-    return out
+    first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
+    projections, squares = np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
+    buffers = RowBuffers(first, rows, np.empty(6 * CHUNK, np.float32), projections, squares)
+    _accumulate_gridline_sums(residual, area, drawn, sigma, buffers, sums)
+    return sums
 
 
 @inlined_no_refcount
-def _accumulate_gridline_sums(residual, lines, contrasts, black, sigma, area, loose, room, out):  # type: ignore[no-untyped-def]
+def _accumulate_gridline_sums(residual, area, drawn, sigma, buffers, out):  # type: ignore[no-untyped-def]
     """Fill in the sums (E, 24) from the residual within the area."""
-    at, rows, weights, rest, squares = room
+    lines, contrasts, black = drawn.lines, drawn.contrasts, drawn.black
+    at, rows, weights = buffers.first, buffers.rows, buffers.weights
+    rest, squares = buffers.projections, buffers.squares
     inverse, reach = 1.0 / sigma, BAND * sigma
     width, height = area[2] - area[0], area[3] - area[1]
     for e in range(lines.shape[0]):
@@ -293,7 +333,7 @@ def _accumulate_gridline_sums(residual, lines, contrasts, black, sigma, area, lo
             fill_projections_and_squares(residual, at, count, wide, step_q, color, beneath, rest, squares)
             _fill_weights(rows, lanes, wide, *steps, *small, *shape, weights)
             _accumulate_sums(rest, squares, weights, lanes * wide, sums)
-            if loose[e]:
+            if drawn.is_bending[e]:
                 _accumulate_bending_sums(rest, weights, lanes * wide, sums)
         for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
             sums[k] *= strength * inverse * inverse
