@@ -45,6 +45,21 @@ class CellOutline(NamedTuple):
     far: float
 
 
+class Corner(NamedTuple):
+    """The numbers that ``wedge_correlation`` takes of one corner, float32: for each of three nodes the factors of the
+    sum of squares (a) and of the product (b), and the node's weight (w)."""
+
+    a0: np.float32
+    a1: np.float32
+    a2: np.float32
+    b0: np.float32
+    b1: np.float32
+    b2: np.float32
+    w0: np.float32
+    w1: np.float32
+    w2: np.float32
+
+
 @inlined_no_refcount
 def _fill_side(lines, e, forward, sense, inverse, out):  # type: ignore[no-untyped-def]
     """A cell's side in units of the blur: d = out[0] + out[1] x + out[2] y inside, t from its first corner likewise.
@@ -156,26 +171,32 @@ def _wedge_correlation(d, other, corner):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def _corner_terms(corners, k):  # type: ignore[no-untyped-def]
+def _corner(corners, k):  # type: ignore[no-untyped-def]
+    """Row k of the corners (3, 9) as a record."""
     c = corners[k]
-    return c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]
+    return Corner(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8])
 
 
 @inlined_no_refcount
 def _selected_corner(which, one, other):  # type: ignore[no-untyped-def]
-    """Nine numbers of one corner or of another."""
-    a0, a1, a2, b0, b1, b2, w0, w1, w2 = one
-    c0, c1, c2, d0, d1, d2, v0, v1, v2 = other
-    a0, a1, a2 = a0 if which else c0, a1 if which else c1, a2 if which else c2
-    b0, b1, b2 = b0 if which else d0, b1 if which else d1, b2 if which else d2
-    w0, w1, w2 = w0 if which else v0, w1 if which else v1, w2 if which else v2
-    return a0, a1, a2, b0, b1, b2, w0, w1, w2
+    """One corner where ``which``, else the other, without a branch."""
+    return Corner(
+        one.a0 if which else other.a0,
+        one.a1 if which else other.a1,
+        one.a2 if which else other.a2,
+        one.b0 if which else other.b0,
+        one.b1 if which else other.b1,
+        one.b2 if which else other.b2,
+        one.w0 if which else other.w0,
+        one.w1 if which else other.w1,
+        one.w2 if which else other.w2,
+    )
 
 
 @inlined_no_refcount
 def _fill_two_side_coverage(sides, corners, count, shares):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares where two sides at most are near."""
-    c01, c12, c20 = _corner_terms(corners, 0), _corner_terms(corners, 1), _corner_terms(corners, 2)
+    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
     for k in range(count):
         d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
         low, high = min(min(d0, d1), d2), max(max(d0, d1), d2)
@@ -194,7 +215,7 @@ def _fill_two_side_coverage(sides, corners, count, shares):  # type: ignore[no-u
 @inlined_no_refcount
 def _fill_three_side_coverage(sides, corners, count, shares):  # type: ignore[no-untyped-def]
     """Fill in the pixels' shares wherever they lie."""
-    c01, c12, c20 = _corner_terms(corners, 0), _corner_terms(corners, 1), _corner_terms(corners, 2)
+    c01, c12, c20 = _corner(corners, 0), _corner(corners, 1), _corner(corners, 2)
     for k in range(count):
         d0, d1, d2 = sides[k], sides[COLUMN + k], sides[2 * COLUMN + k]
         s0, s1, s2 = _half_plane_coverage(d0), _half_plane_coverage(d1), _half_plane_coverage(d2)
