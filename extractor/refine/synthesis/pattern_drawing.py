@@ -1,8 +1,7 @@
-"""The pattern is drawn from its current markers, and cells of it are taken out again.
+"""Drawing of the pattern from its current markers, and erasing of single cells.
 
-A pixel of the drawing is the share of each cell in it (``coverages``) times the cell's level over black. Shares are
-kept:
-to take a cell out, as much is subtracted as had been added, for a fraction of the time.
+A pixel of the drawing is the sum over the cells of the cell's share in that pixel (``cell_coverage``) times its level
+over black. The shares are kept: erasing subtracts what was added, for a fraction of the time.
 """
 
 from __future__ import annotations
@@ -30,21 +29,18 @@ from extractor.refine.synthesis.cell_coverage import (
 from extractor.refine.synthesis.gridlines import KNOWN
 from extractor.refine.synthesis.pixel_rows import LANES, padded_count
 
-MAX_COVERAGES, MAX_RUNS = (
-    1 << 18,
-    1 << 16,
-)  # of what is drawn; more than that is drawn once more to be taken out
-FIRST_RUN, RUN_COUNT, FIRST_COVERAGE = range(3)  # columns of a cell's strokes
+MAX_COVERAGES, MAX_RUNS = 1 << 18, 1 << 16  # that are kept; cells beyond are drawn once more to be erased
+FIRST_RUN, RUN_COUNT, FIRST_COVERAGE = range(3)  # columns of a cell's kept coverages
 
 
 class CoverageRuns(NamedTuple):
-    """What has been drawn.
+    """The coverages of the cells that were drawn.
 
     Attributes:
-        cell: (K, 3) each cell's first run, their number (0: not kept) and first share.
+        cell: (K, 3) each cell's first run, its number of runs (0: not kept) and its first coverage.
         runs: (R, 3) x, y and number of pixels in a row of the image.
-        shares: (S,) of a cell in these pixels.
-        used: (2,) runs and shares.
+        coverages: (S,) shares of the cell in these pixels.
+        used: (2,) numbers of runs and of coverages in use.
     """
 
     cell: NDArray[np.int64]
@@ -148,7 +144,7 @@ class RowEnds(NamedTuple):
 
 
 def allocate_coverage_runs(cells: int, shares: int = MAX_COVERAGES) -> CoverageRuns:
-    """Nothing drawn yet of so many cells."""
+    """Empty memory for a number of cells and of their coverages in all."""
     runs = np.empty((MAX_RUNS, 3), np.int32)
     return CoverageRuns(
         np.zeros((cells, 3), np.int64), runs, np.empty(shares, np.float32), np.zeros(2, np.int64)
@@ -172,11 +168,11 @@ def _fill_colors(places, count, shares, plane, colors):  # type: ignore[no-untyp
 
 @inlined_no_refcount
 def _add_colors(flat, width, runs, colors):  # type: ignore[no-untyped-def]
-    """Add the three channels of pixels to their runs (n, 3) in a flat image."""
+    """Add the three channels of pixels to the runs (n, 3) of a flat image; ``width`` px."""
     first = np.uint64(0)
     for i in range(runs.shape[0]):
         at, own = np.uint64(3 * (runs[i, 1] * width + runs[i, 0])), np.int32(3 * runs[i, 2])
-        # whole lanes, of which those beyond the row are masked: a rest would be added one by one
+        # whole lanes with those beyond the row masked; a remainder would be added one by one
         for j in range(padded_count(own)):
             k = np.uint64(j)
             if np.int32(j) < own:
