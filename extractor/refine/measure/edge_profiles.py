@@ -12,7 +12,7 @@ from extractor.numeric.bilinear import weighted_sample
 from extractor.numeric.compilation import compiled
 from extractor.refine.measure.matched_filter import HEIGHT, MAX_REACH, SINE_A, SINE_B, SQUARED_CONTRAST
 from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, sagitta
-from extractor.refine.synthesis.ink_levels import fill_monomials
+from extractor.refine.synthesis.ink_polynomials import fill_monomials
 
 BLUR_SAMPLES = 8  # on each side of a gridline
 MIN_CONTRAST = 12.0  # gray levels
@@ -25,9 +25,7 @@ MIN_BLUR_GRIDLINES = 12
 APPARENT_BLUR = np.array([0.0, 0.092, 0.112, 0.128, 0.137, 0.149, 0.154])
 TRUE_BLUR = np.array([0.000, 0.093, 0.117, 0.140, 0.160, 0.195, 0.225])
 BILINEAR_PX2 = 1.0 / 6.0  # mean variance that bilinear sampling adds to the blur
-CLEARANCE_COLUMNS = (
-    4  # height of the lower cell beside the gridline, sines of the angles at its ends, contrast^2
-)
+CLEARANCE_COLUMNS = 4  # ``HEIGHT``, ``SINE_A``, ``SINE_B``, ``SQUARED_CONTRAST``
 
 
 @compiled

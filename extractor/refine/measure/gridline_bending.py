@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.synthesis.gridlines import FIRST_RING, KNOWN, LENGTH, UX, UY
+from extractor.refine.synthesis.pixel_weights import BAND
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
     AC,
     AD,
-    BAND,
     BB,
     BC,
     BD,

@@ -25,9 +25,8 @@ from extractor.refine.synthesis.pixel_rows import (
     row_frame,
     row_sizes,
 )
-from extractor.refine.synthesis.residual_kernel import C0, C1, C2, C3, C4, C5
+from extractor.refine.synthesis.pixel_weights import BAND, C0, C1, C2, C3, C4, C5
 
-BAND = 2.2  # in units of the blur, the distance from a gridline within which pixels count
 CLEAR_SIGMA = 2.0  # in units of the blur, the least distance of the next gridline where nothing was drawn
 MIN_WEIGHT_SUM = 0.08  # of the squared weights of pixels at a virtual marker
 OFFSET, VARIANCE = range(2)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY, X, Y
-from extractor.refine.synthesis.ink_levels import fill_monomials
+from extractor.refine.synthesis.ink_polynomials import fill_monomials
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH
 from extractor.refine.synthesis.pixel_rows import row_frame
+from extractor.refine.synthesis.pixel_weights import C0, C1, C2, C3, C4, C5
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
@@ -26,12 +27,6 @@ from extractor.refine.synthesis.residual_kernel import (
     BB,
     BC,
     BD,
-    C0,
-    C1,
-    C2,
-    C3,
-    C4,
-    C5,
     CC,
     CD,
     DD,

@@ -21,7 +21,7 @@ from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, 
 from extractor.refine.synthesis.pixel_rows import LANES, padded_count
 
 CHUNK = 2128  # pixels of one cell at once, at most
-COLUMN = CHUNK + LANES  # room for whole lanes; a power of 2 would put all columns on one cache line
+COLUMN = CHUNK + LANES  # pixels and one lane; a power of 2 would put all columns on one cache line
 PX, PY = 0, COLUMN  # columns of pixels: x and y, px
 SIDE_COLUMNS = 9  # numbers of a side, see ``_fill_side``
 REACH_FLOAT32 = np.float32(NORMAL_REACH)

@@ -202,7 +202,7 @@ def _fill_runs(x, y, ends, x0, y0, places, runs):  # type: ignore[no-untyped-def
 
 @inlined_no_refcount
 def _draw_cell(i, sense, geometry, appearance, box, canvas, buffers):  # type: ignore[no-untyped-def]
-    """Draw a cell, and keep its coverages if it is added and there is room."""
+    """Draw a cell, and keep its coverages if it is added and memory is left."""
     xy, cells, sigma = geometry.xy, geometry.cells, appearance.sigma
     side, places, shares, runs = buffers.side, buffers.places, buffers.shares, buffers.runs
     kept, used = canvas.kept, canvas.kept.used
@@ -270,7 +270,7 @@ def _cell_buffers(height):  # type: ignore[no-untyped-def]
 
 @compiled
 def draw_cells(which, sense, geometry, appearance, box, model, kept):  # type: ignore[no-untyped-def]
-    """Add cells to a drawing, and keep their coverages as far as there is room.
+    """Add cells to a drawing, and keep their coverages as far as memory is left.
 
     Args:
         which: (K,) bool, the cells to draw.
