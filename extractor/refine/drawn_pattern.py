@@ -20,14 +20,23 @@ from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import chord_midpoints, median_edge, pattern_box
 from extractor.refine.solve.convergence import groups_with_any
 from extractor.refine.synthesis.gridlines import gridlines
-from extractor.refine.synthesis.ink_levels import InkLevels, black_levels_at, cell_means, smoothed_levels
+from extractor.refine.synthesis.ink_levels import (
+    InkCells,
+    InkLevels,
+    black_levels_at,
+    cell_means,
+    smoothed_levels,
+)
 from extractor.refine.synthesis.pattern_drawing import (
+    CellAppearance,
+    CellGeometry,
     CoverageRuns,
     allocate_coverage_runs,
     draw_cells,
     update_erasing_cells,
 )
 from extractor.refine.synthesis.residual_kernel import (
+    DrawnGridlines,
     accumulate_residual_sums,
     fill_zeros,
     update_known_contrasts,
@@ -90,7 +99,7 @@ def draw_pattern(view: PyramidLevel, mesh: Topology, fit: Estimate, board: Drawi
     read, edge_px, bettered = _draw_pattern(image, tuple(board), pattern, packed_topology(mesh), look, inside)
     lines, contrasts, black, sums = read
     where = fit.xy, lines, fit.bend
-    return Synthesis(*where, contrasts, black, sums, fit.levels, InkLevels(*bettered), box, sigma, edge_px)
+    return Synthesis(*where, contrasts, black, sums, fit.levels, bettered, box, sigma, edge_px)
 
 
 def packed_topology(mesh: Topology) -> tuple[NDArray[Any], ...]:
@@ -102,7 +111,7 @@ def packed_appearance(
     view: PyramidLevel, levels: InkLevels, sigma: float, box: NDArray[np.int64]
 ) -> tuple[Any, ...]:
     """How the pattern looks, likewise: levels, black, the frame of these, blur and box."""
-    return (levels.cell, levels.slope), levels.black, tuple(view.frame), sigma, box
+    return (levels.cell, levels.slope), levels.black, view.frame, sigma, box
 
 
 @compiled
@@ -116,13 +125,14 @@ def _draw_pattern(image, board, pattern, sides, look, inside):  # type: ignore[n
     contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, slope)
     fill_zeros(picture, box)
     strokes.used[:] = 0
-    every, colors = np.ones(len(cells), np.bool_), (cell, slope, sigma, box, picture, strokes)
-    draw_cells(every, 1.0, xy, cells, cell_edges, edges, lines, *colors)
+    every, geometry = np.ones(len(cells), np.bool_), CellGeometry(xy, cells, cell_edges, edges, lines)
+    draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
     below, loose = (
-        black_levels_at(black, chord_midpoints(lines), *frame),
+        black_levels_at(black, chord_midpoints(lines), frame),
         bending_gridlines(rough, bend, edges),
     )
-    sums = accumulate_residual_sums(image, picture, lines, contrasts, below, sigma, box, loose, residual)
+    drawn = DrawnGridlines(lines, contrasts, below, loose)
+    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, residual)
     bettered = _corrected_levels(image, picture, xy, cells, cell, frame, *inside)
     return (lines, contrasts, below, sums), median_edge(xy, edges), bettered
 
@@ -133,7 +143,7 @@ def _corrected_levels(image, picture, xy, cells, cell, frame, black_cells, color
     own = cell_means(image, picture, xy, cells, 0.0)
     own[:, :3] += cell
     black = cell_means(image, picture, xy, black_cells, 0.0)
-    return smoothed_levels(own, black, xy, cells, black_cells, color, noise, *frame)
+    return smoothed_levels(own, black, xy, InkCells(cells, black_cells, color), noise, frame)
 
 
 @compiled
@@ -150,11 +160,14 @@ def draw_pattern_part(image, board, pattern, sides, look, anew, before):  # type
     xy, bend, ends = merged_rows(anew, xy, old_xy), bend[some], edges[some]
     own = gridlines(xy, maps, bend, ends, along[some])
     contrasts = update_known_contrasts(own, xy, cells, edge_cells[some], cell, slope)
-    lines, colors = replaced_rows(old_lines, some, own), (cell, slope, sigma, box, picture, strokes)
-    update_erasing_cells(which, old_xy, cells, cell_edges, edges, old_lines, *colors)
-    draw_cells(which, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    below, loose = black_levels_at(black, chord_midpoints(own), *frame), bending_gridlines(rough, bend, ends)
-    sums = accumulate_residual_sums(image, picture, own, contrasts, below, sigma, box, loose, residual)
+    lines, appearance = replaced_rows(old_lines, some, own), CellAppearance(cell, slope, sigma)
+    old_geometry = CellGeometry(old_xy, cells, cell_edges, edges, old_lines)
+    update_erasing_cells(which, old_geometry, appearance, box, picture, strokes)
+    geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
+    draw_cells(which, 1.0, geometry, appearance, box, picture, strokes)
+    below, loose = black_levels_at(black, chord_midpoints(own), frame), bending_gridlines(rough, bend, ends)
+    drawn = DrawnGridlines(own, contrasts, below, loose)
+    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, residual)
     contrasts, below = replaced_rows(old_contrasts, some, contrasts), replaced_rows(old_black, some, below)
     return (
         xy,

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.image.input import estimate_noise
-from extractor.image.pyramid import PyramidLevel
+from extractor.image.pyramid import PolynomialFrame, PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate
 from extractor.refine.measure.edge_profiles import channel_projections, profile_blur
 from extractor.refine.measure.gridline_weights import MIN_NOISE
 from extractor.refine.synthesis.blur_bleed import bleed_shares, remove_bleed
-from extractor.refine.synthesis.ink_levels import InkLevels, cell_means, smoothed_levels
+from extractor.refine.synthesis.ink_levels import InkCells, cell_means, smoothed_levels
 from extractor.refine.synthesis.residual_kernel import update_known_contrasts
 from extractor.refine.synthesis_steps import MIN_SIGMA_PX
 
@@ -28,8 +28,8 @@ NO_MODEL = np.empty((0, 0, 3), np.float32)
 def initial_appearance(view: PyramidLevel, mesh: Topology, xy: NDArray[np.float64]) -> Appearance:
     """The noise and the levels in the middles of the cells; the blur is not known yet."""
     usual, tables = DEFAULT_SIGMA_PX / view.scale, (mesh.cells, mesh.black, mesh.cell_color)
-    noise, *levels = _initial_appearance(view.image, NO_MODEL, xy, *tables, usual, *view.frame)
-    return Appearance(view.scale, 0.0, noise, InkLevels(*levels), noise)
+    noise, levels = _initial_appearance(view.image, NO_MODEL, xy, *tables, usual, *view.frame)
+    return Appearance(view.scale, 0.0, noise, levels, noise)
 
 
 @compiled
@@ -37,7 +37,8 @@ def _initial_appearance(image, nothing, xy, cells, black_cells, color, sigma, x0
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
     drawn = cell_means(image, nothing, xy, cells, sigma)
     black = cell_means(image, nothing, xy, black_cells, sigma)
-    return (noise,) + smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale)
+    pattern, frame = InkCells(cells, black_cells, color), PolynomialFrame(x0, y0, scale)
+    return noise, smoothed_levels(drawn, black, xy, pattern, noise, frame)
 
 
 def update_edge_contrasts(
@@ -53,7 +54,8 @@ def update_edge_contrasts(
 @compiled
 def _update_edge_contrasts(lines, xy, cells, edge_cells, cell, slope, black, x0, y0, scale):  # type: ignore[no-untyped-def]
     contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, slope)
-    weights, room = channel_projections(lines, contrasts, xy, cells, edge_cells, cell, black, x0, y0, scale)
+    frame = PolynomialFrame(x0, y0, scale)
+    weights, room = channel_projections(lines, contrasts, xy, cells, edge_cells, cell, black, frame)
     return contrasts, weights, room
 
 

@@ -25,6 +25,7 @@ from extractor.refine.drawn_pattern import (
 )
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import (
+    MarkerRows,
     bend_after_shift,
     bending_misfit,
     estimate_bend_variance,
@@ -58,6 +59,7 @@ from extractor.refine.solve.subproblem import (
 )
 from extractor.refine.synthesis.dot_gain import update_without_dot_gain
 from extractor.refine.synthesis.gridlines import KNOWN
+from extractor.refine.synthesis.ink_levels import LevelChange
 
 
 class Subproblem(NamedTuple):
@@ -146,7 +148,7 @@ def partial_step(
         reading.foot,
         reading.dot_gain_offset,
     )
-    changes = bettered.cell - levels.cell, bettered.black - levels.black
+    changes = LevelChange(bettered.cell - levels.cell, bettered.black - levels.black)
     said = fit.noise, fit.median_misfit, fit.dot_gain, wide, changes
     given = view.image, tuple(board), anew, tables, look, tuple(drawing[:6])
     drew, markers, gridlines = _draw_and_solve_part(*given, markers, gridlines, said)
@@ -172,7 +174,7 @@ def _draw_and_solve_part(image, board, anew, tables, look, before, markers, grid
     free = anew.copy()
     add_neighbours(anew, edges, free)
     if not wide:
-        about = edges, ahead, third, spokes, near
+        about = MarkerRows(edges, ahead, third), spokes, near
         rough = merged_rows(free, measure_roughness(guiding, maps, known, *about, free), rough)
     drew = draw_pattern_part(image, board, (xy, maps, bend, rough), sides, look, anew, before)
     part = _subproblem(free, beyond, rough, _held_shifts(measured, before[0], anew), edges, spokes)
@@ -217,21 +219,20 @@ def _subproblem_reading(drew, part, edge_cells, gridlines, look, said):  # type:
         selected_rows(contrasts, which),
     )
     cells, bend = selected_rows(edge_cells, which), selected_rows(bend, which)
-    to_a, to_b, off = shift_gradients(
-        sums, contrasts, cells, changes[0], changes[1], chord_midpoints(lines), *frame
-    )
-    aside = update_without_dot_gain(sums, to_a, to_b, contrasts, cells, swelling)
+    gradients = shift_gradients(sums, contrasts, cells, changes, chord_midpoints(lines), frame)
+    aside = update_without_dot_gain(sums, gradients, contrasts, cells, swelling)
     loose = np.zeros(len(which))
     if np.any(part.roughness) or np.any(bend):
         about = use[which], lines, part.ends, variance
-        loose = estimate_bend_variance(sums, to_a, to_b, off, bend, part.roughness, *about)
-    kept = update_without_bending(sums, to_a, to_b, off, bend, loose, variance)
+        loose = estimate_bend_variance(sums, gradients, bend, part.roughness, *about)
+    kept = update_without_bending(sums, gradients, bend, loose, variance)
     misfit, pardon = (
-        gridline_misfits(sums, to_a, to_b, values, least),
+        gridline_misfits(sums, gradients, values, least),
         bending_misfit(loose, contrasts, sigma),
     )
     trusted = misfit_weights(sums, misfit, usual, pardon, values, unjudged)
-    return SubproblemReading(lines, contrasts, sums, to_a, to_b, off, bend, loose, kept, trusted, aside)
+    start, end, off = gradients.start, gradients.end, gradients.level_shift
+    return SubproblemReading(lines, contrasts, sums, start, end, off, bend, loose, kept, trusted, aside)
 
 
 @compiled

@@ -15,7 +15,7 @@ from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import EdgeContrasts, Estimate
 from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import weigh_gridlines
+from extractor.refine.measure.gridline_weights import ShiftGradients, weigh_gridlines
 from extractor.refine.measure.matched_filter import read_profiles
 from extractor.refine.outliers import suspect_markers
 from extractor.refine.refinement_step import MisfitRule, solve_step, update_for_bending, with_solution
@@ -64,18 +64,18 @@ def _profile_step(image, lines, across, now, tables, most, judged):  # type: ign
     edges, spokes, edge_cells = tables
     values, least, unjudged = SAMPLE_MISFIT_RULE
     sums = read_profiles(image, lines, weights, room, sigma, bending_gridlines(rough, bend, edges), most)
-    to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums))
-    swelling = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
-    aside = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, swelling)
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums)))
+    swelling = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
+    aside = update_without_dot_gain(sums, gradients, contrasts, edge_cells, swelling)
     bending = bend, rough, before, lines, edges, noise
-    loose, kept = update_for_bending(sums, to_a, to_b, off, *bending, values, least, unjudged)
+    loose, kept = update_for_bending(sums, gradients, *bending, values, least, unjudged)
     trusted, _, _ = weigh_gridlines(
-        sums, to_a, to_b, MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST], values, least, unjudged
+        sums, gradients, MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST], values, least, unjudged
     )
     use = trusted if judged else _lenient_weights(trusted, sums, edges, spokes)
     where = xy, beyond, edges, spokes, sigma, noise, False
     read = trusted, use, loose, swelling, aside
-    return (read,) + solve_step(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
+    return (read,) + solve_step(sums, gradients, bend, kept, use, lines, contrasts, *where)
 
 
 @compiled

@@ -18,6 +18,7 @@ from extractor.refine.estimate import EdgeContrasts, Estimate
 from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import (
     PRIOR_HIDDEN_PX,
+    ShiftGradients,
     gridline_misfits,
     median_of_misfits,
     misfit_weights,
@@ -67,7 +68,7 @@ def _fill_recovered_markers(image, pattern, across, start, tables, lost, xy, cov
     at, beyond, _, _, _, _, (sigma, noise, _) = pattern
     edges, spokes, _, _ = tables
     which, count = _lost_and_reference_gridlines(lost, edges)
-    lines, sums, to_a, to_b, use, loose = _weighed_profiles(image, pattern, across, tables, which, count)
+    lines, sums, gradients, use, loose = _weighed_profiles(image, pattern, across, tables, which, count)
     which, use, loose = which[:count], use[:count], loose[:count]
     markers, ends, turned = number_subproblem(which, edges, spokes)
     asked = lost[markers] & well_weighted_markers(use, turned)
@@ -79,7 +80,8 @@ def _fill_recovered_markers(image, pattern, across, start, tables, lost, xy, cov
     diagonal, joined = np.empty((len(markers), 3)), np.empty((count, 4))
     geometry = lines[:count], selected_rows(across[0], which), ends, turned, sigma, variance, prior
     fill_information(sums[:count], believed, False, *geometry, diagonal, joined)
-    right = gradient(to_a[:count], to_b[:count], believed, variance, lines[:count], ends, len(markers))
+    start_gradient, end_gradient = gradients.start[:count], gradients.end[:count]
+    right = gradient(start_gradient, end_gradient, believed, variance, lines[:count], ends, len(markers))
     measured = selected_rows(at, markers) + solve_shifts(diagonal, joined, ends, right)
     near = selected_rows(start[0], markers), start[1][markers], start[2][markers]
     own, wide = accepted_markers(measured, diagonal, joined, loose, ends, turned, *near, asked)
@@ -112,15 +114,15 @@ def _weighed_profiles(image, pattern, across, tables, which, count):  # type: ig
     lines = gridlines(at, maps, bend, ends, selected_rows(along, which))
     weights, bending = selected_rows(across[1], which), bending_gridlines(rough, bend, ends)
     sums = read_profiles(image, lines, weights, room, sigma, bending, STATIONS)
-    to_a, to_b, off = sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which))
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which)))
     update_without_dot_gain(
-        sums, to_a, to_b, selected_rows(across[0], which), selected_rows(edge_cells, which), swelling
+        sums, gradients, selected_rows(across[0], which), selected_rows(edge_cells, which), swelling
     )
     said = bend, rough, before[which], lines, ends, noise
-    loose, _ = update_for_bending(sums, to_a, to_b, off, *said, values, least, unjudged)
-    misfit = gridline_misfits(sums, to_a, to_b, values, least)
+    loose, _ = update_for_bending(sums, gradients, *said, values, least, unjudged)
+    misfit = gridline_misfits(sums, gradients, values, least)
     usual = median_of_misfits(misfit[count:] if len(which) - count >= MIN_REFERENCE_GRIDLINES else misfit)
     use = misfit_weights(
         sums, misfit, usual, MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST], values, unjudged
     )
-    return lines, sums, to_a, to_b, use, loose
+    return lines, sums, gradients, use, loose

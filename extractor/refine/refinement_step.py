@@ -11,6 +11,7 @@ from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import (
+    MarkerRows,
     bend_after_shift,
     estimate_bend_variance,
     measure_roughness,
@@ -100,14 +101,8 @@ def with_pattern_moved(mesh: Topology, fit: Estimate, which: NDArray[np.bool_] |
 
 def with_roughness(mesh: Topology, fit: Estimate) -> Estimate:
     """The fit with how rough its markers are."""
-    about = (
-        mesh.edges,
-        mesh.next_markers,
-        mesh.third_differences,
-        mesh.spokes,
-        mesh.near,
-        np.ones(len(mesh.spokes), np.bool_),
-    )
+    rows = MarkerRows(mesh.edges, mesh.next_markers, mesh.third_differences)
+    about = rows, mesh.spokes, mesh.near, np.ones(len(mesh.spokes), np.bool_)
     return fit._replace(roughness=measure_roughness(fit.reliable, fit.maps, fit.information.diagonal, *about))
 
 
@@ -117,16 +112,16 @@ def gridlines_of(mesh: Topology, fit: Estimate) -> NDArray[np.float64]:
 
 
 @compiled
-def update_for_bending(sums, to_a, to_b, off, bend, rough, use, lines, edges, noise, values, least, unjudged):  # type: ignore[no-untyped-def]
+def update_for_bending(sums, gradients, bend, rough, use, lines, edges, noise, values, least, unjudged):  # type: ignore[no-untyped-def]
     """(E,) px^2 how freely gridlines bend, as far as they were in ``weight`` before (E,), and (E, 6) what their bending
     is, taken out of ``sums`` and votes in place."""
     loose, variance = np.zeros(len(sums)), 1.0
     if np.any(rough) or np.any(bend):
         # what the drawing misses everywhere is no bending either
-        usual = weigh_gridlines(sums, to_a, to_b, np.zeros(len(sums)), values, least, unjudged)[2]
+        usual = weigh_gridlines(sums, gradients, np.zeros(len(sums)), values, least, unjudged)[2]
         variance = max(noise, usual) ** 2 if np.isfinite(usual) else noise**2
-        loose = estimate_bend_variance(sums, to_a, to_b, off, bend, rough, use, lines, edges, variance)
-    return loose, update_without_bending(sums, to_a, to_b, off, bend, loose, variance)
+        loose = estimate_bend_variance(sums, gradients, bend, rough, use, lines, edges, variance)
+    return loose, update_without_bending(sums, gradients, bend, loose, variance)
 
 
 def with_solution(fit: Estimate, solution: tuple[Any, ...], **others: Any) -> Estimate:
@@ -140,7 +135,7 @@ def with_solution(fit: Estimate, solution: tuple[Any, ...], **others: Any) -> Es
 
 @compiled
 def solve_step(  # type: ignore[no-untyped-def]
-    sums, to_a, to_b, bend, kept, use, lines, contrasts, xy, beyond, edges, spokes, sigma, noise, overlapping
+    sums, gradients, bend, kept, use, lines, contrasts, xy, beyond, edges, spokes, sigma, noise, overlapping
 ):
     """Of ``Estimate``: measured, guiding, bend, strides and the information's blocks, after the step that was asked
     for."""
@@ -150,7 +145,7 @@ def solve_step(  # type: ignore[no-untyped-def]
     prior = np.where(beyond, PRIOR_HIDDEN_PX**-2, PRIOR_PX**-2)
     geometry = (lines, contrasts, edges, spokes, sigma, variance, prior)
     fill_information(sums, believed, overlapping, *geometry, diagonal, beside)
-    right = gradient(to_a, to_b, believed, variance, lines, edges, count)
+    right = gradient(gradients.start, gradients.end, believed, variance, lines, edges, count)
     shift = solve_shifts(diagonal, beside, edges, right)
     least = least_information(sums, use, lines, edges, variance, count)
     measured, guiding = markers_after_shift(xy, shift, least, use, spokes)

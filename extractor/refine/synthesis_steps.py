@@ -45,7 +45,7 @@ from extractor.refine.solve.convergence import (
 )
 from extractor.refine.synthesis.blur_bleed import adapt_levels_to_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.ink_levels import level_change
+from extractor.refine.synthesis.ink_levels import LevelChange, level_change
 from extractor.refine.synthesis.residual_kernel import update_known_contrasts
 
 MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
@@ -192,19 +192,25 @@ class SynthesisSolver:
         """The fit after the step that what was read asks for."""
         mesh, levels, bettered = self._mesh, drawing.levels, drawing.corrected_levels
         assert fit.reading is not None
-        changes = bettered.cell - levels.cell, bettered.black - levels.black
+        changes = LevelChange(bettered.cell - levels.cell, bettered.black - levels.black)
         now = fit.xy, fit.beyond, fit.roughness, drawing.bend, fit.reading.weight, fit.noise
         seen = drawing.lines, drawing.contrasts, drawing.black, drawing.sums, drawing.sigma
         tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
         inks = bettered.cell, bettered.slope
-        read, wider, noise, *step = _update_and_solve(seen, changes, inks, now, tables, tuple(frame))
+        read, wider, noise, *step = _update_and_solve(seen, changes, inks, now, tables, frame)
         use, usual, loose, foot, swelling, aside = read
         how = NO_CLEARANCE, use, aside, drawing.sigma, noise, True
         reading = GridlineReading(drawing.lines, drawing.contrasts, foot, *how)
         sigma = _blur_after_step(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
             bettered = adapt_levels_to_blur(bettered, fit.xy, mesh, drawing.sigma, sigma)
-        about = {"bend_variance": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
+        about = {
+            "bend_variance": loose,
+            "reading": reading,
+            "noise": noise,
+            "sigma": sigma,
+            "levels": bettered,
+        }
         return with_solution(fit, step, median_misfit=usual, dot_gain=swelling, **about)
 
 
@@ -223,23 +229,21 @@ def _update_and_solve(seen, changes, inks, now, tables, frame):  # type: ignore[
     edges, spokes, cells, edge_cells = tables
     values, least, unjudged = PIXEL_MISFIT_RULE
     sums = read.copy()
-    cell_change, black_change = changes
-    to_a, to_b, off = shift_gradients(
-        sums, contrasts, edge_cells, cell_change, black_change, chord_midpoints(lines), *frame
-    )
-    swelling = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
-    aside = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, swelling)
+    gradients = shift_gradients(sums, contrasts, edge_cells, changes, chord_midpoints(lines), frame)
+    swelling = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
+    aside = update_without_dot_gain(sums, gradients, contrasts, edge_cells, swelling)
     said = bend, rough, before, lines, edges, noise
-    loose, kept = update_for_bending(sums, to_a, to_b, off, *said, values, least, unjudged)
+    loose, kept = update_for_bending(sums, gradients, *said, values, least, unjudged)
     use, usual, found = weigh_gridlines(
-        sums, to_a, to_b, bending_misfit(loose, contrasts, sigma), values, least, unjudged
+        sums, gradients, bending_misfit(loose, contrasts, sigma), values, least, unjudged
     )
     noise = found if np.isfinite(found) else noise
     where = xy, beyond, edges, spokes, sigma, noise, True
-    step = solve_step(sums, to_a, to_b, bend, kept, use, lines, contrasts, *where)
+    step = solve_step(sums, gradients, bend, kept, use, lines, contrasts, *where)
     current = update_known_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
     wider = blur_change(sums, aside, use, contrasts, current, sigma)
-    return ((use, usual, loose, foot_levels(contrasts, black, off), swelling, aside), wider, noise) + step
+    foot = foot_levels(contrasts, black, gradients.level_shift)
+    return ((use, usual, loose, foot, swelling, aside), wider, noise) + step
 
 
 def _without_bending(fit: Estimate) -> Estimate:

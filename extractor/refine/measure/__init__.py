@@ -1,4 +1,4 @@
-"""How far every gridline lies from where it is drawn, and how far each measurement is to be trusted.
+"""The offsets of the gridlines from where they are drawn, with their weights, and the bending of the gridlines.
 
-In: the image or its residual, gridlines. Out: offsets across the gridlines with weights, and how freely gridlines bend.
+In: the image or its residual, gridlines. Out: offsets across the gridlines, weights, variances of the bending.
 """

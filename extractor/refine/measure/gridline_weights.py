@@ -1,12 +1,15 @@
-"""What a step of refinement needs beside its votes: whom to trust, what changed, and how far the markers moved."""
+"""Gradients by shifts of the gridlines, the gridlines' weights by their misfit, and the markers after a step."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY, X, Y
-from extractor.refine.synthesis.ink_levels import fill_monomials
+from extractor.refine.synthesis.ink_polynomials import fill_monomials
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
@@ -23,25 +26,52 @@ from extractor.refine.synthesis.residual_kernel import (
     B,
 )
 
-SHORTEST_RARITY = 100  # one in so many gridlines is shorter than what is called a short edge
-MIN_NOISE = 0.3  # grey levels; rounding alone makes 0.29
-PRIOR_HIDDEN_PX = 1.0  # how far a marker beyond the pattern's known part may be drawn by nothing
-MIN_INFORMATION_SHARE = (
-    0.04  # of the usual information, below which a marker does not guide its neighbours' gridlines; at the
-)
-# pattern's rim, unless believed and known so well: there the map through those on one side knows less
+SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
+MIN_NOISE = 0.3  # gray levels; rounding alone makes 0.29
+PRIOR_HIDDEN_PX = 1.0  # prior deviation of a hidden marker from its prediction
+# A marker with less than this share of the median information does not guide its neighbours' gridlines. At the rim, a
+# marker with enough weight and a smaller deviation than this does: the map of markers on one side only is less precise.
+MIN_INFORMATION_SHARE = 0.04
 RIM_DEVIATION_PX = 0.05
-MIN_CLEAN_SHARE = 0.68  # of the gridlines look as the pattern does, where their noise is that of all
-MIN_OFFSET_WEIGHT = 0.4  # of a gridline, for its places to be measured
-MIN_MARKER_WEIGHT = 0.3  # of the gridlines around a marker, for it to be believed if its neighbours agree
-# An error of contrast looks like one of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
+MIN_CLEAN_SHARE = 0.68  # of the gridlines with weight 1, from which on the noise is that of all gridlines
+MIN_OFFSET_WEIGHT = 0.4  # of a gridline, for its offsets to be measured
+MIN_MARKER_WEIGHT = 0.3  # mean weight of the gridlines at a marker, for the marker to count
+# An error of contrast looks like an error of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
 # normal density and N its integral.
 CONTRAST_TO_BLUR = 1.79
 
 
+class GridlineWeights(NamedTuple):
+    """The weights of the gridlines.
+
+    Attributes:
+        weight: (E,) 0 to 1.
+        median_misfit: gray levels^2, NaN where nothing was read.
+        noise: gray levels, NaN where nothing was read.
+    """
+
+    weight: NDArray[np.float64]
+    median_misfit: float
+    noise: float
+
+
+class ShiftGradients(NamedTuple):
+    """Gradients of the log-likelihood by shifts of the gridlines' ends, times the noise's variance.
+
+    Attributes:
+        start, end: (E,) gray levels^2 / px, by a shift of the start and of the end along the normal (-uy, ux).
+        level_shift: (E,) gray levels^2, the change of the levels of both sides together times the contrast; 0 where
+            levels stay as they are.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    level_shift: NDArray[np.float64]
+
+
 @compiled
 def chord_midpoints(lines):  # type: ignore[no-untyped-def]
-    """(E, 2) the middle of each gridline's chord."""
+    """(E, 2) px, the middles of the gridlines' chords; ``lines`` (E, 8)."""
     out = np.empty((lines.shape[0], 2))
     for e in range(lines.shape[0]):
         half = 0.5 * lines[e, LENGTH]
@@ -50,123 +80,148 @@ def chord_midpoints(lines):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def shift_gradients(sums, contrasts, edge_cells, cell_change, black_change, middle, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """(E,) each, the votes for moving a gridline's start and end: residuals less what new levels explain of them; and
-    the change of the levels of both sides together, times the contrast.
+def shift_gradients(sums, contrasts, edge_cells, change, middle, frame):  # type: ignore[no-untyped-def]
+    """The gradients by shifts of the gridlines' ends: of the residual less the part that new levels explain.
 
-    ``cell_change`` (K, 3) and ``black_change`` (3, 10) are the changes of the levels and of the black's polynomial.
+    Args:
+        sums: (E, 24), as ``accumulate_residual_sums`` gives them.
+        contrasts: (E, 3) gray levels.
+        edge_cells: (E, 2) the drawn cells on both sides, -1 for none.
+        change: ``LevelChange`` since the pattern was drawn.
+        middle: (E, 2) px, the middles of the chords.
+        frame: ``PolynomialFrame`` of the black polynomial.
+
+    Returns:
+        ``ShiftGradients``.
     """
     count = sums.shape[0]
-    to_a, to_b, off = np.zeros(count), np.zeros(count), np.zeros(count)
-    terms = np.empty(black_change.shape[1])
+    start, end, level_shift = np.zeros(count), np.zeros(count), np.zeros(count)
+    terms = np.empty(change.black.shape[1])
     for e in range(count):
         if sums[e, AA] == 0.0:
             continue
-        fill_monomials((middle[e, 0] - x0) / scale, (middle[e, 1] - y0) / scale, terms)
+        fill_monomials((middle[e, 0] - frame.x) / frame.scale, (middle[e, 1] - frame.y) / frame.scale, terms)
         for channel in range(3):
-            change = 0.0
+            both_sides = 0.0
             for k in range(terms.shape[0]):
-                change += 2.0 * terms[k] * black_change[channel, k]
+                both_sides += 2.0 * terms[k] * change.black[channel, k]
             for side in range(2):
                 if edge_cells[e, side] >= 0:
-                    change += cell_change[edge_cells[e, side], channel]
-            off[e] += contrasts[e, channel] * change
-        to_a[e] = sums[e, A] - off[e] * sums[e, SHARE_A]
-        to_b[e] = sums[e, B] - off[e] * sums[e, SHARE_B]
-    return to_a, to_b, off
+                    both_sides += change.cell[edge_cells[e, side], channel]
+            level_shift[e] += contrasts[e, channel] * both_sides
+        start[e] = sums[e, A] - level_shift[e] * sums[e, SHARE_A]
+        end[e] = sums[e, B] - level_shift[e] * sums[e, SHARE_B]
+    return ShiftGradients(start, end, level_shift)
 
 
 @compiled
-def gridline_misfits(sums, to_a, to_b, values, least):  # type: ignore[no-untyped-def]
-    """(E,) the mean squared residual of gridlines once they are moved, a place; NaN where there are no more than
-    ``min_places`` places, each of which adds so many ``values``."""
+def gridline_misfits(sums, gradients, values, min_places):  # type: ignore[no-untyped-def]
+    """The misfit of the gridlines: the mean squared residual once their ends are moved.
+
+    Args:
+        sums: (E, 24). gradients: ``ShiftGradients``.
+        values: of each place, 3 for a pixel and 1 for a sample along the contrast.
+        min_places: a gridline with no more places has no misfit.
+
+    Returns:
+        (E,) gray levels^2; NaN where there is none.
+    """
     out = np.full(sums.shape[0], np.nan)
     for e in range(sums.shape[0]):
-        if sums[e, PIXELS] <= least:
+        if sums[e, PIXELS] <= min_places:
             continue
         aa, ab, bb = sums[e, AA], sums[e, AB], sums[e, BB]
         determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
-        explained = (bb * to_a[e] ** 2 - 2 * ab * to_a[e] * to_b[e] + aa * to_b[e] ** 2) / determinant
+        start, end = gradients.start[e], gradients.end[e]
+        explained = (bb * start**2 - 2 * ab * start * end + aa * end**2) / determinant
         out[e] = max(sums[e, MISFIT] - explained, 0.0) / (values * sums[e, PIXELS] - 2)
     return out
 
 
 @compiled
-def misfit_weights(sums, misfit, usual, pardon, values, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines whose ``misfit`` (E,) is not more than the ``median_misfit`` one may be by
-    chance, or their
-    ``pardon`` (E,); ``default_weight`` for what was read but has none."""
-    use = np.zeros(sums.shape[0])
+def misfit_weights(sums, misfit, median_misfit, tolerance, values, default_weight):  # type: ignore[no-untyped-def]
+    """The weights of gridlines by their misfit.
+
+    Args:
+        sums: (E, 24). misfit: (E,) gray levels^2, NaN for none.
+        median_misfit: gray levels^2, of gridlines that look like the pattern.
+        tolerance: (E,) gray levels^2, a misfit that does not lower the weight.
+        values: of each place.
+        default_weight: of gridlines that were read but have no misfit.
+
+    Returns:
+        (E,) 0 to 1; 1 where the misfit is below the tolerance or explained by chance.
+    """
+    weight = np.zeros(sums.shape[0])
     for e in range(sums.shape[0]):
         if np.isfinite(misfit[e]):
-            limit = max(usual * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2))), pardon[e])
-            use[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
+            by_chance = median_misfit * (1.25 + 5 * np.sqrt(2 / (values * sums[e, PIXELS] - 2)))
+            limit = max(by_chance, tolerance[e])
+            weight[e] = min(1.0, limit / max(misfit[e], 1e-12)) ** 2
         else:
-            use[e] = unjudged if sums[e, AA] > 0.0 else 0.0
-    return use
+            weight[e] = default_weight if sums[e, AA] > 0.0 else 0.0
+    return weight
 
 
 @compiled
 def median_of_misfits(misfit):  # type: ignore[no-untyped-def]
-    """The median of those that were judged; NaN where none was."""
-    judged = misfit[np.isfinite(misfit)]
-    return max(np.median(judged), MIN_NOISE**2) if judged.shape[0] > 0 else np.nan
+    """gray levels^2, the median of the misfits (E,) that are not NaN; NaN without any."""
+    known = misfit[np.isfinite(misfit)]
+    return max(np.median(known), MIN_NOISE**2) if known.shape[0] > 0 else np.nan
 
 
 @compiled
-def _noise_from_misfits(misfit, use, usual):  # type: ignore[no-untyped-def]
-    """The noise by the gridlines' misfit (E,), the ``median_misfit`` one, and how far they are in ``weight`` (E,);
-    NaN where none
-    was judged."""
-    sound = misfit[use == 1.0]
-    if (
-        0 < sound.shape[0] < MIN_CLEAN_SHARE * np.count_nonzero(np.isfinite(misfit))
-    ):  # what is dirty is no noise
-        return np.sqrt(max(np.median(sound), MIN_NOISE**2))
-    return np.sqrt(usual)
+def _noise_from_misfits(misfit, weight, median_misfit):  # type: ignore[no-untyped-def]
+    """The noise in gray levels, from the gridlines' misfits (E,), their weights (E,) and the median misfit; NaN where
+    that is NaN."""
+    clean = misfit[weight == 1.0]
+    if 0 < clean.shape[0] < MIN_CLEAN_SHARE * np.count_nonzero(np.isfinite(misfit)):  # dirt is not noise
+        return np.sqrt(max(np.median(clean), MIN_NOISE**2))
+    return np.sqrt(median_misfit)
 
 
 @compiled
-def weigh_gridlines(sums, to_a, to_b, pardon, values, least, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) weights, 1 for gridlines that look as the pattern does once they are moved; their usual misfit, and
-    the noise (NaN where nothing was read).
+def weigh_gridlines(sums, gradients, tolerance, values, min_places, default_weight):  # type: ignore[no-untyped-def]
+    """The weights of gridlines, 1 for those that look like the pattern once their ends are moved.
 
-    Each of a gridline's places adds so many ``values``; one with no more than ``min_places`` places gets
-    ``default_weight``; a
-    misfit of less than its ``pardon`` (E,) is always forgiven.
+    Args: as in ``gridline_misfits`` and ``misfit_weights``.
+
+    Returns:
+        ``GridlineWeights``.
     """
-    misfit = gridline_misfits(sums, to_a, to_b, values, least)
-    usual = median_of_misfits(misfit)
-    use = misfit_weights(sums, misfit, usual, pardon, values, unjudged)
-    return use, usual, _noise_from_misfits(misfit, use, usual)
+    misfit = gridline_misfits(sums, gradients, values, min_places)
+    median_misfit = median_of_misfits(misfit)
+    weight = misfit_weights(sums, misfit, median_misfit, tolerance, values, default_weight)
+    return GridlineWeights(weight, median_misfit, _noise_from_misfits(misfit, weight, median_misfit))
 
 
 @compiled
-def _is_well_weighted(use, spokes, m):  # type: ignore[no-untyped-def]
-    """Whether enough of the gridlines that end at a marker are trusted."""
+def _is_well_weighted(weight, spokes, m):  # type: ignore[no-untyped-def]
+    """Whether the gridlines at marker m have enough weight (E,)."""
     total, count = 0.0, 0
     for k in range(spokes.shape[1]):
         e = spokes[m, k]
         if e >= 0:
-            total += use[e]
+            total += weight[e]
             count += 1
     return total > MIN_MARKER_WEIGHT * count
 
 
 @compiled
-def well_weighted_markers(use, spokes):  # type: ignore[no-untyped-def]
-    """(M,) bool: enough of the gridlines that end there are trusted."""
+def well_weighted_markers(weight, spokes):  # type: ignore[no-untyped-def]
+    """(M,) bool, the markers whose gridlines have enough weight (E,)."""
     out = np.zeros(spokes.shape[0], np.bool_)
     for m in range(spokes.shape[0]):
-        out[m] = _is_well_weighted(use, spokes, m)
+        out[m] = _is_well_weighted(weight, spokes, m)
     return out
 
 
 @compiled
-def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
-    """The lengths in px that all gridlines exceed but for one in ``rare``, and but for one in ``median_misfit``,
-    which are
-    fewer; 0 without any."""
+def short_edges(xy, edges, rarity, other_rarity):  # type: ignore[no-untyped-def]
+    """Two lengths, px, that all edges exceed but for one in ``rarity``, and but for one in ``other_rarity``.
+
+    ``other_rarity`` is not greater than ``rarity``. 0 and 0 without any known edge.
+    """
     length, count = np.empty(edges.shape[0]), 0
     for e in range(edges.shape[0]):
         a, b = edges[e, 0], edges[e, 1]
@@ -177,47 +232,54 @@ def short_edges(xy, edges, rare, usual):  # type: ignore[no-untyped-def]
             count += 1
     if count == 0:
         return 0.0, 0.0
-    least, some = count // rare, count // usual
+    few, some = count // rarity, count // other_rarity
     short = np.partition(length[:count], some)[: some + 1]
-    return np.sqrt(np.partition(short, least)[least]), np.sqrt(short[some])
+    return np.sqrt(np.partition(short, few)[few]), np.sqrt(short[some])
 
 
 @compiled
 def median_edge(xy, edges):  # type: ignore[no-untyped-def]
-    """The median length of the gridlines, px; 1 without any."""
+    """The median length of the edges (E, 2), px; 1 without any."""
     return max(short_edges(xy, edges, 2, 2)[1], 1.0)
 
 
 @compiled
-def blur_change(sums, aside, use, before, now, sigma):  # type: ignore[no-untyped-def]
-    """By how much the gridlines' pixels say that the blur is larger, their contrasts (E, 3) corrected to ``now``.
+def blur_change(sums, dot_gain_offset, gridline_weight, before, now, sigma):  # type: ignore[no-untyped-def]
+    """The change of the blur, px, that the gridlines' pixels ask for.
 
-    What lies ``dot_gain_offset`` (E,), px, of where it is drawn looks more blurred, by half the square of that over
-    the blur.
+    A gridline off its drawn place looks more blurred, by half of the offset squared over the blur.
+
+    Args:
+        sums: (E, 24). dot_gain_offset: (E,) px. gridline_weight: (E,) 0 to 1.
+        before, now: (E, 3) gray levels, the contrasts as drawn and as corrected.
+        sigma: px, the blur as drawn.
     """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
-        if use[e] == 0.0:
+        if gridline_weight[e] == 0.0:
             continue
         strength, change = 1e-9, 0.0
         for channel in range(3):
             strength += before[e, channel] ** 2
             change += before[e, channel] * (now[e, channel] - before[e, channel])
-        weight = use[e] * sums[e, BLUR_CURVATURE]
+        weight = gridline_weight[e] * sums[e, BLUR_CURVATURE]
         curvature += weight
-        pull += use[e] * sums[e, BLUR] + CONTRAST_TO_BLUR * sigma * weight * change / strength
-        pull -= weight * 0.5 * aside[e] ** 2 / sigma
+        pull += gridline_weight[e] * sums[e, BLUR] + CONTRAST_TO_BLUR * sigma * weight * change / strength
+        pull -= weight * 0.5 * dot_gain_offset[e] ** 2 / sigma
     return pull / curvature if curvature > 0.0 else 0.0
 
 
 @compiled
-def least_information(sums, use, lines, edges, variance, count):  # type: ignore[no-untyped-def]
-    """(M,) 1/px^2, the least information about a marker in any direction, were its gridlines' bending known."""
+def least_information(sums, weight, lines, edges, variance, count):  # type: ignore[no-untyped-def]
+    """(M,) 1/px^2, the information about each of ``count`` markers in its worst direction, with bending taken as known.
+
+    ``sums`` (E, 24), ``weight`` (E,), ``lines`` (E, 8), ``edges`` (E, 2); ``variance`` of the noise, gray levels^2.
+    """
     xx, cross, yy = np.zeros(count), np.zeros(count), np.zeros(count)
     for e in range(edges.shape[0]):
-        nx, ny, weight = -lines[e, UY], lines[e, UX], use[e] * lines[e, KNOWN] / variance
+        nx, ny, factor = -lines[e, UY], lines[e, UX], weight[e] * lines[e, KNOWN] / variance
         for side in range(2):
-            m, value = edges[e, side], weight * (sums[e, READ_AA] if side == 0 else sums[e, READ_BB])
+            m, value = edges[e, side], factor * (sums[e, READ_AA] if side == 0 else sums[e, READ_BB])
             xx[m] += value * nx * nx
             cross[m] += value * nx * ny
             yy[m] += value * ny * ny
@@ -225,39 +287,52 @@ def least_information(sums, use, lines, edges, variance, count):  # type: ignore
 
 
 @compiled
-def normalized_step_lengths(step, diagonal, beyond):  # type: ignore[no-untyped-def]
-    """(M,) how far each marker stepped in standard deviations with all others known; 0 for those ``beyond``."""
+def normalized_step_lengths(step, diagonal, hidden):  # type: ignore[no-untyped-def]
+    """(M,) the length of each marker's step (M, 2) px, in its deviations with all other markers known.
+
+    ``diagonal`` (M, 3) 1/px^2, the information's diagonal blocks; 0 for the ``hidden`` (M,) bool.
+    """
     out = np.zeros(step.shape[0])
     for m in range(step.shape[0]):
         xx, cross, yy = diagonal[m, 0], diagonal[m, 1], diagonal[m, 2]
         dx, dy = step[m, 0], step[m, 1]
-        if not beyond[m]:
+        if not hidden[m]:
             out[m] = np.sqrt(max(dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy, 0.0))
     return out
 
 
 @compiled
-def markers_after_shift(xy, shift, least, use, spokes):  # type: ignore[no-untyped-def]
-    """(M, 2) the markers after a step, and the same with NaN where the image hardly shows them (``min_places``, as
-    ``least_information``
-    gives it)."""
+def markers_after_shift(xy, shift, information, weight, spokes):  # type: ignore[no-untyped-def]
+    """The markers after a step.
+
+    Args:
+        xy: (M, 2) px. shift: (M, 2) px.
+        information: (M,) 1/px^2, as ``least_information`` gives it.
+        weight: (E,) 0 to 1. spokes: as in ``Topology``.
+
+    Returns:
+        (M, 2) px, the markers; the same with NaN for markers with little information.
+    """
     count = xy.shape[0]
-    measured, guiding = np.empty((count, 2)), np.empty((count, 2))
-    seen = least[least > 3 * PRIOR_HIDDEN_PX**-2]
-    limit = MIN_INFORMATION_SHARE * np.median(seen) if seen.shape[0] > 0 else np.inf
+    measured, reliable = np.empty((count, 2)), np.empty((count, 2))
+    informed = information[information > 3 * PRIOR_HIDDEN_PX**-2]
+    limit = MIN_INFORMATION_SHARE * np.median(informed) if informed.shape[0] > 0 else np.inf
     for m in range(count):
         measured[m, 0], measured[m, 1] = xy[m, 0] + shift[m, 0], xy[m, 1] + shift[m, 1]
-        weak = least[m] < limit
-        if weak and spokes[m, spokes.shape[1] - 1] < 0 and least[m] > RIM_DEVIATION_PX**-2:
-            weak = not _is_well_weighted(use, spokes, m)
-        guiding[m, 0] = np.nan if weak else measured[m, 0]
-        guiding[m, 1] = np.nan if weak else measured[m, 1]
-    return measured, guiding
+        weak = information[m] < limit
+        if weak and spokes[m, spokes.shape[1] - 1] < 0 and information[m] > RIM_DEVIATION_PX**-2:
+            weak = not _is_well_weighted(weight, spokes, m)
+        reliable[m, 0] = np.nan if weak else measured[m, 0]
+        reliable[m, 1] = np.nan if weak else measured[m, 1]
+    return measured, reliable
 
 
 @compiled
 def pattern_box(xy, margin, width, height):  # type: ignore[no-untyped-def]
-    """(4,) x from, y from, x to, y to: the pattern's part of the image."""
+    """(4,) px, x from, y from, x to, y to: the part of the image with the pattern and a margin, px.
+
+    ``xy`` (M, 2) px, NaN where unknown; zeros where no marker is known.
+    """
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for m in range(xy.shape[0]):
         if np.isfinite(xy[m, 0]):

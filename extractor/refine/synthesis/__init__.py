@@ -1,4 +1,5 @@
-"""The pattern drawn from its current markers with the image's own inks and blur, and the residual along gridlines.
+"""The pattern drawn from the current estimate with the image's own ink levels and blur, and the drawing's residual.
 
-In: markers, blur, ink levels. Out: curved gridlines, the coverage of every pixel, the drawn pattern, the residual.
+In: markers, blur, ink levels. Out: curved gridlines, the coverage of every pixel, the drawn pattern, the sums of the
+residual along the gridlines.
 """

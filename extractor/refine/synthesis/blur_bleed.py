@@ -1,7 +1,7 @@
-"""What blur brings into the middles of cells from their neighbours: taken out of the levels, or put back.
+"""Bleed: the blur brings the neighbours' levels into a cell's middle. Levels with the bleed removed, or adapted.
 
-A level is the mean of a disc in the middle of its cell. Each of the three neighbours has a share in that, by how far
-the disc lies from the side between them, in units of the blur.
+A level is the mean of a disc in the middle of the cell. Each of the three neighbours has a share in that mean, which
+depends on the distance from the disc to the side between the cells, in units of the blur.
 """
 
 from __future__ import annotations
@@ -15,25 +15,32 @@ from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.synthesis.ink_levels import BLACK, InkLevels, cell_radii, disc_radius
 
-MAX_BLEED = 0.1  # of a neighbour in a cell's mean that can be made good
-MIN_BLEED = 0.002  # of a neighbour, which makes no difference;
-MIN_BLEED_CHANGE = 0.0003  # nor does so much more or less
+MAX_BLEED = 0.1  # share of a neighbour in a cell's mean, the most that is corrected
+MIN_BLEED = 0.002  # share of a neighbour, below which bleed is neglected
+MIN_BLEED_CHANGE = 0.0003  # change of the share, below which the change is neglected
 
 
 @compiled
-def bleed_shares(xy, cells, sigma, assumed):  # type: ignore[no-untyped-def]
-    """(K,) what the blur ``sigma`` makes of each neighbour in a cell's mean, as ``cell_means`` takes it with another
-    blur ``assumed``, NaN where the cell is not known; and the median of that."""
+def bleed_shares(xy, cells, sigma, assumed_sigma):  # type: ignore[no-untyped-def]
+    """The share of each neighbour in the means of the cells.
+
+    Args:
+        xy: (M, 2) px, the markers. cells: (K, 3) marker ids.
+        sigma: px, the blur. assumed_sigma: px, the blur that ``cell_means`` was called with.
+
+    Returns:
+        (K,) the shares, NaN where a corner is unknown; and their median.
+    """
     inscribed = _inscribed_radii(xy, cells)
     out = np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        out[i] = _bleed_share(inscribed[i], assumed, sigma)
+        out[i] = _bleed_share(inscribed[i], assumed_sigma, sigma)
     return out, np.nanmedian(out)
 
 
 @compiled
 def _inscribed_radii(xy, cells):  # type: ignore[no-untyped-def]
-    """(K,) the radius of each cell's inscribed circle, NaN where the cell is not known."""
+    """(K,) px, the radii of the cells' inscribed circles, NaN where a corner is unknown."""
     out = np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
         out[i] = cell_radii(xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]], 0.0)[0]
@@ -41,30 +48,35 @@ def _inscribed_radii(xy, cells):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def _bleed_share(inscribed, assumed, sigma):  # type: ignore[no-untyped-def]
-    """What a blur makes of each neighbour in the mean of one cell's disc, which is taken with another blur assumed."""
-    radius = disc_radius(inscribed, assumed)
-    # a disc's pixels have a quarter of its radius squared for their variance in one direction
+def _bleed_share(inscribed, assumed_sigma, sigma):  # type: ignore[no-untyped-def]
+    """The share of each neighbour in the mean of a disc; the disc's size follows from the assumed blur, px."""
+    radius = disc_radius(inscribed, assumed_sigma)
+    # the pixels of a disc have the variance radius^2 / 4 in one direction
     return 0.5 * math.erfc(inscribed / np.sqrt(2.0 * (sigma * sigma + 0.25 * radius * radius)))
 
 
 def remove_bleed(
-    levels: InkLevels, color: NDArray[np.int32], share: NDArray[np.float64], usual: float
+    levels: InkLevels, color: NDArray[np.int32], share: NDArray[np.float64], median_share: float
 ) -> InkLevels:
-    """The levels that means show in which each neighbour has a ``share`` (K,), ``median_misfit`` where it is not known.
+    """The levels without bleed.
 
-    A colored cell has three black neighbours, a black one a red, a green and a blue one. So the means differ by
-    (1 - 3 b) of the levels less b of their sum over the inks, which is 1 - 6 b of what it seems.
+    A colored cell has three black neighbours, a black cell has a red, a green and a blue one. Over black, the mean of a
+    colored cell is therefore (1 - 3 b) of its level less b times the sum of the three inks' levels. The sum of the
+    means is 1 - 6 b of that sum.
+
+    Args:
+        levels: with bleed.
+        color: (K,) the cells' inks.
+        share: (K,) b, the share of each neighbour; ``median_share`` stands for NaN.
     """
-    cell, slope, black = _remove_bleed(levels.cell, levels.slope, levels.black, color, share, usual)
-    return levels._replace(cell=cell, slope=slope, black=black)
+    return InkLevels(*_remove_bleed(levels, color, share, median_share))
 
 
 @compiled
-def _remove_bleed(cell, slope, black, color, share, usual):  # type: ignore[no-untyped-def]
-    cell, slope, black = cell.copy(), slope.copy(), black.copy()
+def _remove_bleed(levels, color, share, median_share):  # type: ignore[no-untyped-def]
+    cell, slope, black = levels.cell.copy(), levels.slope.copy(), levels.black.copy()
     total, own = np.zeros(3), np.empty(cell.shape[0])
-    usual = min(usual, MAX_BLEED)
+    median_share = min(median_share, MAX_BLEED)
     for ink in range(BLACK):
         for channel in range(3):
             count = 0
@@ -73,36 +85,41 @@ def _remove_bleed(cell, slope, black, color, share, usual):  # type: ignore[no-u
                     own[count] = cell[i, channel]
                     count += 1
             if count > 0:
-                total[channel] += np.median(own[:count]) / (1.0 - 6.0 * usual)
+                total[channel] += np.median(own[:count]) / (1.0 - 6.0 * median_share)
     for i in range(cell.shape[0]):
-        bleeding = min(max(share[i] if np.isfinite(share[i]) else usual, -MAX_BLEED), MAX_BLEED)
+        b = min(max(share[i] if np.isfinite(share[i]) else median_share, -MAX_BLEED), MAX_BLEED)
         for channel in range(3):
-            cell[i, channel] = (cell[i, channel] + bleeding * total[channel]) / (1.0 - 3.0 * bleeding)
-            slope[i, channel, 0] /= 1.0 - 3.0 * bleeding
-            slope[i, channel, 1] /= 1.0 - 3.0 * bleeding
+            cell[i, channel] = (cell[i, channel] + b * total[channel]) / (1.0 - 3.0 * b)
+            slope[i, channel, 0] /= 1.0 - 3.0 * b
+            slope[i, channel, 1] /= 1.0 - 3.0 * b
     for channel in range(3):
-        black[channel, 0] -= usual * total[channel]
-    return cell, slope, black
+        black[channel, 0] -= median_share * total[channel]
+    return InkLevels(cell, slope, black, levels.is_outlier)
 
 
 def adapt_levels_to_blur(
-    levels: InkLevels, xy: NDArray[np.float64], mesh: Topology, drawn: float, sigma: float
+    levels: InkLevels, xy: NDArray[np.float64], mesh: Topology, drawn_sigma: float, sigma: float
 ) -> InkLevels:
-    """The levels that the cells' middles would have shown, had the blur not been ``drawn`` but ``sigma``, px."""
-    inks = levels.cell, levels.slope, levels.black
-    differ, cell, slope, black = _adapt_levels_to_blur(*inks, mesh.cell_color, xy, mesh.cells, drawn, sigma)
-    return levels._replace(cell=cell, slope=slope, black=black) if differ else levels
+    """The levels that the cells' middles show with the blur ``sigma`` instead of ``drawn_sigma``, px.
+
+    The same object where the change is negligible. ``xy`` (M, 2) px are the markers.
+    """
+    shares = _bleed_change(xy, mesh.cells, drawn_sigma, sigma)
+    if shares is None:
+        return levels
+    return remove_bleed(levels, mesh.cell_color, *shares)
 
 
 @compiled
-def _adapt_levels_to_blur(cell, slope, black, color, xy, cells, drawn, sigma):  # type: ignore[no-untyped-def]
-    """Whether that is so much that it matters, and the cells' levels, slopes and the black's polynomial."""
+def _bleed_change(xy, cells, drawn_sigma, sigma):  # type: ignore[no-untyped-def]
+    """The change of the cells' shares (K,) and of the median share; None where the change is negligible."""
     inscribed = _inscribed_radii(xy, cells)
     size = np.nanmedian(inscribed)
-    usual, more = _bleed_share(size, 0.0, drawn), _bleed_share(size, 0.0, sigma)
-    if max(usual, more) < MIN_BLEED or abs(more - usual) < MIN_BLEED_CHANGE:
-        return False, cell, slope, black
-    left, change = 1.0 - 6.0 * min(usual, MAX_BLEED), np.empty(cells.shape[0])
+    before, after = _bleed_share(size, 0.0, drawn_sigma), _bleed_share(size, 0.0, sigma)
+    if max(before, after) < MIN_BLEED or abs(after - before) < MIN_BLEED_CHANGE:
+        return None
+    remainder, change = 1.0 - 6.0 * min(before, MAX_BLEED), np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
-        change[i] = (_bleed_share(inscribed[i], 0.0, sigma) - _bleed_share(inscribed[i], 0.0, drawn)) / left
-    return (True, *_remove_bleed(cell, slope, black, color, change, (more - usual) / left))
+        own_before = _bleed_share(inscribed[i], 0.0, drawn_sigma)
+        change[i] = (_bleed_share(inscribed[i], 0.0, sigma) - own_before) / remainder
+    return change, (after - before) / remainder

@@ -1,8 +1,8 @@
-"""The gridlines between the current markers: cubic curves through the smooth map that the markers define.
+"""The gridlines between the current markers: cubic curves of the smooth map that the markers define.
 
-Gridlines are straight in the layout and curved by the map to the image. At every marker the map's derivative is
-estimated from the two rings of neighbours; it gives the direction in which each gridline leaves. A cubic between the
-two markers with these directions is what a C1-smooth interpolation of the map (Clough-Tocher) draws.
+Gridlines are straight in the layout; the map to the image curves them. The map's derivative at every marker is
+estimated from the two rings of neighbours, and gives the direction of each gridline at that marker. The gridline is the
+cubic between two markers with these directions, as a C1-smooth interpolation of the map (Clough-Tocher) has it.
 """
 
 from __future__ import annotations
@@ -12,43 +12,51 @@ import numpy as np
 from extractor.localmap.regularised_maps import fill_quadratic_derivatives
 from extractor.numeric.compilation import compiled, inlined, vectorized
 
-# columns of a gridline
+# columns of a gridline: start, unit vector and length of the chord (px), slopes against the chord at both ends, known
 X, Y, UX, UY, LENGTH, LEAVE, ARRIVE, KNOWN = range(8)
 FIRST_RING = 6
-MAX_SLOPE = 0.5  # of a gridline against its chord; more is an error somewhere
+MAX_SLOPE = 0.5  # of a gridline against its chord; a larger slope is an error of the map
 
 
 @compiled
 def local_maps(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
-    """(M, 2, 5): derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2 at each marker; NaN where unknown.
+    """The local map at each marker.
 
-    Where both rings are whole, the first derivatives are those of a cubic (and the second 0: nothing asks for them);
-    elsewhere of a quadratic, bending held towards 0, and without bending where fewer than five neighbours are known.
+    Where both rings are complete, the first derivatives are those of a cubic, and the second are 0, as they are not
+    used. Elsewhere they are those of a quadratic, whose second derivatives are regularised towards 0 and are 0 where
+    fewer than five neighbours are known.
+
+    Args:
+        xy: (M, 2) px, NaN where unknown.
+        near, offset, stencil: ``Topology.near``, ``ring_vectors`` and ``derivative_stencil``.
+
+    Returns:
+        (M, 2, 5): derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2; NaN where unknown.
     """
     return local_maps_at(xy, np.isfinite(xy[:, 0]), near, offset, stencil)
 
 
 @compiled
 def local_maps_at(xy, which, near, offset, stencil):  # type: ignore[no-untyped-def]
-    """The same at ``gridlines`` (M,) of the known markers only."""
+    """The same at some of the known markers, ``which`` (M,) bool, only."""
     out = np.full((xy.shape[0], 2, 5), np.nan)
-    broken, count = np.empty(xy.shape[0], np.int64), 0
+    incomplete, count = np.empty(xy.shape[0], np.int64), 0
     for m in range(xy.shape[0]):
         if not which[m]:
             continue
-        # there are weights where both rings are whole
-        whole = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
+        # the stencil has weights where both rings are complete
+        complete = stencil[m, 0, 0] != 0.0 or stencil[m, 0, 1] != 0.0
         xu, xv, yu, yv = (
-            _cubic_derivatives(xy, m, near, stencil) if whole else (np.nan, np.nan, np.nan, np.nan)
+            _cubic_derivatives(xy, m, near, stencil) if complete else (np.nan, np.nan, np.nan, np.nan)
         )
         if np.isfinite(xu):
             out[m, 0, 0], out[m, 0, 1], out[m, 1, 0], out[m, 1, 1] = xu, xv, yu, yv
             for k in range(2, 5):
                 out[m, 0, k], out[m, 1, k] = 0.0, 0.0
         else:
-            broken[count] = m
+            incomplete[count] = m
             count += 1
-    fill_quadratic_derivatives(xy, broken[:count], near, offset, out)
+    fill_quadratic_derivatives(xy, incomplete[:count], near, offset, out)
     return out
 
 
@@ -69,9 +77,13 @@ def _cubic_derivatives(xy, m, near, stencil):  # type: ignore[no-untyped-def]
 
 @compiled
 def extrapolate_markers(xy, maps, near, offset):  # type: ignore[no-untyped-def]
-    """``xy`` with unknown markers beside known ones put where their neighbours' maps say; which ones, (M,) bool."""
+    """Unknown markers beside known ones predicted by their neighbours' maps.
+
+    Returns:
+        (M, 2) px, ``xy`` with the predictions; (M,) bool, the predicted markers.
+    """
     out = xy.copy()
-    put = np.zeros(xy.shape[0], np.bool_)
+    predicted = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
         if np.isfinite(xy[m, 0]):
             continue
@@ -88,34 +100,41 @@ def extrapolate_markers(xy, maps, near, offset):  # type: ignore[no-untyped-def]
             count += 1
         if count > 0:
             out[m, 0], out[m, 1] = x / count, y / count
-            put[m] = True
-    return out, put
+            predicted[m] = True
+    return out, predicted
 
 
 @compiled
 def extrapolate_rings(xy, near, offset, stencil, rings):  # type: ignore[no-untyped-def]
-    """``xy`` with the unknown markers of so many rings around known ones put where ``extrapolate_markers`` puts
-    them, by maps
-    that are laid only beside them."""
+    """(M, 2) px: ``xy`` with ring after ring of unknown markers around the known ones predicted, ``rings`` times.
+
+    The predictions are those of ``extrapolate_markers``, with maps only at the known markers beside unknown ones.
+    """
     for _ in range(rings):
-        asked = np.zeros(xy.shape[0], np.bool_)
+        needed = np.zeros(xy.shape[0], np.bool_)
         for m in np.flatnonzero(~np.isfinite(xy[:, 0])):
             for k in range(FIRST_RING):
                 n = near[m, k]
                 if n >= 0 and np.isfinite(xy[n, 0]):
-                    asked[n] = True
-        if not np.any(asked):
+                    needed[n] = True
+        if not np.any(needed):
             break
-        xy = extrapolate_markers(xy, local_maps_at(xy, asked, near, offset, stencil), near, offset)[0]
+        xy = extrapolate_markers(xy, local_maps_at(xy, needed, near, offset, stencil), near, offset)[0]
     return xy
 
 
 @compiled
 def gridlines(xy, maps, bend, edges, along):  # type: ignore[no-untyped-def]
-    """(E, 8) per gridline: start, unit vector along its chord, length, slopes against the chord at both ends, known.
+    """The gridlines between markers.
 
-    Slopes count towards (-uy, ux), per unit of length along the chord. ``bend`` (E, 2) px is added to them: b and s of
-    ``bending``.
+    Args:
+        xy: (M, 2) px, the markers. maps: (M, 2, 5), as ``local_maps`` gives them.
+        bend: (E, 2) px, b and s of ``gridline_bending``, which add to the slopes.
+        edges: (E, 2) marker ids. along: (E, 2) ``Topology.edge_vectors``.
+
+    Returns:
+        (E, 8): start and unit vector of the chord, its length, px; slopes against the chord at both ends, towards
+        (-uy, ux); 1 where known. All 0 where unknown.
     """
     out = np.zeros((edges.shape[0], 8))
     for e in range(edges.shape[0]):
@@ -142,7 +161,7 @@ def gridlines(xy, maps, bend, edges, along):  # type: ignore[no-untyped-def]
 
 @inlined
 def _slope(maps, m, along, e, ux, uy):  # type: ignore[no-untyped-def]
-    """Of gridline e by the map at marker m, NaN where that cannot be."""
+    """The slope of gridline e against its chord (ux, uy) at marker m; NaN where the map is unknown or wrong."""
     tx = maps[m, 0, 0] * along[e, 0] + maps[m, 0, 1] * along[e, 1]
     ty = maps[m, 1, 0] * along[e, 0] + maps[m, 1, 1] * along[e, 1]
     forward = tx * ux + ty * uy
@@ -154,7 +173,7 @@ def _slope(maps, m, along, e, ux, uy):  # type: ignore[no-untyped-def]
 
 @compiled
 def sagitta(t, length, leave, arrive):  # type: ignore[no-untyped-def]
-    """How far the gridline lies off its chord at the fraction t; straight on beyond its ends."""
+    """px, the offset of a gridline from its chord at the fraction t of the chord; straight beyond the ends."""
     if t <= 0.0:
         return length * leave * t
     if t >= 1.0:

@@ -1,9 +1,9 @@
-"""The inks as they look in this image: a level for every cell, from itself and from the cells of its ink.
+"""The ink levels of one image: a level for every cell, from the cell itself and from all cells of its ink.
 
-A cell's own level is noisy, and half of its error would go into its gridlines. The light and the print vary smoothly
-from cell to cell as a rule: a low polynomial over the image, fitted robustly to each ink, is far less noisy. Every
-level is drawn towards it by as much as the cells' scatter about it is noise; where it is not (uneven print, hard
-shadows, a cell that fell out) the cell's own level stays.
+A cell's own level is noisy, and half of the error would go into its gridlines. Light and print vary smoothly from cell
+to cell as a rule, and a low polynomial over the image, fitted robustly to each ink, is far less noisy. Every level is
+drawn towards the polynomial in the proportion of noise in the cells' scatter about the polynomial. Where the scatter is
+not noise (uneven print, hard shadows, a missing cell) the cell's own level stays.
 """
 
 from __future__ import annotations
@@ -13,27 +13,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.numeric.compilation import compiled, vectorized
-from extractor.numeric.dense_systems import update_to_cholesky_solution
+from extractor.numeric.compilation import compiled
+from extractor.refine.synthesis.ink_polynomials import TERMS, fill_monomials, robust_polynomial
 
 INKS = 5  # red, green, blue, black, white
 BLACK, WHITE = 3, 4
-TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
-CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))
-DISC_SHARE = 0.55  # of the inscribed circle, over which a cell's level is averaged at most
-FIRST_DISC_SHARE = 0.47  # where nothing is drawn yet, and the neighbours' ink reaches into it
-CLEAR_SIGMA = 2.2  # blurs that its pixels keep off the cell's sides
-MIN_RADIUS_PX = 0.75
+CELLS_FOR_TERMS = ((40, 10), (18, 6), (8, 3), (1, 1))  # from so many cells on, so many terms
+DISC_SHARE = 0.55  # of the inscribed circle's radius, the disc of a cell's level at most
+FIRST_DISC_SHARE = 0.47  # the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc
+CLEAR_SIGMA = 2.2  # in units of the blur, the distance of the disc from the cell's sides
+MIN_RADIUS_PX = 0.75  # of the disc
 FIT_ROUNDS = 2  # of the robust fit
-OUTLIER_TOLERANCE = 4.0  # scatters, beyond which a cell is one of its own kind
 
 
 class InkLevels(NamedTuple):
-    """Attributes:
-    cell: (K, 3) level of the drawn cells over the black beneath, at their centroids.
-    slope: (K, 3, 2) its change per px along x and y.
-    black: (3, 10) the black's polynomial.
-    strange: (K,) bool, cells whose ink is not that of their kind.
+    """The levels of the inks in an image.
+
+    Attributes:
+        cell: (K, 3) gray levels of the drawn cells over black, at their centroids.
+        slope: (K, 3, 2) gray levels per px along x and y.
+        black: (3, 10) the polynomial of the black.
+        is_outlier: (K,) bool, cells that do not look like the other cells of their ink.
     """
 
     cell: NDArray[np.float64]
@@ -42,40 +42,79 @@ class InkLevels(NamedTuple):
     is_outlier: NDArray[np.bool_]
 
 
-@compiled
-def fill_monomials(x, y, out):  # type: ignore[no-untyped-def]
-    """Write the ten terms at (x, y)."""
-    out[0], out[1], out[2] = 1.0, x, y
-    out[3], out[4], out[5] = x * x, x * y, y * y
-    out[6], out[7], out[8], out[9] = x * x * x, x * x * y, x * y * y, y * y * y
+class InkCells(NamedTuple):
+    """The cells of the pattern by ink.
+
+    Attributes:
+        cells: (K, 3) marker ids of the drawn cells.
+        black_cells: (B, 3) marker ids of the black cells.
+        color: (K,) inks of the drawn cells.
+    """
+
+    cells: NDArray[np.int32]
+    black_cells: NDArray[np.int32]
+    color: NDArray[np.int32]
+
+
+class InkPolynomials(NamedTuple):
+    """The inks as polynomials over the image.
+
+    Attributes:
+        coefficients: (5, 3, 10) by ink and channel.
+        variance: (5,) gray levels^2, of the cells about the polynomials beyond noise.
+    """
+
+    coefficients: NDArray[np.float64]
+    variance: NDArray[np.float64]
+
+
+class LevelChange(NamedTuple):
+    """A change of the inks' levels.
+
+    Attributes:
+        cell: (K, 3) gray levels, of the drawn cells over black.
+        black: (3, 10) of the black polynomial.
+    """
+
+    cell: NDArray[np.float64]
+    black: NDArray[np.float64]
 
 
 @compiled
 def cell_radii(a, b, c, sigma):  # type: ignore[no-untyped-def]
-    """The radius of a cell's inscribed circle, and of the disc about its centroid that its level is taken from."""
+    """The radius of a cell's inscribed circle, and of the disc of its level about its centroid, px.
+
+    ``a``, ``b``, ``c`` are the corners (2,) px; ``sigma`` is the blur, px, 0 where the pattern is drawn.
+    """
     area = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-    around = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
-    around += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
-    around += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
-    inscribed = area / max(around, 1e-9)
+    perimeter = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+    perimeter += np.sqrt((c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2)
+    perimeter += np.sqrt((a[0] - c[0]) ** 2 + (a[1] - c[1]) ** 2)
+    inscribed = area / max(perimeter, 1e-9)
     return inscribed, disc_radius(inscribed, sigma)
 
 
 @compiled
 def disc_radius(inscribed, sigma):  # type: ignore[no-untyped-def]
-    """The radius of that disc, by the inscribed circle's."""
+    """The radius of that disc, px, by the radius of the inscribed circle."""
     most = DISC_SHARE if sigma == 0.0 else FIRST_DISC_SHARE
     return max(min(most * inscribed, inscribed - CLEAR_SIGMA * sigma), MIN_RADIUS_PX)
 
 
 @compiled
 def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
-    """(K, 4): each cell's mean of image - model over the pixels about its centroid, and their number (0: none).
+    """The mean of image - model over a disc about each cell's centroid.
 
-    ``model`` may be empty; ``sigma`` is the blur.
+    Args:
+        image: (H, W, 3) uint8. model: (H, W, 3) float32, or empty for 0.
+        xy: (M, 2) px, the markers. cells: (K, 3) marker ids.
+        sigma: px, the blur; 0 where the pattern is drawn.
+
+    Returns:
+        (K, 4): the means, gray levels, and the number of pixels, 0 outside the image.
     """
-    bare = model.shape[0] == 0
-    seen, drawn = image.reshape(-1), model.reshape(-1)
+    no_model = model.shape[0] == 0
+    observed, drawn = image.reshape(-1), model.reshape(-1)
     one, two = np.uint64(1), np.uint64(2)
     height, width = image.shape[0], image.shape[1]
     out = np.zeros((cells.shape[0], 4))
@@ -91,10 +130,10 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
             first, last = max(int(np.ceil(cx - half)), 0), min(int(cx + half), width - 1)
             at = np.uint64((y * width + first) * 3)
             for _ in range(first, last + 1):
-                s0 += seen[at]
-                s1 += seen[at + one]
-                s2 += seen[at + two]
-                if not bare:
+                s0 += observed[at]
+                s1 += observed[at + one]
+                s2 += observed[at + two]
+                if not no_model:
                     s0 -= drawn[at]
                     s1 -= drawn[at + one]
                     s2 -= drawn[at + two]
@@ -105,109 +144,42 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
     return out
 
 
-@vectorized
-def _fill_normal_equations(terms, values, weight, gram, right):  # type: ignore[no-untyped-def]
-    """Fill in the sums over all cells of weight times term times term (its lower triangle), and times value."""
-    weighted = np.empty(weight.shape[0])
-    for j in range(TERMS):
-        for i in range(weight.shape[0]):
-            weighted[i] = weight[i] * terms[j, i]
-        for k in range(j, TERMS):
-            other, total = terms[k], 0.0
-            for i in range(weight.shape[0]):
-                total += weighted[i] * other[i]
-            gram[k, j] = total
-        for channel in range(3):
-            other, total = values[channel], 0.0
-            for i in range(weight.shape[0]):
-                total += weighted[i] * other[i]
-            right[channel, j] = total
-
-
 @compiled
-def _fill_polynomial_fit(terms, values, weight, count, gram, right):  # type: ignore[no-untyped-def]
-    """Write the weighted least squares polynomial with the first ``count`` terms, a little held towards 0, into
-    ``right`` (3, 10)."""
-    _fill_normal_equations(terms, values, weight, gram, right)
-    right[:, count:] = 0.0
-    if not gram[0, 0] > 0.0:
-        right[:] = 0.0
-        return
-    for j in range(1, count):
-        gram[j, j] += 1e-6 * gram[0, 0]
-    update_to_cholesky_solution(gram, right, count)
+def _fill_levels(own, centroids, color, noise, inks, scale, levels):  # type: ignore[no-untyped-def]
+    """Fill in the cells' levels over black and their slopes.
 
-
-@vectorized
-def _fill_misfits(terms, values, field, out):  # type: ignore[no-untyped-def]
-    """Mean squared distance of each cell's level from the polynomial."""
-    rest = np.empty(out.shape[0])
-    out[:] = 0.0
-    for channel in range(3):
-        rest[:] = values[channel]
-        for k in range(TERMS):
-            factor, row = field[channel, k], terms[k]
-            for i in range(out.shape[0]):
-                rest[i] -= factor * row[i]
-        for i in range(out.shape[0]):
-            out[i] += rest[i] * rest[i] / 3.0
-
-
-@compiled
-def _robust_polynomial(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
-    """An ink's polynomial (3, 10), the variance of its cells about it beyond noise, and (n,) which are strange.
-
-    ``terms`` (10, n) and ``values`` (4, n) are columns a cell; the fourth value is the number of pixels.
+    Args:
+        own: (K, 4), as ``cell_means`` gives them. centroids: (K, 2) in the frame of the polynomials.
+        color: (K,) inks. noise: gray levels.
+        inks: ``InkPolynomials``.
+        scale: px, of the frame.
+        levels: ``InkLevels`` with the outliers; ``cell`` and ``slope`` are filled.
     """
-    n = terms.shape[1]
-    weight, misfit = np.empty(n), np.zeros(n)
-    for i in range(n):
-        weight[i] = values[3, i] / (1.0 + 0.1 * values[3, i])
-    start, gram, field = weight.copy(), np.empty((TERMS, TERMS)), np.empty((3, TERMS))
-    _fill_polynomial_fit(terms, values, weight, count, gram, field)
-    for _ in range(rounds):
-        _fill_misfits(terms, values, field, misfit)
-        # 0.79 is the median of a chi-square of 3 degrees over 3
-        spread = np.median(misfit) / 0.79
-        for i in range(n):
-            weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * spread + 1e-9)) ** 2
-        _fill_polynomial_fit(terms, values, weight, count, gram, field)
-    _fill_misfits(terms, values, field, misfit)
-    spread = np.median(misfit) / 0.79
-    expected = noise * noise / np.median(values[3])
-    strange = np.zeros(n, np.bool_)
-    for i in range(n):
-        strange[i] = misfit[i] > OUTLIER_TOLERANCE**2 * (spread + noise * noise / values[3, i]) + 4.0
-    return field, max(spread * n / max(n - count, 1) - 1.15 * expected, 0.0), strange
-
-
-@compiled
-def _fill_levels(own, place, color, noise, fields, spreads, strange, cell, slope, scale):  # type: ignore[no-untyped-def]
-    """Fill in the cells' levels over black and their slopes."""
-    terms = np.empty(TERMS)
+    terms, coefficients, variance = np.empty(TERMS), inks.coefficients, inks.variance
+    cell, slope, is_outlier = levels.cell, levels.slope, levels.is_outlier
     for i in range(own.shape[0]):
-        x, y = place[i, 0], place[i, 1]
+        x, y = centroids[i, 0], centroids[i, 1]
         if not np.isfinite(x):
-            # a corner is unknown; its cell may be drawn in the next step, when it has been put
+            # a corner is unknown; the cell may be drawn in the next step, when that corner is predicted
             x, y = 0.0, 0.0
         fill_monomials(x, y, terms)
         c = color[i]
         known = own[i, 3] > 0.0
-        keep = 0.0
+        own_share = 0.0
         if known:
-            keep = 1.0 if strange[i] else spreads[c] / (spreads[c] + noise * noise / own[i, 3])
+            own_share = 1.0 if is_outlier[i] else variance[c] / (variance[c] + noise * noise / own[i, 3])
         for channel in range(3):
-            f, b = fields[c, channel], fields[BLACK, channel]
-            level, below = 0.0, 0.0
+            f, b = coefficients[c, channel], coefficients[BLACK, channel]
+            level, black = 0.0, 0.0
             for k in range(TERMS):
                 level += terms[k] * f[k]
-                below += terms[k] * b[k]
+                black += terms[k] * b[k]
             if known:
-                level += keep * (own[i, channel] - level)
-            cell[i, channel] = level - below
+                level += own_share * (own[i, channel] - level)
+            cell[i, channel] = level - black
             for axis in range(2):
                 d = 0.0
-                if not strange[i]:
+                if not is_outlier[i]:
                     d = f[1 + axis] - b[1 + axis]
                     if axis == 0:
                         d += 2 * x * (f[3] - b[3]) + y * (f[4] - b[4]) + 3 * x * x * (f[6] - b[6])
@@ -219,8 +191,8 @@ def _fill_levels(own, place, color, noise, fields, spreads, strange, cell, slope
 
 
 @compiled
-def _ink_samples(values, place, color, ink):  # type: ignore[no-untyped-def]
-    """Terms (10, n), values (4, n) and numbers (n,) of an ink's cells that can be seen."""
+def _ink_samples(values, centroids, color, ink):  # type: ignore[no-untyped-def]
+    """Terms (10, n), values (4, n) and numbers (n,) of the cells of an ink that lie in the image."""
     n = 0
     for i in range(values.shape[0]):
         if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
@@ -229,44 +201,47 @@ def _ink_samples(values, place, color, ink):  # type: ignore[no-untyped-def]
     n = 0
     for i in range(values.shape[0]):
         if values[i, 3] > 0.0 and (ink == BLACK or color[i] == ink):
-            fill_monomials(place[i, 0], place[i, 1], terms[:, n])
+            fill_monomials(centroids[i, 0], centroids[i, 1], terms[:, n])
             own[:, n], number[n] = values[i], i
             n += 1
     return terms, own, number
 
 
 @compiled
-def _cell_centroids(xy, cells, x0, y0, scale):  # type: ignore[no-untyped-def]
+def _cell_centroids(xy, cells, frame):  # type: ignore[no-untyped-def]
+    """(K, 2) the centroids of cells in the frame of the polynomials, NaN where a corner is unknown."""
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
         a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
-        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - x0) / scale
-        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - y0) / scale
+        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - frame.x) / frame.scale
+        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - frame.y) / frame.scale
     return out
 
 
 @compiled
-def smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """``InkLevels``, one by one, from the cells' own ones.
+def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no-untyped-def]
+    """The inks' levels, smoothed over the cells of each ink.
 
     Args:
-        drawn: (K, 4) own levels of the drawn cells and the pixels behind them, as ``cell_means`` gives them.
+        drawn: (K, 4) own levels of the drawn cells and their numbers of pixels, as ``cell_means`` gives them.
         black: (B, 4) the same for the black cells.
-        xy: (M, 2) the markers, NaN where unknown.
-        noise: grey levels.
-        x0, y0, scale: the frame of the polynomials.
+        xy: (M, 2) px, the markers, NaN where unknown.
+        pattern: ``InkCells``.
+        noise: gray levels.
+        frame: ``PolynomialFrame``.
+
+    Returns:
+        ``InkLevels``.
     """
-    fields, spreads = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
-    strange = np.zeros(drawn.shape[0], np.bool_)
-    place, place_black = (
-        _cell_centroids(xy, cells, x0, y0, scale),
-        _cell_centroids(xy, black_cells, x0, y0, scale),
-    )
+    coefficients, variance = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
+    is_outlier, color = np.zeros(drawn.shape[0], np.bool_), pattern.color
+    centroids = _cell_centroids(xy, pattern.cells, frame)
+    black_centroids = _cell_centroids(xy, pattern.black_cells, frame)
     for ink in range(INKS):
         if ink == BLACK:
-            terms, own, number = _ink_samples(black, place_black, color, ink)
+            terms, own, number = _ink_samples(black, black_centroids, color, ink)
         else:
-            terms, own, number = _ink_samples(drawn, place, color, ink)
+            terms, own, number = _ink_samples(drawn, centroids, color, ink)
         n = number.shape[0]
         if n == 0:
             continue
@@ -275,21 +250,23 @@ def smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, 
             if n >= CELLS_FOR_TERMS[k][0]:
                 count = CELLS_FOR_TERMS[k][1]
                 break
-        field, spread, odd = _robust_polynomial(terms, own, noise, count, FIT_ROUNDS)
-        fields[ink], spreads[ink] = field, spread
-        if ink == WHITE:  # alone of its kind
-            spreads[ink] = 1e9
+        polynomial, own_variance, own_outlier = robust_polynomial(terms, own, noise, count, FIT_ROUNDS)
+        coefficients[ink], variance[ink] = polynomial, own_variance
+        if ink == WHITE:  # one cell only, which keeps its own level
+            variance[ink] = 1e9
         if ink != BLACK:
             for i in range(n):
-                strange[number[i]] = odd[i]
+                is_outlier[number[i]] = own_outlier[i]
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
-    _fill_levels(drawn, place, color, noise, fields, spreads, strange, cell, slope, scale)
-    return cell, slope, fields[BLACK], strange
+    levels = InkLevels(cell, slope, coefficients[BLACK], is_outlier)
+    inks = InkPolynomials(coefficients, variance)
+    _fill_levels(drawn, centroids, color, noise, inks, frame.scale, levels)
+    return levels
 
 
 @compiled
 def level_change(before, now):  # type: ignore[no-untyped-def]
-    """The cells' median change of level (K, 3), over their median level."""
+    """The median change of the cells' levels (K, 3), in units of their median level."""
     sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
     for i in range(before.shape[0]):
         for channel in range(3):
@@ -299,11 +276,11 @@ def level_change(before, now):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def black_levels_at(black, xy, x0, y0, scale):  # type: ignore[no-untyped-def]
-    """(K, 3): the black's polynomial at the points (K, 2) px."""
+def black_levels_at(black, xy, frame):  # type: ignore[no-untyped-def]
+    """(K, 3) gray levels: the polynomial (3, 10) of the black at the points (K, 2) px."""
     out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
     for i in range(xy.shape[0]):
-        fill_monomials((xy[i, 0] - x0) / scale, (xy[i, 1] - y0) / scale, terms)
+        fill_monomials((xy[i, 0] - frame.x) / frame.scale, (xy[i, 1] - frame.y) / frame.scale, terms)
         for channel in range(3):
             for k in range(TERMS):
                 out[i, channel] += terms[k] * black[channel, k]
