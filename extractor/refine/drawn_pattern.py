@@ -98,7 +98,7 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     """``Synthesis`` of a ``PatternState`` with ``InkLevels`` within the box (4,)."""
     image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
     xy, bend, sigma = state.xy, state.bend, state.sigma
-    x0, y0, scale = view.frame
+    frame = view.frame
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = levels.cell, levels.slope
     lines = gridlines(xy, state.maps, bend, edges, topology.edge_vectors)
@@ -107,7 +107,7 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     strokes.used[:] = 0
     every, colors = np.ones(len(cells), np.bool_), (cell, slope, sigma, box, picture, strokes)
     draw_cells(every, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    black = black_levels_at(levels.black, chord_midpoints(lines), x0, y0, scale)
+    black = black_levels_at(levels.black, chord_midpoints(lines), frame.x, frame.y, frame.scale)
     bending = bending_gridlines(state.roughness, bend, edges)
     sums = accumulate_residual_sums(
         image, picture, lines, contrasts, black, sigma, box, bending, buffers.residual
@@ -124,8 +124,9 @@ def _corrected_levels(view, picture, topology, xy, cell, noise):  # type: ignore
     own = cell_means(view.image, picture, xy, cells, 0.0)
     own[:, :3] += cell
     black = cell_means(view.image, picture, xy, black_cells, 0.0)
-    x0, y0, scale = view.frame
-    return InkLevels(*smoothed_levels(own, black, xy, cells, black_cells, color, noise, x0, y0, scale))
+    frame = view.frame
+    levels = smoothed_levels(own, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale)
+    return InkLevels(*levels)
 
 
 @compiled
@@ -145,17 +146,17 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
     """
     image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
     sigma, box = drawing.sigma, drawing.box
-    x0, y0, scale = view.frame
+    frame = view.frame
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = drawing.levels.cell, drawing.levels.slope
-    some, which = np.flatnonzero(groups_with_any(redrawn, edges)), groups_with_any(redrawn, cells)
-    xy, bend, ends = merged_rows(redrawn, state.xy, drawing.xy), state.bend[some], edges[some]
-    own = gridlines(xy, state.maps, bend, ends, topology.edge_vectors[some])
-    contrasts = update_known_contrasts(own, xy, cells, topology.edge_cells[some], cell, slope)
-    lines, colors = replaced_rows(drawing.lines, some, own), (cell, slope, sigma, box, picture, strokes)
-    update_erasing_cells(which, drawing.xy, cells, cell_edges, edges, drawing.lines, *colors)
-    draw_cells(which, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    black = black_levels_at(drawing.levels.black, chord_midpoints(own), x0, y0, scale)
+    edge_ids, redrawn_cells = np.flatnonzero(groups_with_any(redrawn, edges)), groups_with_any(redrawn, cells)
+    xy, bend, ends = merged_rows(redrawn, state.xy, drawing.xy), state.bend[edge_ids], edges[edge_ids]
+    own = gridlines(xy, state.maps, bend, ends, topology.edge_vectors[edge_ids])
+    contrasts = update_known_contrasts(own, xy, cells, topology.edge_cells[edge_ids], cell, slope)
+    lines, colors = replaced_rows(drawing.lines, edge_ids, own), (cell, slope, sigma, box, picture, strokes)
+    update_erasing_cells(redrawn_cells, drawing.xy, cells, cell_edges, edges, drawing.lines, *colors)
+    draw_cells(redrawn_cells, 1.0, xy, cells, cell_edges, edges, lines, *colors)
+    black = black_levels_at(drawing.levels.black, chord_midpoints(own), frame.x, frame.y, frame.scale)
     bending = bending_gridlines(state.roughness, bend, ends)
     sums = accumulate_residual_sums(
         image, picture, own, contrasts, black, sigma, box, bending, buffers.residual
@@ -163,10 +164,10 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
     return Synthesis(
         xy,
         lines,
-        replaced_rows(drawing.bend, some, bend),
-        replaced_rows(drawing.contrasts, some, contrasts),
-        replaced_rows(drawing.black, some, black),
-        replaced_rows(drawing.sums, some, sums),
+        replaced_rows(drawing.bend, edge_ids, bend),
+        replaced_rows(drawing.contrasts, edge_ids, contrasts),
+        replaced_rows(drawing.black, edge_ids, black),
+        replaced_rows(drawing.sums, edge_ids, sums),
         drawing.levels,
         drawing.corrected_levels,
         box,

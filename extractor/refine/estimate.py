@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.solve.fisher_information import Information
@@ -175,6 +176,11 @@ class StartPlaces(NamedTuple):
     edge_px: NDArray[np.float64]
     agreed: NDArray[np.bool_]
     is_intact: NDArray[np.bool_]
+
+
+def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
+    """Places of the full image in a reduced one."""
+    return replace(places, xy_px=view.reduced(places.xy_px), edge_px=places.edge_px / view.scale)
 
 
 def start_places(places: InitialMarkers) -> StartPlaces:

@@ -37,10 +37,11 @@ def _initial_appearance(view, topology, xy, sigma, no_model):  # type: ignore[no
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
     drawn = cell_means(image, no_model, xy, cells, sigma)
     black = cell_means(image, no_model, xy, black_cells, sigma)
-    x0, y0, scale = view.frame
-    return noise, InkLevels(
-        *smoothed_levels(drawn, black, xy, cells, black_cells, color, noise, x0, y0, scale)
+    frame = view.frame
+    levels = smoothed_levels(
+        drawn, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale
     )
+    return noise, InkLevels(*levels)
 
 
 def update_edge_contrasts(
@@ -57,9 +58,8 @@ def update_edge_contrasts(
 def _update_edge_contrasts(lines, xy, topology, levels, frame):  # type: ignore[no-untyped-def]
     cells, edge_cells, cell, black = topology.cells, topology.edge_cells, levels.cell, levels.black
     contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, levels.slope)
-    x0, y0, scale = frame
     projections, clearance = channel_projections(
-        lines, contrasts, xy, cells, edge_cells, cell, black, x0, y0, scale
+        lines, contrasts, xy, cells, edge_cells, cell, black, frame.x, frame.y, frame.scale
     )
     return EdgeContrasts(contrasts, projections, clearance)
 
@@ -75,10 +75,10 @@ def update_blur_and_bleed(
     bleed."""
     across = view.image, lines, contrasts.projections, contrasts.clearance
     assumed = DEFAULT_SIGMA_PX / view.scale
-    sigma, share, usual = _blur_and_bleed(*across, estimate.xy, topology.cells, assumed)
+    sigma, share, median_share = _blur_and_bleed(*across, estimate.xy, topology.cells, assumed)
     estimate = estimate._replace(sigma=sigma)
-    if usual > MIN_CORRECTED_BLEED:
-        levels = remove_bleed(estimate.levels, topology.cell_color, share, usual)
+    if median_share > MIN_CORRECTED_BLEED:
+        levels = remove_bleed(estimate.levels, topology.cell_color, share, median_share)
         estimate = estimate._replace(levels=levels)
         contrasts = update_edge_contrasts(view, topology, estimate, lines)
     return estimate, contrasts
@@ -89,5 +89,5 @@ def _blur_and_bleed(image, lines, projections, clearance, xy, cells, assumed):  
     """The blur, px; and the bleed of each cell and its median, as ``bleed_shares`` gives them."""
     sigma = profile_blur(image, lines, projections, clearance, BLUR_GRIDLINES)
     sigma = max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else FALLBACK_SIGMA_PX
-    share, usual = bleed_shares(xy, cells, sigma, assumed)
-    return sigma, share, usual
+    share, median_share = bleed_shares(xy, cells, sigma, assumed)
+    return sigma, share, median_share

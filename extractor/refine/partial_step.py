@@ -54,10 +54,10 @@ from extractor.refine.solve.fisher_information import (
     solve_shifts,
 )
 from extractor.refine.solve.subproblem import (
-    gridlines_at,
-    number_subproblem,
+    held_shifts,
     replaced_table_rows,
     selected_rows,
+    subproblem_around,
 )
 from extractor.refine.synthesis.dot_gain import update_without_dot_gain
 
@@ -105,28 +105,6 @@ class PartialStep(NamedTuple):
     drawing: Synthesis
     markers: MarkerState
     gridlines: GridlineState
-
-
-class Subproblem(NamedTuple):
-    """Some gridlines (n) and the markers at their ends (m), numbered among themselves.
-
-    Attributes:
-        gridlines: (n,) the gridlines.
-        markers, ends, spokes: as in ``SubproblemNumbering``.
-        free: (m,) bool, all gridlines at the marker belong to the subproblem.
-        hidden: (m,) bool.
-        roughness: (m,) px^2.
-        shifts: (m, 2) px, of each marker from where it is drawn.
-    """
-
-    gridlines: NDArray[np.int64]
-    markers: NDArray[np.int64]
-    ends: NDArray[np.int32]
-    spokes: NDArray[np.int32]
-    free: NDArray[np.bool_]
-    hidden: NDArray[np.bool_]
-    roughness: NDArray[np.float64]
-    shifts: NDArray[np.float64]
 
 
 class SubproblemReading(NamedTuple):
@@ -209,9 +187,9 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
     state = PatternState(
         xy, hidden, maps, roughness, gridlines.bend, gridlines.weight, drawing.sigma, noise, dot_gain
     )
-    held = _held_shifts(markers.measured, drawing.xy, redrawn)
+    held = held_shifts(markers.measured, drawing.xy, redrawn)
     drawing = draw_pattern_part(view, topology, buffers, drawing, redrawn, state)
-    part = _subproblem(free, hidden, roughness, held, edges, topology.spokes)
+    part = subproblem_around(free, hidden, roughness, held, edges, topology.spokes)
     read = _subproblem_reading(drawing, part, topology.edge_cells, gridlines.weight, view.frame, image_state)
     shifts, information = _solve_subproblem(part, read, gridlines.off_diagonal)
     markers = _markers_after_step(state, drawing.xy, shifts, information.diagonal, part, markers)
@@ -220,41 +198,22 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
 
 
 @compiled
-def _held_shifts(measured, drawn, redrawn):  # type: ignore[no-untyped-def]
-    """(M, 2) px, the shifts of the markers from where they are drawn; 0 for those drawn again and unknown ones."""
-    out = measured - drawn
-    for m in range(out.shape[0]):
-        if redrawn[m] or not np.isfinite(out[m, 0]):
-            out[m, 0], out[m, 1] = 0.0, 0.0
-    return out
-
-
-@compiled
-def _subproblem(free, hidden, roughness, shifts, edges, spokes):  # type: ignore[no-untyped-def]
-    """``Subproblem`` of the gridlines at ``free`` markers (M,) bool."""
-    gridlines = gridlines_at(free, edges)
-    markers, ends, around = number_subproblem(gridlines, edges, spokes)
-    kinds = free[markers], hidden[markers], roughness[markers]
-    return Subproblem(gridlines, markers, ends, around, *kinds, selected_rows(shifts, markers))
-
-
-@compiled
 def _subproblem_reading(drawing, part, edge_cells, weight, frame, image_state):  # type: ignore[no-untyped-def]
     """``SubproblemReading`` from the drawing; ``weight`` (E,) are those of all gridlines before."""
     rule, sigma, variance = PIXEL_MISFIT_RULE, drawing.sigma, image_state.noise**2
-    which, values = part.gridlines, rule.values
-    sums, lines = selected_rows(drawing.sums, which), selected_rows(drawing.lines, which)
-    contrasts, bend = selected_rows(drawing.contrasts, which), selected_rows(drawing.bend, which)
-    cells, levels, corrected = selected_rows(edge_cells, which), drawing.levels, drawing.corrected_levels
+    ids, values = part.gridlines, rule.values
+    sums, lines = selected_rows(drawing.sums, ids), selected_rows(drawing.lines, ids)
+    contrasts, bend = selected_rows(drawing.contrasts, ids), selected_rows(drawing.bend, ids)
+    cells, levels, corrected = selected_rows(edge_cells, ids), drawing.levels, drawing.corrected_levels
     cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
-    x0, y0, scale = frame
+    middle = chord_midpoints(lines)
     to_a, to_b, off = shift_gradients(
-        sums, contrasts, cells, cell_change, black_change, chord_midpoints(lines), x0, y0, scale
+        sums, contrasts, cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
     )
     dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, cells, image_state.dot_gain)
-    bend_variance = np.zeros(len(which))
+    bend_variance = np.zeros(len(ids))
     if np.any(part.roughness) or np.any(bend):
-        about = weight[which], lines, part.ends, variance
+        about = weight[ids], lines, part.ends, variance
         bend_variance = estimate_bend_variance(sums, to_a, to_b, off, bend, part.roughness, *about)
     bend_response = update_without_bending(sums, to_a, to_b, off, bend, bend_variance, variance)
     misfit = gridline_misfits(sums, to_a, to_b, values, rule.min_places)
@@ -310,15 +269,15 @@ def _markers_after_step(state, xy, shifts, own_diagonal, part, markers):  # type
 @compiled
 def _gridlines_after_step(drawing, shifts, own_off_diagonal, part, read, gridlines):  # type: ignore[no-untyped-def]
     """``GridlineState`` with the measurements along the gridlines of the subproblem."""
-    which, system = part.gridlines, read.system
+    ids, system = part.gridlines, read.system
     own_bend = bend_after_shift(read.bend, read.bend_response, shifts, system.lines, part.ends)
-    black = selected_rows(drawing.black, which)
+    black = selected_rows(drawing.black, ids)
     own_foot = foot_levels(system.contrasts, black, read.gradients.level_shift)
     return GridlineState(
-        replaced_table_rows(gridlines.bend, which, own_bend),
-        replaced_rows(gridlines.bend_variance, which, read.bend_variance),
-        replaced_table_rows(gridlines.off_diagonal, which, own_off_diagonal),
-        replaced_rows(gridlines.weight, which, system.weight),
-        replaced_rows(gridlines.foot, which, own_foot),
-        replaced_rows(gridlines.dot_gain_offset, which, read.dot_gain_offset),
+        replaced_table_rows(gridlines.bend, ids, own_bend),
+        replaced_rows(gridlines.bend_variance, ids, read.bend_variance),
+        replaced_table_rows(gridlines.off_diagonal, ids, own_off_diagonal),
+        replaced_rows(gridlines.weight, ids, system.weight),
+        replaced_rows(gridlines.foot, ids, own_foot),
+        replaced_rows(gridlines.dot_gain_offset, ids, read.dot_gain_offset),
     )

@@ -96,18 +96,18 @@ def profile_step(
 @compiled
 def _profile_step(image, lines, across, state, topology, stations, judged):  # type: ignore[no-untyped-def]
     """``ProfileStep`` from the gridlines (E, 8), the ``EdgeContrasts`` across them, and the ``PatternState``."""
-    contrasts, room = across.contrasts, across.clearance
+    contrasts, clearance = across.contrasts, across.clearance
     edges, spokes, edge_cells = topology.edges, topology.spokes, topology.edge_cells
     sigma, noise, rule = state.sigma, state.noise, SAMPLE_MISFIT_RULE
     bending = bending_gridlines(state.roughness, state.bend, edges)
-    sums = read_profiles(image, lines, across.projections, room, sigma, bending, stations)
+    sums = read_profiles(image, lines, across.projections, clearance, sigma, bending, stations)
     gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums)))
     to_a, to_b = gradients.start, gradients.end
     dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
     dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(state.bend, state.roughness, state.weight)
     bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, noise, rule)
-    pardon = MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST]
+    pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
     profile_weight, _, _ = weigh_gridlines(
         sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
     )

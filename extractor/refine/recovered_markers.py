@@ -46,9 +46,7 @@ from extractor.refine.synthesis.residual_kernel import A, B
 
 STATIONS = 16  # a gridline
 REFERENCE_INTERVAL = 12  # one of so many other gridlines is read
-MIN_REFERENCE_GRIDLINES = (
-    20  # other gridlines for the usual misfit; with fewer, all gridlines together give it
-)
+MIN_REFERENCE_GRIDLINES = 20  # other gridlines for the usual misfit; with fewer, all together give it
 
 
 class WeighedProfiles(NamedTuple):
@@ -97,16 +95,20 @@ def fill_recovered_markers(
 @compiled
 def _fill_recovered_markers(image, state, contrasts, places, topology, lost, xy, cov):  # type: ignore[no-untyped-def]
     edges, spokes, hidden = topology.edges, topology.spokes, state.hidden
-    which, count = _lost_and_reference_gridlines(lost, edges)
-    read = _weighed_profiles(image, state, contrasts, topology, which, count)
-    which, weight, bend_variance = which[:count], read.weight[:count], read.bend_variance[:count]
-    markers, ends, around = number_subproblem(which, edges, spokes)
+    gridline_ids, count = _lost_and_reference_gridlines(lost, edges)
+    read = _weighed_profiles(image, state, contrasts, topology, gridline_ids, count)
+    gridline_ids, weight, bend_variance = (
+        gridline_ids[:count],
+        read.weight[:count],
+        read.bend_variance[:count],
+    )
+    markers, ends, around = number_subproblem(gridline_ids, edges, spokes)
     asked = lost[markers] & well_weighted_markers(weight, around)
     if not np.any(asked):
         return
     prior = prior_information(hidden[markers])
     prior[~hidden[markers] & np.isfinite(xy[markers, 0])] = HELD_INFORMATION
-    across, lines = selected_rows(contrasts.contrasts, which), read.lines[:count]
+    across, lines = selected_rows(contrasts.contrasts, gridline_ids), read.lines[:count]
     system = GridlineSystem(
         read.sums[:count], weight, lines, across, ends, around, state.sigma, state.noise**2
     )
@@ -135,25 +137,30 @@ def _lost_and_reference_gridlines(lost, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _weighed_profiles(image, state, contrasts, topology, which, count):  # type: ignore[no-untyped-def]
-    """``WeighedProfiles`` of the gridlines ``which`` (n,); those after the first ``count`` show the usual misfit."""
+def _weighed_profiles(image, state, contrasts, topology, gridline_ids, count):  # type: ignore[no-untyped-def]
+    """``WeighedProfiles`` of the gridlines (n,); those after the first ``count`` show the usual misfit."""
     sigma, rule = state.sigma, SAMPLE_MISFIT_RULE
-    ends, bend = selected_rows(topology.edges, which), selected_rows(state.bend, which)
-    room, across = selected_rows(contrasts.clearance, which), selected_rows(contrasts.contrasts, which)
-    lines = gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, which))
+    ends, bend = selected_rows(topology.edges, gridline_ids), selected_rows(state.bend, gridline_ids)
+    clearance, across = (
+        selected_rows(contrasts.clearance, gridline_ids),
+        selected_rows(contrasts.contrasts, gridline_ids),
+    )
+    lines = gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, gridline_ids))
     weights, bending = (
-        selected_rows(contrasts.projections, which),
+        selected_rows(contrasts.projections, gridline_ids),
         bending_gridlines(state.roughness, bend, ends),
     )
-    sums = read_profiles(image, lines, weights, room, sigma, bending, STATIONS)
-    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(which)))
+    sums = read_profiles(image, lines, weights, clearance, sigma, bending, STATIONS)
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(gridline_ids)))
     to_a, to_b = gradients.start, gradients.end
-    cells = selected_rows(topology.edge_cells, which)
+    cells = selected_rows(topology.edge_cells, gridline_ids)
     update_without_dot_gain(sums, to_a, to_b, across, cells, state.dot_gain)
-    prior = BendingPrior(bend, state.roughness, state.weight[which])
+    prior = BendingPrior(bend, state.roughness, state.weight[gridline_ids])
     bend_variance, _ = update_for_bending(sums, gradients, prior, lines, ends, state.noise, rule)
     misfit = gridline_misfits(sums, to_a, to_b, rule.values, rule.min_places)
-    usual = median_of_misfits(misfit[count:] if len(which) - count >= MIN_REFERENCE_GRIDLINES else misfit)
-    pardon = MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST]
-    weight = misfit_weights(sums, misfit, usual, pardon, rule.values, rule.default_weight)
+    median = median_of_misfits(
+        misfit[count:] if len(gridline_ids) - count >= MIN_REFERENCE_GRIDLINES else misfit
+    )
+    pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
+    weight = misfit_weights(sums, misfit, median, pardon, rule.values, rule.default_weight)
     return WeighedProfiles(lines, sums, gradients, weight, bend_variance)

@@ -215,12 +215,12 @@ def solve_step(system, gradients, bend, bend_response, xy, hidden, overlapping):
     Returns:
         ``StepSolution``.
     """
-    lines, edges, spokes, use = system.lines, system.edges, system.spokes, system.weight
+    lines, edges, spokes, weight = system.lines, system.edges, system.spokes, system.weight
     information = fisher_information(system, prior_information(hidden), overlapping)
     right = gradient(system, gradients.start, gradients.end)
     shift = solve_shifts(information.diagonal, information.off_diagonal, edges, right)
-    least = least_information(system.sums, use, lines, edges, system.variance, len(xy))
-    measured, reliable = markers_after_shift(xy, shift, least, use, spokes)
+    least = least_information(system.sums, weight, lines, edges, system.variance, len(xy))
+    measured, reliable = markers_after_shift(xy, shift, least, weight, spokes)
     bend = bend_after_shift(bend, bend_response, shift, lines, edges)
     normalized_steps = normalized_step_lengths(shift, information.diagonal, hidden)
     return StepSolution(measured, reliable, bend, normalized_steps, information)

@@ -24,7 +24,14 @@ from extractor.refine.acceptance import (
     update_obstructed_markers,
     update_unaccepted_markers,
 )
-from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate, RefinedMarkers, start_places
+from extractor.refine.estimate import (
+    Appearance,
+    EdgeContrasts,
+    Estimate,
+    RefinedMarkers,
+    places_in_view,
+    start_places,
+)
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
 from extractor.refine.measure.gridline_bending import mean_at_markers
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
@@ -73,23 +80,27 @@ class Refiner:
             places: where the markers were found, to about a pixel.
             before: the appearance of the image before, in a sequence.
         """
-        edge, usual = short_edges(places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY)
-        if before is not None and before.scale == self._reduction_scale(before.scale * before.sigma, usual):
+        short_edge, usual_edge = short_edges(
+            places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY
+        )
+        if before is not None and before.scale == self._reduction_scale(
+            before.scale * before.sigma, usual_edge
+        ):
             view = pyramid.at(before.scale)
             first = self._first_estimate(view, places, places.xy_px, before)
-            refined = self._final_steps(view, *first, edge)
+            refined = self._final_steps(view, *first, short_edge)
             if refined.appearance is not None and refined.appearance.is_similar(before):
                 return refined
-        view = pyramid.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual), 2))
+        view = pyramid.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
         estimate, contrasts, places = self._first_estimate(view, places, places.xy_px)
-        scale = self._reduction_scale(view.scale * estimate.sigma, usual)
+        scale = self._reduction_scale(view.scale * estimate.sigma, usual_edge)
         if scale > view.scale:
             estimate = rescaled(estimate, view, pyramid.at(scale))
             contrasts = rescaled_contrasts(contrasts, view.scale / scale)
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(estimate.measured), np.nan)
             estimate, contrasts, places = self._first_estimate(pyramid.at(scale), places, xy)
-        return self._final_steps(pyramid.at(scale), estimate, contrasts, places, edge, pyramid)
+        return self._final_steps(pyramid.at(scale), estimate, contrasts, places, short_edge, pyramid)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """The factor by which an image with this blur and these edges is reduced."""
@@ -167,7 +178,7 @@ class Refiner:
                 gridlines do not.
         """
         topology, schedule = self._topology, self._schedule
-        places, edge_px = _at_reduced_scale(view, places), edge_px / view.scale
+        places, edge_px = places_in_view(view, places), edge_px / view.scale
         if estimate.dot_gain != 0.0:
             xy = markers_without_dot_gain(places.xy_px, topology.cells, estimate.dot_gain)
             places = replace(places, xy_px=xy)
@@ -302,8 +313,3 @@ def _at_full_scale(xy, cov, bend_variance, spokes, places, scale):  # type: igno
             out_cov[m, 0, 0] = out_cov[m, 1, 1] = scale**2 * (AGREED_DEVIATION * places.edge_px[m]) ** 2
             out_cov[m, 0, 1] = out_cov[m, 1, 0] = 0.0
     return out, out_cov, bend_deviation
-
-
-def _at_reduced_scale(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
-    """Places of the full image in a reduced one."""
-    return replace(places, xy_px=view.reduced(places.xy_px), edge_px=places.edge_px / view.scale)

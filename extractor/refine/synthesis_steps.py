@@ -287,9 +287,9 @@ def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyp
     )
     levels, corrected, rule = drawing.levels, drawing.corrected_levels, PIXEL_MISFIT_RULE
     cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
-    x0, y0, scale = frame
+    middle = chord_midpoints(lines)
     to_a, to_b, off = shift_gradients(
-        sums, contrasts, edge_cells, cell_change, black_change, chord_midpoints(lines), x0, y0, scale
+        sums, contrasts, edge_cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
     )
     dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
     dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
@@ -297,7 +297,7 @@ def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyp
     prior = BendingPrior(drawing.bend, state.roughness, state.weight)
     bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, state.noise, rule)
     pardon = bending_misfit(bend_variance, contrasts, sigma)
-    weight, usual, found = weigh_gridlines(
+    weight, median_misfit, found = weigh_gridlines(
         sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
     )
     noise = found if np.isfinite(found) else state.noise
@@ -307,7 +307,7 @@ def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyp
     wider = blur_change(sums, dot_gain_offset, weight, contrasts, current, sigma)
     foot = foot_levels(contrasts, drawing.black, off)
     return SynthesisReading(
-        weight, usual, bend_variance, foot, dot_gain, dot_gain_offset, wider, noise, solution
+        weight, median_misfit, bend_variance, foot, dot_gain, dot_gain_offset, wider, noise, solution
     )
 
 

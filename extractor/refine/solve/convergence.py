@@ -51,12 +51,12 @@ class UnconvergedMarkers(NamedTuple):
 
     Attributes:
         redrawn: (M,) bool, the markers to draw again.
-        count: of moving markers and their neighbours; 0 where no more than ``max_moving_share`` of all move.
+        touched: moving markers and their neighbours together; 0 where no more than ``max_moving_share`` of all move.
         by_dirt: dirt moves them.
     """
 
     redrawn: NDArray[np.bool_]
-    count: int
+    touched: int
     by_dirt: bool
 
 
@@ -108,7 +108,7 @@ def unconverged_markers(measured, drawn, normalized_steps, rule, weight, spokes,
     moving = square > 0.0
     redrawn, dirty = moving.copy(), _is_moved_by_dirt(moving, weight, spokes)
     add_neighbours(moving, edges, redrawn)
-    touched = np.sum(redrawn)
+    touched = np.count_nonzero(redrawn)
     if touched <= max_partial or (found > max_partial and not dirty):
         return UnconvergedMarkers(redrawn, touched, dirty)
     if dirty and touched > 2 * max_partial:
@@ -192,9 +192,9 @@ def convergence_covariance(shift, sigma, remaining_share):  # type: ignore[no-un
         out[m, 0, 0], out[m, 1, 1] = (share * x) ** 2, (share * y) ** 2
         out[m, 0, 1] = out[m, 1, 0] = share * share * x * y
     if remaining_share > 0.0:
-        usual = 0.5 * min(remaining_share, 1.0) ** 2 * MEAN_OVER_MEDIAN * np.nanmedian(square)
-        out[:, 0, 0] += usual
-        out[:, 1, 1] += usual
+        variance = 0.5 * min(remaining_share, 1.0) ** 2 * MEAN_OVER_MEDIAN * np.nanmedian(square)
+        out[:, 0, 0] += variance
+        out[:, 1, 1] += variance
     return out
 
 

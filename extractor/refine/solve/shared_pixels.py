@@ -6,6 +6,8 @@ t^i u^j exp(-|t a - u b|^2 / 4 s^2) / 4 pi s^2 over the two rays, which have clo
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from extractor.numeric.compilation import compiled, vectorized
@@ -18,6 +20,25 @@ MIN_END_INFORMATION = 0.75  # least share of a gridline's information that is le
 # 1 / length; sums over the other gridlines of their normals times the overlap: near end with near end, their near end
 # with its far end.
 AX, AY, C0, C1, C2, WEIGHT, INVERSE_LENGTH, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(0, 88, 8)
+
+
+class GridlineEnd(NamedTuple):
+    """A gridline at one marker.
+
+    Attributes:
+        x, y: its direction away from the marker.
+        red, green, blue: its contrast, gray levels.
+        weight: 0 to 1.
+        inverse_length: 1/px.
+    """
+
+    x: float
+    y: float
+    red: float
+    green: float
+    blue: float
+    weight: float
+    inverse_length: float
 
 
 def _closed_forms() -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -65,15 +86,13 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _accumulate_overlaps(rows, i, nx, ny, sigma):  # type: ignore[no-untyped-def]
-    """Add the overlaps of gridline i (normal n) with all gridlines at its marker to their sums."""
-    ax, ay = rows[AX + i], rows[AY + i]
-    c0, c1, c2 = rows[C0 + i], rows[C1 + i], rows[C2 + i]
-    weight, inverse_length = rows[WEIGHT + i], rows[INVERSE_LENGTH + i]
+def _accumulate_overlaps(rows, i, gridline, nx, ny, sigma):  # type: ignore[no-untyped-def]
+    """Add the overlaps of gridline i (``GridlineEnd``, normal n) with all gridlines at its marker to their sums."""
+    weight, inverse_length = gridline.weight, gridline.inverse_length
     for k in range(8):
-        color = c0 * rows[C0 + k] + c1 * rows[C1 + k] + c2 * rows[C2 + k]
+        color = gridline.red * rows[C0 + k] + gridline.green * rows[C1 + k] + gridline.blue * rows[C2 + k]
         dot = 0.0 if k == i else color * min(weight, rows[WEIGHT + k])
-        cosine = ax * rows[AX + k] + ay * rows[AY + k]
+        cosine = gridline.x * rows[AX + k] + gridline.y * rows[AY + k]
         near, far, _ = overlap(cosine, inverse_length, rows[INVERSE_LENGTH + k], sigma)
         near, far = dot * near, dot * far
         rows[NEAR_X + k] += near * nx
@@ -131,7 +150,16 @@ def add_shared_pixels(system, diagonal, off_diagonal):  # type: ignore[no-untype
         count = _fill_gridlines_at_marker(m, system, rows, numbers)
         for i in range(count):
             nx, ny = -lines[numbers[i], UY] / variance, lines[numbers[i], UX] / variance
-            _accumulate_overlaps(rows, i, nx, ny, system.sigma)
+            gridline = GridlineEnd(
+                rows[AX + i],
+                rows[AY + i],
+                rows[C0 + i],
+                rows[C1 + i],
+                rows[C2 + i],
+                rows[WEIGHT + i],
+                rows[INVERSE_LENGTH + i],
+            )
+            _accumulate_overlaps(rows, i, gridline, nx, ny, system.sigma)
         for i in range(count):
             e = numbers[i]
             nx, ny = -lines[e, UY], lines[e, UX]
