@@ -57,7 +57,7 @@ MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 MAX_BLUR_CHANGE = 0.3  # of the blur, in one step
 BLUR_TOLERANCE = 0.03  # relative error of the blur of a drawing that is kept
 LEVEL_TOLERANCE = (
-    0.006  # likewise, of the levels. Both may be larger where the deviation of the markers explains it:
+    0.006  # likewise, of the levels. Both may be larger where the markers' deviation explains it:
 )
 BLUR_NOISE_FACTOR, LEVEL_NOISE_FACTOR = (
     0.75,
@@ -79,9 +79,7 @@ WIDE_PATIENCE = 2  # steps there at least, after which no fewer markers move,
 WIDE_EFFORT = 0.6  # and share of the effort that is allowed in images of
 USUAL_PIXELS = 640 * 480  # and more in larger ones, which take longer anyway
 MAX_STEPS = 10
-MAX_EXPLAINED_NOISE = (
-    2.0  # times the noise inside the cells: residual of a drawing that explains all but dirt
-)
+MAX_EXPLAINED_NOISE = 2.0  # times the noise inside the cells, in a drawing that explains all but dirt
 MAX_BUFFERS = 2  # kept, for images of so many shapes: a frame, and its coarser view
 MAX_PARTIAL_SHARE = 0.7  # of the markers that are drawn again; above, everything is
 MAX_PARTIAL_SHARE_DIRTY = 0.45  # of them, once dirt has moved some: dirt moves so many, too
@@ -172,15 +170,15 @@ class SynthesisSolver:
         begun = spent > 0.0
         wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
         estimate, drawing = self._full_step(view, self._with_bending(estimate, wide_blur))
-        size, least, tries, soiled = drawing.edge_px, len(estimate.xy), 0, False
-        share = _wide_blur_effort_share(view) if wide_blur else 1.0
+        drawn_edge_px, least_moving, idle_steps, dirt_found = drawing.edge_px, len(estimate.xy), 0, False
+        effort_share = _wide_blur_effort_share(view) if wide_blur else 1.0
         patience = max(schedule.patience, WIDE_PATIENCE) if wide_blur else schedule.patience
-        spent += step_effort(size)
+        spent += step_effort(drawn_edge_px)
         for step in range(MAX_STEPS - 1):
             corrected = _overlap_corrected(estimate, drawing)
-            hard = not wide_blur and _converges_slowly(estimate, edge_px)
-            allowed = schedule.max_synthesis_effort * (HARD_EFFORT if hard else share)
-            if (begun or step > 0) and spent + step_effort(size, 0.0) > allowed:
+            slow = not wide_blur and _converges_slowly(estimate, edge_px)
+            allowed = schedule.max_synthesis_effort * (HARD_EFFORT if slow else effort_share)
+            if (begun or step > 0) and spent + step_effort(drawn_edge_px, 0.0) > allowed:
                 break
             redrawn, moving, dirty = self._unconverged(corrected, drawing, schedule, wide_blur)
             changed = _has_appearance_changed(estimate, drawing, schedule.converged_deviations) and (
@@ -188,14 +186,17 @@ class SynthesisSolver:
             )
             count = np.count_nonzero(redrawn)
             everything = bool(changed or count > MAX_PARTIAL_SHARE * len(redrawn))
-            spent += step_effort(size, None if everything else count / len(redrawn))
-            tries = tries + 1 if moving >= least and not changed else 0
-            soiled = soiled or dirty
-            by_dirt = dirty or (soiled and count > MAX_PARTIAL_SHARE_DIRTY * len(redrawn))
-            ended = tries == patience or (by_dirt and not everything and step >= schedule.max_steps_in_dirt)
+            spent += step_effort(drawn_edge_px, None if everything else count / len(redrawn))
+            # what moves no fewer markers again and again is nothing that a drawing could explain
+            idle_steps = idle_steps + 1 if moving >= least_moving and not changed else 0
+            dirt_found = dirt_found or dirty
+            by_dirt = dirty or (dirt_found and count > MAX_PARTIAL_SHARE_DIRTY * len(redrawn))
+            ended = idle_steps == patience or (
+                by_dirt and not everything and step >= schedule.max_steps_in_dirt
+            )
             if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
                 break
-            least = min(least, len(estimate.xy) if changed else moving)
+            least_moving = min(least_moving, len(estimate.xy) if changed else moving)
             if everything:
                 moved = with_pattern_moved(self._topology, corrected)
                 estimate, drawing = self._full_step(view, self._with_bending(moved, wide_blur))
@@ -204,7 +205,7 @@ class SynthesisSolver:
                 estimate, drawing = self._partial_step(view, estimate, drawing, redrawn, wide_blur)
         else:
             corrected = _overlap_corrected(estimate, drawing)
-        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / size) ** 2 if wide_blur else 0.0
+        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawn_edge_px) ** 2 if wide_blur else 0.0
         cov = convergence_covariance(corrected.measured - drawing.xy, drawing.sigma, remaining)
         return corrected._replace(convergence_cov_px2=cov)
 

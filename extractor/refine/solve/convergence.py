@@ -108,7 +108,7 @@ def unconverged_markers(measured, drawn, normalized_steps, rule, weight, spokes,
     moving = square > 0.0
     redrawn, dirty = moving.copy(), _is_moved_by_dirt(moving, weight, spokes)
     add_neighbours(moving, edges, redrawn)
-    touched = np.count_nonzero(redrawn)
+    touched = int(np.count_nonzero(redrawn))
     if touched <= max_partial or (found > max_partial and not dirty):
         return UnconvergedMarkers(redrawn, touched, dirty)
     if dirty and touched > 2 * max_partial:
