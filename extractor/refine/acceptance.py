@@ -1,4 +1,4 @@
-"""Which markers of a fit are sure, and what becomes of those on which something lies."""
+"""The final tests of markers, and the treatment of those that are covered."""
 
 from __future__ import annotations
 
@@ -10,35 +10,42 @@ from extractor.refine.measure.gridline_bending import BEND_TO_END_SHIFT, mean_at
 from extractor.refine.refinement_step import PRIOR_PX
 from extractor.refine.solve.fisher_information import covariances
 
-MAX_SHIFT = 0.25  # in units of the edges around the marker,
-MAX_SHIFT_ALL_CELLS = 0.13  # and where all of its triangles agree: in steep views these lie so far off
-MAX_DEVIATION = 0.03  # of what is measured, in the same units
-MAX_SHIFT_UNEXPLAINED = (
-    0.13  # likewise, that a marker may be moved by where the drawing explains nothing well
-)
-MAX_SHIFT_FROM_PREDICTION = (
-    0.05  # likewise, of a marker that the image hardly shows, from where its neighbours put it
-)
-DOT_GAIN_FACTOR = 2.0  # times the swelling of the cells, that it may be moved by besides: corners swell most
-# Where the drawing does not explain the image, dirt moves what is left to see, in units of the edges around the marker.
-UNEXPLAINED_DEVIATION = 0.015
-DIRT_DEVIATION = (
-    0.01  # likewise, where the drawing does explain it, but none of the marker's gridlines is trusted
-)
-DISAGREEMENT_SCALE = 0.03  # where all triangles of a marker were found
+# All in units of the edges around the marker, except the last but one:
+MAX_SHIFT = 0.25  # from the start place,
+MAX_SHIFT_ALL_CELLS = 0.13  # and where all triangles agree on that: in steep views these lie so far off
+MAX_DEVIATION = 0.03  # of what is measured
+MAX_SHIFT_UNEXPLAINED = 0.13  # from the start place, where the drawing explains nothing well
+MAX_SHIFT_FROM_PREDICTION = 0.05  # from where the neighbours put an unaccepted marker
+DOT_GAIN_FACTOR = 2.0  # times the dot gain, added to MAX_SHIFT_UNEXPLAINED: corners move most
+UNEXPLAINED_DEVIATION = 0.015  # by dirt, of the visible part where the drawing does not explain the image
+DIRT_DEVIATION = 0.01  # by dirt, where it does, but no gridline of the marker has any weight
+DISAGREEMENT_SCALE = 0.03  # of profiles and triangles, where all triangles of a marker were found
 
 
 @compiled
-def accepted_markers(measured, diagonal, beside, loose, edges, spokes, start, edge, whole, which):  # type: ignore[no-untyped-def]
-    """Markers and covariances, NaN where a marker lies far from its ``start``, is not sure, or not one of
-    ``gridlines``."""
-    xy, hidden = measured.copy(), mean_at_markers(loose, spokes)
-    cov = covariances(diagonal, beside, edges, spokes, 4 * PRIOR_PX**-2, which)
+def accepted_markers(measured, information, bend_variance, edges, spokes, places, selected):  # type: ignore[no-untyped-def]
+    """The markers that lie near their start place with a small deviation.
+
+    Args:
+        measured: (M, 2) px.
+        information: ``Information`` about them.
+        bend_variance: (E,) px^2.
+        edges, spokes: (E, 2) and (M, 6).
+        places: ``StartPlaces``.
+        selected: (M,) bool, the markers to test; no other is accepted.
+
+    Returns:
+        (M, 2) px and (M, 2, 2) px^2: markers and covariances, NaN where not accepted.
+    """
+    xy, bending = measured.copy(), mean_at_markers(bend_variance, spokes)
+    blocks = information.diagonal, information.off_diagonal
+    cov = covariances(blocks[0], blocks[1], edges, spokes, 4 * PRIOR_PX**-2, selected)
+    start, edge = places.xy_px, places.edge_px
     for m in range(xy.shape[0]):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        limit = (MAX_SHIFT_ALL_CELLS if whole[m] else MAX_SHIFT) * edge[m]
-        cov[m, 0, 0] += BEND_TO_END_SHIFT**2 * hidden[m]
-        cov[m, 1, 1] += BEND_TO_END_SHIFT**2 * hidden[m]
+        limit = (MAX_SHIFT_ALL_CELLS if places.is_intact[m] else MAX_SHIFT) * edge[m]
+        cov[m, 0, 0] += BEND_TO_END_SHIFT**2 * bending[m]
+        cov[m, 1, 1] += BEND_TO_END_SHIFT**2 * bending[m]
         spread = cov[m, 0, 0] + cov[m, 1, 1]
         if not (dx * dx + dy * dy < limit * limit and spread < (MAX_DEVIATION * edge[m]) ** 2):
             xy[m], cov[m] = np.nan, np.nan
@@ -46,44 +53,67 @@ def accepted_markers(measured, diagonal, beside, loose, edges, spokes, start, ed
 
 
 @compiled
-def add_dirt_variance(cov, use, spokes, edge):  # type: ignore[no-untyped-def]
-    """Widen the covariances (M, 2, 2), in place, by how little the gridlines at each marker are trusted, by their use
-    (E,), 0 where nothing was read: what lies on some of them moves the others, too."""
+def add_dirt_variance(cov, weight, spokes, edge):  # type: ignore[no-untyped-def]
+    """Add the variance by dirt to the covariances: dirt on some gridlines moves the others, too.
+
+    Args:
+        cov: (M, 2, 2) px^2, written.
+        weight: (E,) 0 to 1, of the gridlines; 0 where nothing was measured.
+        spokes: (M, 6) the gridlines at each marker.
+        edge: (M,) px, the length of the edges at each marker.
+    """
     for m in range(cov.shape[0]):
-        hidden, count = 0.0, 0
+        missing, count = 0.0, 0
         for e in spokes[m]:
-            if e >= 0 and use[e] > 0.0:
-                hidden += 1.0 - use[e]
+            if e >= 0 and weight[e] > 0.0:
+                missing += 1.0 - weight[e]
                 count += 1
-        doubted = (DIRT_DEVIATION * edge[m] * hidden / max(count, 1)) ** 2
-        cov[m, 0, 0] += doubted
-        cov[m, 1, 1] += doubted
+        variance = (DIRT_DEVIATION * edge[m] * missing / max(count, 1)) ** 2
+        cov[m, 0, 0] += variance
+        cov[m, 1, 1] += variance
 
 
 @compiled
-def update_unaccepted_markers(xy, cov, guiding, start, edge, strange, swelling):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers that are known to start with but not sure, or that guide nothing; and whether there are
-    any. Where all is ``is_outlier``, those that lie far from their ``start`` are made unsure, in place; cells have a
-    ``dot_gain``, px.
+def update_unaccepted_markers(xy, cov, reliable, start, edge, unexplained, dot_gain):  # type: ignore[no-untyped-def]
+    """The markers that are neither accepted nor reliable.
+
+    Args:
+        xy, cov: (M, 2) px and (M, 2, 2) px^2, NaN where not accepted. Where all is ``unexplained``, markers far from
+            their start become NaN.
+        reliable: (M, 2) px, NaN where the image shows a marker little.
+        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
+        unexplained: the drawing does not explain the image.
+        dot_gain: px.
+
+    Returns:
+        (M,) bool, the markers with a start that are not accepted or not reliable; and whether there are any.
     """
     out = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        if strange and np.sqrt(dx * dx + dy * dy) > MAX_SHIFT_UNEXPLAINED * edge[m] + DOT_GAIN_FACTOR * abs(
-            swelling
-        ):
+        limit = MAX_SHIFT_UNEXPLAINED * edge[m] + DOT_GAIN_FACTOR * abs(dot_gain)
+        if unexplained and np.sqrt(dx * dx + dy * dy) > limit:
             xy[m], cov[m] = np.nan, np.nan
-        out[m] = (np.isnan(xy[m, 0]) or np.isnan(guiding[m, 0])) and np.isfinite(start[m, 0])
+        out[m] = (np.isnan(xy[m, 0]) or np.isnan(reliable[m, 0])) and np.isfinite(start[m, 0])
     return out, np.any(out)
 
 
 @compiled
-def update_lost_markers(xy, cov, unsure, put, start, edge):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers that are known to start with but not sure. Those ``unsure`` (M,) bool are made so, in
-    place, where they do not lie where their neighbours ``put`` them (M, 2)."""
+def update_lost_markers(xy, cov, unaccepted, predicted, start, edge):  # type: ignore[no-untyped-def]
+    """The markers that are lost.
+
+    Args:
+        xy, cov: (M, 2) px and (M, 2, 2) px^2; unaccepted markers far from where they are predicted become NaN.
+        unaccepted: (M,) bool.
+        predicted: (M, 2) px, where the neighbours put the markers.
+        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
+
+    Returns:
+        (M,) bool, the markers with a start that are not accepted.
+    """
     out = np.zeros(xy.shape[0], np.bool_)
-    for m in np.flatnonzero(unsure):
-        dx, dy = xy[m, 0] - put[m, 0], xy[m, 1] - put[m, 1]
+    for m in np.flatnonzero(unaccepted):
+        dx, dy = xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1]
         if not dx * dx + dy * dy < (MAX_SHIFT_FROM_PREDICTION * edge[m]) ** 2:
             xy[m], cov[m] = np.nan, np.nan
         out[m] = np.isnan(xy[m, 0]) and np.isfinite(start[m, 0])
@@ -91,18 +121,25 @@ def update_lost_markers(xy, cov, unsure, put, start, edge):  # type: ignore[no-u
 
 
 @compiled
-def update_obstructed_markers(xy, cov, which, start, edge, whole):  # type: ignore[no-untyped-def]
-    """Put markers on which something lies between what profiles and triangles (``start``) say, in place; NaN where
-    these differ."""
-    for m in np.flatnonzero(which):
+def update_obstructed_markers(xy, cov, selected, places):  # type: ignore[no-untyped-def]
+    """Put covered markers between the places by profiles and by triangles; NaN where these differ much.
+
+    Args:
+        xy, cov: (M, 2) px and (M, 2, 2) px^2 by profiles, written.
+        selected: (M,) bool, the covered markers.
+        places: ``StartPlaces``, by triangles.
+    """
+    start, edge = places.xy_px, places.edge_px
+    for m in np.flatnonzero(selected):
         dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        apart = np.sqrt(dx * dx + dy * dy)
-        if not apart < MAX_PLACE_ERROR * edge[m]:
+        distance = np.sqrt(dx * dx + dy * dy)
+        if not distance < MAX_PLACE_ERROR * edge[m]:
             xy[m], cov[m] = np.nan, np.nan
             continue
-        # all triangles around a marker are seldom wrong together: the farther off, the more they count
-        share = 0.5 / (1.0 + (apart / (DISAGREEMENT_SCALE * edge[m])) ** 2) if whole[m] else 0.5
+        # all triangles around a marker are seldom wrong together: the larger the distance, the more they count
+        ratio = distance / (DISAGREEMENT_SCALE * edge[m])
+        share = 0.5 / (1.0 + ratio**2) if places.is_intact[m] else 0.5
         xy[m, 0], xy[m, 1] = start[m, 0] + share * dx, start[m, 1] + share * dy
-        doubted = 0.25 * apart**2 + (UNEXPLAINED_DEVIATION * edge[m]) ** 2
-        cov[m, 0, 0] += doubted
-        cov[m, 1, 1] += doubted
+        variance = 0.25 * distance**2 + (UNEXPLAINED_DEVIATION * edge[m]) ** 2
+        cov[m, 0, 0] += variance
+        cov[m, 1, 1] += variance

@@ -1,13 +1,12 @@
-"""The pattern drawn over black, and what the image shows beyond it: of everything, or once more around some markers.
+"""The pattern drawn over black, and the residual along its gridlines: of everything, or again around some markers.
 
-Each is one compiled function from the markers to the sums along the gridlines: between small ones, every array would be
-handed to Python and back. Whatever is large is kept from image to image: fresh memory costs more than what is written
-to it.
+One compiled function leads from the markers to the sums along the gridlines: between small functions, every array would
+pass through Python. Large arrays are kept from image to image: fresh memory costs more than writing to it.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,16 +41,16 @@ from extractor.refine.synthesis.residual_kernel import (
     update_known_contrasts,
 )
 
-MARGIN_SIGMA = 4.0
+MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
 
 
 class DrawingBuffers(NamedTuple):
-    """Room to draw in for one image size and layout.
+    """Memory to draw in for one image size and layout.
 
     Attributes:
-        picture: (H, W, 3) the pattern over black, as it was last drawn.
-        strokes: of it.
-        residual: (H * W * 3,) what the image shows beyond it.
+        synthetic_image: (H, W, 3) the pattern over black, as it was last drawn.
+        coverage_runs: the coverages of that drawing.
+        residual: (H * W * 3,) the image minus that drawing.
     """
 
     synthetic_image: NDArray[np.float32]
@@ -60,14 +59,17 @@ class DrawingBuffers(NamedTuple):
 
 
 class Synthesis(NamedTuple):
-    """The pattern as it is drawn, and what was read along its gridlines.
+    """The pattern as it is drawn, and the sums along its gridlines.
 
     Attributes:
-        xy, lines, bend: where: the markers (M, 2), gridlines (E, 8) and their bending (E, 2).
+        xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
         contrasts, black: (E, 3) across the gridlines, and under their middles.
         sums: (E, 24), as ``accumulate_residual_sums`` gives them.
-        levels, bettered: of the inks, as drawn, and as the cells' middles then said.
-        box: of the image that is drawn. sigma: the blur. edge_px: a usual edge's length in it.
+        levels: of the inks, as drawn.
+        corrected_levels: of the inks, corrected by the residual in the middles of the cells.
+        box: (4,) the part of the image that is drawn: x from, y from, x to, y to.
+        sigma: the blur, px.
+        edge_px: the median length of the gridlines.
     """
 
     xy: NDArray[np.float64]
@@ -83,115 +85,119 @@ class Synthesis(NamedTuple):
     edge_px: float
 
 
-def allocate_drawing_buffers(shape: tuple[int, ...], mesh: Topology) -> DrawingBuffers:
-    """An empty board for images of a shape."""
+def allocate_drawing_buffers(shape: tuple[int, ...], topology: Topology) -> DrawingBuffers:
+    """Buffers for images of a shape (H, W, 3), nothing drawn."""
     residual = np.empty(int(np.prod(shape)), np.float32)
-    return DrawingBuffers(np.zeros(shape, np.float32), allocate_coverage_runs(len(mesh.cells)), residual)
+    return DrawingBuffers(np.zeros(shape, np.float32), allocate_coverage_runs(len(topology.cells)), residual)
 
 
-def draw_pattern(view: PyramidLevel, mesh: Topology, fit: Estimate, board: DrawingBuffers) -> Synthesis:
-    """Everything as the fit says."""
-    image, sigma = view.image, fit.sigma
-    box = pattern_box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
-    inside = mesh.black, mesh.cell_color, fit.noise
-    pattern = fit.xy, fit.maps, fit.bend, fit.roughness
-    look = packed_appearance(view, fit.levels, sigma, box)
-    read, edge_px, bettered = _draw_pattern(image, tuple(board), pattern, packed_topology(mesh), look, inside)
-    lines, contrasts, black, sums = read
-    where = fit.xy, lines, fit.bend
-    return Synthesis(*where, contrasts, black, sums, fit.levels, bettered, box, sigma, edge_px)
-
-
-def packed_topology(mesh: Topology) -> tuple[NDArray[Any], ...]:
-    """Which cells, gridlines and markers belong together, as compiled functions take it."""
-    return mesh.cells, mesh.cell_edges, mesh.edges, mesh.edge_cells, mesh.edge_vectors
-
-
-def packed_appearance(
-    view: PyramidLevel, levels: InkLevels, sigma: float, box: NDArray[np.int64]
-) -> tuple[Any, ...]:
-    """How the pattern looks, likewise: levels, black, the frame of these, blur and box."""
-    return (levels.cell, levels.slope), levels.black, view.frame, sigma, box
+def draw_pattern(
+    view: PyramidLevel, topology: Topology, estimate: Estimate, buffers: DrawingBuffers
+) -> Synthesis:
+    """Draw the whole pattern of the estimate into the buffers, and compare it with the image."""
+    height, width = view.image.shape[:2]
+    box = pattern_box(estimate.xy, MARGIN_SIGMA * estimate.sigma + 2, width, height)
+    state = estimate.pattern_state()
+    drawing: Synthesis = _draw_pattern(view, topology, buffers, state, estimate.levels, box)
+    return drawing
 
 
 @compiled
-def _draw_pattern(image, board, pattern, sides, look, inside):  # type: ignore[no-untyped-def]
-    """Lines, contrasts, black and sums of a ``Synthesis``; a usual edge's length; and the bettered levels."""
-    picture, strokes, residual = board
-    xy, maps, bend, rough = pattern
-    cells, cell_edges, edges, edge_cells, along = sides
-    (cell, slope), black, frame, sigma, box = look
-    lines = gridlines(xy, maps, bend, edges, along)
-    contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, slope)
+def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[no-untyped-def]
+    """``Synthesis`` of a ``PatternState`` with ``InkLevels`` within the box (4,)."""
+    image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
+    xy, bend, sigma = state.xy, state.bend, state.sigma
+    frame = view.frame
+    cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
+    cell, slope = levels.cell, levels.slope
+    lines = gridlines(xy, state.maps, bend, edges, topology.edge_vectors)
+    contrasts = update_known_contrasts(lines, xy, cells, topology.edge_cells, cell, slope)
     fill_zeros(picture, box)
     strokes.used[:] = 0
-    every, geometry = np.ones(len(cells), np.bool_), CellGeometry(xy, cells, cell_edges, edges, lines)
-    draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
-    below, loose = (
-        black_levels_at(black, chord_midpoints(lines), frame),
-        bending_gridlines(rough, bend, edges),
+    every, colors = np.ones(len(cells), np.bool_), (cell, slope, sigma, box, picture, strokes)
+    draw_cells(every, 1.0, xy, cells, cell_edges, edges, lines, *colors)
+    black = black_levels_at(levels.black, chord_midpoints(lines), frame.x, frame.y, frame.scale)
+    bending = bending_gridlines(state.roughness, bend, edges)
+    sums = accumulate_residual_sums(
+        image, picture, lines, contrasts, black, sigma, box, bending, buffers.residual
     )
-    drawn = DrawnGridlines(lines, contrasts, below, loose)
-    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, residual)
-    bettered = _corrected_levels(image, picture, xy, cells, cell, frame, *inside)
-    return (lines, contrasts, below, sums), median_edge(xy, edges), bettered
+    corrected = _corrected_levels(view, picture, topology, xy, cell, state.noise)
+    edge_px = median_edge(xy, edges)
+    return Synthesis(xy, lines, bend, contrasts, black, sums, levels, corrected, box, sigma, edge_px)
 
 
 @compiled
-def _corrected_levels(image, picture, xy, cells, cell, frame, black_cells, color, noise):  # type: ignore[no-untyped-def]
-    """Levels corrected by what the drawing does not explain in the middle of the cells."""
-    own = cell_means(image, picture, xy, cells, 0.0)
+def _corrected_levels(view, picture, topology, xy, cell, noise):  # type: ignore[no-untyped-def]
+    """``InkLevels``: the levels ``cell`` (K, 3) corrected by the residual in the middle of the cells."""
+    cells, black_cells, color = topology.cells, topology.black, topology.cell_color
+    own = cell_means(view.image, picture, xy, cells, 0.0)
     own[:, :3] += cell
-    black = cell_means(image, picture, xy, black_cells, 0.0)
-    return smoothed_levels(own, black, xy, InkCells(cells, black_cells, color), noise, frame)
+    black = cell_means(view.image, picture, xy, black_cells, 0.0)
+    frame = view.frame
+    levels = smoothed_levels(own, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale)
+    return InkLevels(*levels)
 
 
 @compiled
-def draw_pattern_part(image, board, pattern, sides, look, anew, before):  # type: ignore[no-untyped-def]
-    """The first six of a ``Synthesis``, as they were ``before`` but for the markers that are ``anew`` (M,) bool, and
-    all
-    gridlines and cells that they belong to; these as the ``pattern`` says."""
-    picture, strokes, residual = board
-    xy, maps, bend, rough = pattern
-    cells, cell_edges, edges, edge_cells, along = sides
-    (cell, slope), black, frame, sigma, box = look
-    old_xy, old_lines, old_bend, old_contrasts, old_black, old_sums = before
-    some, which = np.flatnonzero(groups_with_any(anew, edges)), groups_with_any(anew, cells)
-    xy, bend, ends = merged_rows(anew, xy, old_xy), bend[some], edges[some]
-    own = gridlines(xy, maps, bend, ends, along[some])
-    contrasts = update_known_contrasts(own, xy, cells, edge_cells[some], cell, slope)
-    lines, appearance = replaced_rows(old_lines, some, own), CellAppearance(cell, slope, sigma)
-    old_geometry = CellGeometry(old_xy, cells, cell_edges, edges, old_lines)
-    update_erasing_cells(which, old_geometry, appearance, box, picture, strokes)
-    geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
-    draw_cells(which, 1.0, geometry, appearance, box, picture, strokes)
-    below, loose = black_levels_at(black, chord_midpoints(own), frame), bending_gridlines(rough, bend, ends)
-    drawn = DrawnGridlines(own, contrasts, below, loose)
-    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, residual)
-    contrasts, below = replaced_rows(old_contrasts, some, contrasts), replaced_rows(old_black, some, below)
-    return (
+def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type: ignore[no-untyped-def]
+    """Draw some markers again, with all gridlines and cells that they belong to.
+
+    Args:
+        view: the image.
+        topology: of the layout.
+        buffers: ``DrawingBuffers`` with the drawing, written.
+        drawing: ``Synthesis`` as it was.
+        redrawn: (M,) bool, the markers to draw again.
+        state: ``PatternState``, where these are drawn; its blur is not used.
+
+    Returns:
+        ``Synthesis``: markers, gridlines, contrasts, black and sums are new where drawn again.
+    """
+    image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
+    sigma, box = drawing.sigma, drawing.box
+    frame = view.frame
+    cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
+    cell, slope = drawing.levels.cell, drawing.levels.slope
+    edge_ids, redrawn_cells = np.flatnonzero(groups_with_any(redrawn, edges)), groups_with_any(redrawn, cells)
+    xy, bend, ends = merged_rows(redrawn, state.xy, drawing.xy), state.bend[edge_ids], edges[edge_ids]
+    own = gridlines(xy, state.maps, bend, ends, topology.edge_vectors[edge_ids])
+    contrasts = update_known_contrasts(own, xy, cells, topology.edge_cells[edge_ids], cell, slope)
+    lines, colors = replaced_rows(drawing.lines, edge_ids, own), (cell, slope, sigma, box, picture, strokes)
+    update_erasing_cells(redrawn_cells, drawing.xy, cells, cell_edges, edges, drawing.lines, *colors)
+    draw_cells(redrawn_cells, 1.0, xy, cells, cell_edges, edges, lines, *colors)
+    black = black_levels_at(drawing.levels.black, chord_midpoints(own), frame.x, frame.y, frame.scale)
+    bending = bending_gridlines(state.roughness, bend, ends)
+    sums = accumulate_residual_sums(
+        image, picture, own, contrasts, black, sigma, box, bending, buffers.residual
+    )
+    return Synthesis(
         xy,
         lines,
-        replaced_rows(old_bend, some, bend),
-        contrasts,
-        below,
-        replaced_rows(old_sums, some, sums),
+        replaced_rows(drawing.bend, edge_ids, bend),
+        replaced_rows(drawing.contrasts, edge_ids, contrasts),
+        replaced_rows(drawing.black, edge_ids, black),
+        replaced_rows(drawing.sums, edge_ids, sums),
+        drawing.levels,
+        drawing.corrected_levels,
+        box,
+        sigma,
+        drawing.edge_px,
     )
 
 
 @compiled
-def merged_rows(which, ones, others):  # type: ignore[no-untyped-def]
-    """Rows of ``ones`` where ``gridlines``, of ``others`` elsewhere."""
-    out = others.copy()
-    for i in range(which.shape[0]):
-        if which[i]:
-            out[i] = ones[i]
+def merged_rows(selected, rows, other_rows):  # type: ignore[no-untyped-def]
+    """``rows`` (n, ...) where selected (n,) bool, ``other_rows`` elsewhere."""
+    out = other_rows.copy()
+    for i in range(selected.shape[0]):
+        if selected[i]:
+            out[i] = rows[i]
     return out
 
 
 @compiled
-def replaced_rows(rows, some, ones):  # type: ignore[no-untyped-def]
-    """The rows with others at these numbers (n,)."""
-    out = rows.copy()
-    out[some] = ones
+def replaced_rows(table, numbers, rows):  # type: ignore[no-untyped-def]
+    """A copy of the table with other ``rows`` at these numbers (n,)."""
+    out = table.copy()
+    out[numbers] = rows
     return out

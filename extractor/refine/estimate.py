@@ -1,26 +1,33 @@
-"""What refinement passes from step to step, and what it gives."""
+"""What refinement passes from step to step, and its result."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.pyramid import PyramidLevel
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
 
-MAX_BLUR_CHANGE, MAX_LEVEL_CHANGE = (
-    0.06,
-    0.03,
-)  # of the blur and the levels, that no start can take for granted
+# Changes of blur and levels, relative, above which an image looks unlike the one before.
+MAX_BLUR_CHANGE, MAX_LEVEL_CHANGE = 0.06, 0.03
 
 
 class Appearance(NamedTuple):
-    """How an image looks, for the next one of a sequence to start from: at which scale, the blur (px there), the noise,
-    the inks' levels, and the grain: noise as pixels show it that lie side by side, whatever the pattern explains."""
+    """How an image looks; the next image of a sequence starts from it.
+
+    Attributes:
+        scale: by which the image was reduced.
+        sigma: the blur, px at that scale.
+        noise: gray levels, one channel, as the residual shows it.
+        levels: of the inks.
+        pixel_noise: gray levels, one channel, from neighbouring pixels: independent of what the pattern explains.
+    """
 
     scale: int
     sigma: float
@@ -29,10 +36,10 @@ class Appearance(NamedTuple):
     pixel_noise: float
 
     def with_lighting(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Appearance:
-        """The same in another light.
+        """The appearance in another light.
 
         Args:
-            before, now: (2, C, 3) some cells' inks over black, and their black, in the light then and now.
+            before, now: (2, C, 3) gray levels of some cells over black, and of their black, in the light then and now.
         """
         gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
         black = self.levels.black.copy()
@@ -40,7 +47,7 @@ class Appearance(NamedTuple):
         cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
         return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
 
-    def near(self, other: Appearance) -> bool:
+    def is_similar(self, other: Appearance) -> bool:
         """Whether blur and levels are nearly the same."""
         blur = abs(self.sigma - other.sigma) < MAX_BLUR_CHANGE * other.sigma
         return blur and bool(level_change(other.levels.cell, self.levels.cell) < MAX_LEVEL_CHANGE)
@@ -53,12 +60,12 @@ class RefinedMarkers:
     Attributes:
         xy_px: (M, 2) float64, NaN where nothing was measured.
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
-        explained: (M,) bool, the pattern explains the image around the marker; where not, something lies on it (and
-            after synthesis, its place is from profiles alone).
-        free_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
+        explained: (M,) bool, the pattern explains the image around the marker. Where not, something lies on the marker
+            (and after synthesis, its place is from profiles alone).
+        bend_deviation_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
-        noise: the noise found, grey levels, one channel.
-        seen: how the image looks, where the pattern was drawn.
+        noise: the noise found, gray levels, one channel.
+        appearance: how the image looks; None where the pattern was not drawn.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
     """
 
@@ -68,36 +75,58 @@ class RefinedMarkers:
     bend_deviation_px: NDArray[np.float64]
     blur_px: float
     noise: float
-    seen: Appearance | None
+    appearance: Appearance | None
     points: NDArray[np.float64]
 
 
-class Estimate(NamedTuple):
-    """The current estimate.
+class PatternState(NamedTuple):
+    """Where the pattern is thought to be: the part of an ``Estimate`` that compiled functions take.
 
     Attributes:
-        xy: (M, 2) where the pattern is drawn: markers that the image hardly shows, or not at all (``beyond``), lie
-            where their neighbours' maps put them.
-        measured: (M, 2), all of them as the last step left them.
-        guiding: (M, 2), the same with NaN where the image hardly shows them.
-        beyond: (M,) bool.
+        xy, hidden, maps, roughness, bend, sigma, noise, dot_gain: as in ``Estimate``.
+        weight: (E,) 0 to 1, the weights of the gridlines in the last step.
+    """
+
+    xy: NDArray[np.float64]
+    hidden: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    sigma: float
+    noise: float
+    dot_gain: float
+
+
+class Estimate(NamedTuple):
+    """The current estimate. Places are px in the image at the scale of the step.
+
+    Attributes:
+        xy: (M, 2) where the pattern is drawn. Markers that the image shows little or not at all (``hidden``) lie where
+            the maps of their neighbours put them.
+        measured: (M, 2) all markers as the last step left them.
+        reliable: (M, 2) the same, NaN where the image shows them little.
+        hidden: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
-        sigma: the blur, px. noise: grey levels, one channel. levels: of the inks. grain: as in ``Appearance``.
+        sigma: the blur, px.
+        noise: gray levels, one channel.
+        levels: of the inks.
+        pixel_noise: as in ``Appearance``.
         information: about the markers.
-        rough: (M,) px^2, how rough the markers are around each.
-        loose: (E,) px^2, how freely gridlines may bend beyond the map there.
-        bend: (E, 2) px, by how much they do.
-        strides: (M,) by how many of their standard deviations the last step moved markers from where they were drawn.
-        reading: what that step saw.
-        usual: by how much gridlines miss what they show, as ``usual_misfit`` gives it; NaN where nothing is drawn.
-        swelling: by how much the sides of all cells have moved outward, px.
-        unsettled: (M, 2, 2) px^2, what it may have left; None where nothing is drawn.
+        roughness: (M,) px^2, how rough the markers are around each.
+        bend_variance: (E,) px^2, how freely gridlines may bend beyond the map.
+        bend: (E, 2) px, how far they bend.
+        normalized_steps: (M,) the last step from where the markers were drawn, in standard deviations.
+        reading: what that step compared with the image; None before the first step.
+        median_misfit: squared gray levels, by which gridlines usually miss the image; NaN where nothing is drawn.
+        dot_gain: how far the sides of all cells have moved outward, px.
+        convergence_cov_px2: (M, 2, 2) the error that the last step may have left; None where nothing is drawn.
     """
 
     xy: NDArray[np.float64]
     measured: NDArray[np.float64]
     reliable: NDArray[np.float64]
-    beyond: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
     maps: NDArray[np.float64]
     sigma: float
     noise: float
@@ -113,15 +142,47 @@ class Estimate(NamedTuple):
     dot_gain: float = 0.0
     convergence_cov_px2: NDArray[np.float64] | None = None
 
+    def pattern_state(self) -> PatternState:
+        """The part that compiled functions take; all weights are 1 before the first step."""
+        weight = np.ones(len(self.bend)) if self.reading is None else self.reading.weight
+        where = self.xy, self.hidden, self.maps, self.roughness, self.bend
+        return PatternState(*where, weight, self.sigma, self.noise, self.dot_gain)
+
 
 class EdgeContrasts(NamedTuple):
-    """What changes across the gridlines; moves of a pixel do not change it.
+    """The change of color across the gridlines; it stays the same where gridlines move by a pixel.
 
     Attributes:
         contrasts: (E, 3) differences of level.
-        weights, room: as ``unmixing`` gives them.
+        projections, clearance: (E, 4), as ``channel_projections`` gives them.
     """
 
     contrasts: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    projections: NDArray[np.float64]
     clearance: NDArray[np.float64]
+
+
+class StartPlaces(NamedTuple):
+    """Markers before refinement: the part of ``InitialMarkers`` that compiled functions take.
+
+    Attributes:
+        xy_px: (M, 2) px at the scale of the step, NaN where there is none.
+        edge_px: (M,) the mean length of the edges at each marker, px, NaN where there is none.
+        agreed: (M,) bool, the triangles found at the marker meet.
+        is_intact: (M,) bool, these are all triangles that the pattern has there.
+    """
+
+    xy_px: NDArray[np.float64]
+    edge_px: NDArray[np.float64]
+    agreed: NDArray[np.bool_]
+    is_intact: NDArray[np.bool_]
+
+
+def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
+    """Places of the full image in a reduced one."""
+    return replace(places, xy_px=view.reduced(places.xy_px), edge_px=places.edge_px / view.scale)
+
+
+def start_places(places: InitialMarkers) -> StartPlaces:
+    """The part of the places that compiled functions take."""
+    return StartPlaces(places.xy_px, places.edge_px, places.agreed, places.whole)

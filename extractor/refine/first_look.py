@@ -1,5 +1,4 @@
-"""How an image looks before anything is measured: its noise, the inks' levels, what changes across the gridlines, and
-the blur."""
+"""The appearance of an image before anything is measured: noise, levels of the inks, contrasts, and blur."""
 
 from __future__ import annotations
 
@@ -18,65 +17,77 @@ from extractor.refine.synthesis.ink_levels import InkCells, cell_means, smoothed
 from extractor.refine.synthesis.residual_kernel import update_known_contrasts
 from extractor.refine.synthesis_steps import MIN_SIGMA_PX
 
-DEFAULT_SIGMA_PX = 1.5  # before it is known
-FALLBACK_SIGMA_PX = 0.9  # where no gridline shows it
-MIN_CORRECTED_BLEED = 0.002  # of a neighbour's level in the middle of a cell, from which on it is taken out
-BLUR_GRIDLINES = 60  # gridlines that the first estimate of the blur is taken from
+DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured
+FALLBACK_SIGMA_PX = 0.9  # where no gridline shows the blur
+MIN_CORRECTED_BLEED = 0.002  # of a neighbour's level in the middle of a cell, above which bleed is removed
+BLUR_GRIDLINES = 60  # gridlines for the first estimate of the blur
 NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 
-def initial_appearance(view: PyramidLevel, mesh: Topology, xy: NDArray[np.float64]) -> Appearance:
-    """The noise and the levels in the middles of the cells; the blur is not known yet."""
-    usual, tables = DEFAULT_SIGMA_PX / view.scale, (mesh.cells, mesh.black, mesh.cell_color)
-    noise, levels = _initial_appearance(view.image, NO_MODEL, xy, *tables, usual, *view.frame)
+def initial_appearance(view: PyramidLevel, topology: Topology, xy: NDArray[np.float64]) -> Appearance:
+    """The noise, and the levels from the middles of the cells at the markers (M, 2), px; the blur is 0: not known."""
+    noise, levels = _initial_appearance(view, topology, xy, DEFAULT_SIGMA_PX / view.scale, NO_MODEL)
     return Appearance(view.scale, 0.0, noise, levels, noise)
 
 
 @compiled
-def _initial_appearance(image, nothing, xy, cells, black_cells, color, sigma, x0, y0, scale):  # type: ignore[no-untyped-def]
+def _initial_appearance(view, topology, xy, sigma, no_model):  # type: ignore[no-untyped-def]
+    """The noise and ``InkLevels``."""
+    image, cells, black_cells, color = view.image, topology.cells, topology.black, topology.cell_color
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
-    drawn = cell_means(image, nothing, xy, cells, sigma)
-    black = cell_means(image, nothing, xy, black_cells, sigma)
-    pattern, frame = InkCells(cells, black_cells, color), PolynomialFrame(x0, y0, scale)
-    return noise, smoothed_levels(drawn, black, xy, pattern, noise, frame)
+    drawn = cell_means(image, no_model, xy, cells, sigma)
+    black = cell_means(image, no_model, xy, black_cells, sigma)
+    frame = view.frame
+    levels = smoothed_levels(
+        drawn, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale
+    )
+    return noise, InkLevels(*levels)
 
 
 def update_edge_contrasts(
-    view: PyramidLevel, mesh: Topology, fit: Estimate, lines: NDArray[np.float64]
+    view: PyramidLevel, topology: Topology, estimate: Estimate, lines: NDArray[np.float64]
 ) -> EdgeContrasts:
-    """The colors beside the gridlines."""
-    levels = fit.levels.cell, fit.levels.slope, fit.levels.black
-    return EdgeContrasts(
-        *_update_edge_contrasts(lines, fit.xy, mesh.cells, mesh.edge_cells, *levels, *view.frame)
+    """The contrasts across the gridlines (E, 8). Those beside unknown cells are marked as not known in ``lines``."""
+    contrasts: EdgeContrasts = _update_edge_contrasts(
+        lines, estimate.xy, topology, estimate.levels, view.frame
     )
+    return contrasts
 
 
 @compiled
-def _update_edge_contrasts(lines, xy, cells, edge_cells, cell, slope, black, x0, y0, scale):  # type: ignore[no-untyped-def]
-    contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, slope)
-    frame = PolynomialFrame(x0, y0, scale)
-    weights, room = channel_projections(lines, contrasts, xy, cells, edge_cells, cell, black, frame)
-    return contrasts, weights, room
+def _update_edge_contrasts(lines, xy, topology, levels, frame):  # type: ignore[no-untyped-def]
+    cells, edge_cells, cell, black = topology.cells, topology.edge_cells, levels.cell, levels.black
+    contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, levels.slope)
+    projections, clearance = channel_projections(
+        lines, contrasts, xy, cells, edge_cells, cell, black, frame.x, frame.y, frame.scale
+    )
+    return EdgeContrasts(contrasts, projections, clearance)
 
 
 def update_blur_and_bleed(
-    view: PyramidLevel, mesh: Topology, fit: Estimate, lines: NDArray[np.float64], beside: EdgeContrasts
+    view: PyramidLevel,
+    topology: Topology,
+    estimate: Estimate,
+    lines: NDArray[np.float64],
+    contrasts: EdgeContrasts,
 ) -> tuple[Estimate, EdgeContrasts]:
-    """The fit with the blur that some of the gridlines show, and its levels without what that brings into the middle of
-    a cell from its neighbours."""
-    shown = view.image, lines, beside.weights, beside.clearance
-    sigma, share, usual = _blur_and_bleed(*shown, fit.xy, mesh.cells, DEFAULT_SIGMA_PX / view.scale)
-    fit = fit._replace(sigma=sigma)
-    if usual > MIN_CORRECTED_BLEED:
-        fit = fit._replace(levels=remove_bleed(fit.levels, mesh.cell_color, share, usual))
-        beside = update_edge_contrasts(view, mesh, fit, lines)
-    return fit, beside
+    """The estimate with the blur that some of the gridlines (E, 8) show, and with levels and contrasts without
+    bleed."""
+    across = view.image, lines, contrasts.projections, contrasts.clearance
+    assumed = DEFAULT_SIGMA_PX / view.scale
+    sigma, share, median_share = _blur_and_bleed(*across, estimate.xy, topology.cells, assumed)
+    estimate = estimate._replace(sigma=sigma)
+    if median_share > MIN_CORRECTED_BLEED:
+        levels = remove_bleed(estimate.levels, topology.cell_color, share, median_share)
+        estimate = estimate._replace(levels=levels)
+        contrasts = update_edge_contrasts(view, topology, estimate, lines)
+    return estimate, contrasts
 
 
 @compiled
-def _blur_and_bleed(image, lines, weights, room, xy, cells, assumed):  # type: ignore[no-untyped-def]
-    """The blur, px; and what it makes of neighbours in the cells' means, as ``bleed_shares`` tells it."""
-    sigma = profile_blur(image, lines, weights, room, BLUR_GRIDLINES)
+def _blur_and_bleed(image, lines, projections, clearance, xy, cells, assumed):  # type: ignore[no-untyped-def]
+    """The blur, px; and the bleed of each cell and its median, as ``bleed_shares`` gives them."""
+    sigma = profile_blur(image, lines, projections, clearance, BLUR_GRIDLINES)
     sigma = max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else FALLBACK_SIGMA_PX
-    share, usual = bleed_shares(xy, cells, sigma, assumed)
-    return sigma, share, usual
+    share, median_share = bleed_shares(xy, cells, sigma, assumed)
+    return sigma, share, median_share

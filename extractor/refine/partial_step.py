@@ -1,7 +1,7 @@
-"""A step by synthesis around some markers: what is drawn anew there is read, judged and solved, and nothing else.
+"""A step by synthesis around some markers: only what is drawn again is read, weighed and solved.
 
-The markers that are drawn anew are solved together with those beside them, between others that are held where the last
-step left them. Levels, blur, noise, swelling and what misfit is usual are what the last step from everything said.
+The markers that are drawn again are solved together with their neighbours, between others that are held where the last
+step left them. Levels, blur, noise, dot gain and the usual misfit are those of the last step from everything.
 """
 
 from __future__ import annotations
@@ -19,11 +19,9 @@ from extractor.refine.drawn_pattern import (
     Synthesis,
     draw_pattern_part,
     merged_rows,
-    packed_appearance,
-    packed_topology,
     replaced_rows,
 )
-from extractor.refine.estimate import Estimate
+from extractor.refine.estimate import Estimate, PatternState
 from extractor.refine.measure.gridline_bending import (
     MarkerRows,
     bend_after_shift,
@@ -34,256 +32,253 @@ from extractor.refine.measure.gridline_bending import (
 )
 from extractor.refine.measure.gridline_offsets import foot_levels
 from extractor.refine.measure.gridline_weights import (
-    PRIOR_HIDDEN_PX,
     chord_midpoints,
     gridline_misfits,
     misfit_weights,
     normalized_step_lengths,
     shift_gradients,
 )
-from extractor.refine.refinement_step import PIXEL_MISFIT_RULE, PRIOR_PX, extrapolate_pattern_around
+from extractor.refine.refinement_step import (
+    PIXEL_MISFIT_RULE,
+    ShiftGradients,
+    extrapolate_pattern_around,
+    prior_information,
+)
 from extractor.refine.solve.convergence import add_neighbours
 from extractor.refine.solve.fisher_information import (
     HELD_INFORMATION,
+    GridlineSystem,
     Information,
-    fill_information,
     fill_product,
+    fisher_information,
     gradient,
     solve_shifts,
 )
 from extractor.refine.solve.subproblem import (
-    gridlines_at,
-    number_subproblem,
+    held_shifts,
     replaced_table_rows,
     selected_rows,
+    subproblem_around,
 )
 from extractor.refine.synthesis.dot_gain import update_without_dot_gain
-from extractor.refine.synthesis.gridlines import KNOWN
-from extractor.refine.synthesis.ink_levels import LevelChange
 
 
-class Subproblem(NamedTuple):
-    """Some gridlines (n) and the markers at their ends (m), numbered among themselves.
+class MarkerState(NamedTuple):
+    """The part of an ``Estimate`` about the single markers; fields as there, and the information's ``diagonal``."""
+
+    measured: NDArray[np.float64]
+    reliable: NDArray[np.float64]
+    hidden: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    normalized_steps: NDArray[np.float64]
+    diagonal: NDArray[np.float64]
+
+
+class GridlineState(NamedTuple):
+    """The part of an ``Estimate`` about the single gridlines; fields as there and in ``GridlineReading``, and the
+    information's ``off_diagonal``."""
+
+    bend: NDArray[np.float64]
+    bend_variance: NDArray[np.float64]
+    off_diagonal: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    foot: NDArray[np.float64]
+    dot_gain_offset: NDArray[np.float64]
+
+
+class ImageState(NamedTuple):
+    """The part of an ``Estimate`` that a partial step keeps; fields as there.
 
     Attributes:
-        which: (n,) the gridlines. markers: (m,) the markers.
-        ends: (n, 2) the gridlines' ends. around: (m, 6) the gridlines around each marker, -1 for none.
-        free: (m,) bool, all gridlines around it are there. beyond: (m,) bool. rough: (m,) px^2.
-        away: (m, 2) px, how far each marker is from where it is drawn.
+        wide_blur: no gridline may bend, as the blur is wide.
     """
 
-    gridlines: NDArray[np.int64]
-    markers: NDArray[np.int64]
-    ends: NDArray[np.int32]
-    spokes: NDArray[np.int32]
-    free: NDArray[np.bool_]
-    beyond: NDArray[np.bool_]
-    roughness: NDArray[np.float64]
-    shifts: NDArray[np.float64]
+    noise: float
+    median_misfit: float
+    dot_gain: float
+    wide_blur: bool
+
+
+class PartialStep(NamedTuple):
+    """The drawing, the markers and the gridlines after a partial step."""
+
+    drawing: Synthesis
+    markers: MarkerState
+    gridlines: GridlineState
 
 
 class SubproblemReading(NamedTuple):
-    """What was read along the gridlines of a part (n), and what follows.
+    """The measurements along the gridlines (n) of a subproblem.
 
     Attributes:
-        lines, contrasts, sums, bend: as drawn and read, bending eliminated from the sums.
-        to_a, to_b, off: the votes, and how the levels' change explains some.
-        loose, kept: how freely they bend, and what their bending is.
-        use: how far they are trusted. aside: px, as the cells are swollen.
+        system: the gridlines, bending eliminated from the sums.
+        gradients: likewise.
+        bend, bend_variance: (n, 2) px as drawn, (n,) px^2.
+        bend_response: (n, 6), as ``update_without_bending`` gives it.
+        dot_gain_offset: (n,) px.
     """
 
-    lines: NDArray[np.float64]
-    contrasts: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    gradient_a: NDArray[np.float64]
-    gradient_b: NDArray[np.float64]
-    level_shift: NDArray[np.float64]
+    system: GridlineSystem
+    gradients: ShiftGradients
     bend: NDArray[np.float64]
     bend_variance: NDArray[np.float64]
-    kept: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    bend_response: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
 
 
 def partial_step(
     view: PyramidLevel,
-    mesh: Topology,
-    fit: Estimate,
+    topology: Topology,
+    estimate: Estimate,
     drawing: Synthesis,
-    anew: NDArray[np.bool_],
-    board: DrawingBuffers,
-    wide: bool,
+    redrawn: NDArray[np.bool_],
+    buffers: DrawingBuffers,
+    wide_blur: bool,
 ) -> tuple[Estimate, Synthesis]:
-    """The fit and the drawing after a step around the markers that are ``anew`` (M,) bool.
+    """A step around some markers.
 
-    ``wide``: no gridline may bend, as the blur is wide.
+    Args:
+        view: the image.
+        topology: of the layout.
+        estimate: after the last step.
+        drawing: of the last step.
+        redrawn: (M,) bool, the markers to draw again.
+        buffers: with the drawing, written.
+        wide_blur: no gridline may bend, as the blur is wide.
+
+    Returns:
+        The estimate and the drawing after the step.
     """
-    levels, bettered, reading = drawing.levels, drawing.corrected_levels, fit.reading
+    reading, information = estimate.reading, estimate.information
     assert reading is not None
-    tables = (
-        packed_topology(mesh),
-        (
-            mesh.spokes,
-            mesh.near,
-            mesh.ring_vectors,
-            mesh.derivative_stencil,
-            mesh.next_markers,
-            mesh.third_differences,
-        ),
+    where = estimate.measured, estimate.reliable, estimate.hidden, estimate.maps, estimate.roughness
+    markers = MarkerState(*where, estimate.normalized_steps, information.diagonal)
+    how = information.off_diagonal, reading.weight, reading.foot, reading.dot_gain_offset
+    gridlines = GridlineState(estimate.bend, estimate.bend_variance, *how)
+    image_state = ImageState(estimate.noise, estimate.median_misfit, estimate.dot_gain, wide_blur)
+    step: PartialStep = _partial_step(
+        view, topology, buffers, drawing, redrawn, markers, gridlines, image_state
     )
-    look = packed_appearance(view, levels, drawing.sigma, drawing.box)
-    markers = (
-        fit.measured,
-        fit.reliable,
-        fit.maps,
-        fit.roughness,
-        fit.normalized_steps,
-        fit.information.diagonal,
-    )
-    gridlines = (
-        fit.bend,
-        fit.bend_variance,
-        fit.information.beside,
-        reading.weight,
-        reading.foot,
-        reading.dot_gain_offset,
-    )
-    changes = LevelChange(bettered.cell - levels.cell, bettered.black - levels.black)
-    said = fit.noise, fit.median_misfit, fit.dot_gain, wide, changes
-    given = view.image, tuple(board), anew, tables, look, tuple(drawing[:6])
-    drew, markers, gridlines = _draw_and_solve_part(*given, markers, gridlines, said)
-    xy, lines, drawn_bend, contrasts, black, sums = drew
-    drawing = drawing._replace(
-        xy=xy, lines=lines, bend=drawn_bend, contrasts=contrasts, black=black, sums=sums
-    )
-    measured, guiding, beyond, maps, rough, stepped, diagonal = markers
-    where = {"xy": xy, "measured": measured, "reliable": guiding, "beyond": beyond, "maps": maps}
-    bend, loose, joined, use, foot, aside = gridlines
-    how = {"bend": bend, "bend_variance": loose, "roughness": rough, "normalized_steps": stepped}
-    reading = reading._replace(lines=lines, contrasts=contrasts, foot=foot, weight=use, dot_gain_offset=aside)
-    return fit._replace(**where, **how, information=Information(diagonal, joined), reading=reading), drawing
+    drawing, of_markers, of_gridlines = step.drawing, step.markers._asdict(), step.gridlines._asdict()
+    information = Information(of_markers.pop("diagonal"), of_gridlines.pop("off_diagonal"))
+    fields = {name: of_gridlines.pop(name) for name in ("weight", "foot", "dot_gain_offset")}
+    reading = reading._replace(lines=drawing.lines, contrasts=drawing.contrasts, **fields)
+    fields = {**of_markers, **of_gridlines, "information": information, "reading": reading}
+    return estimate._replace(xy=drawing.xy, **fields), drawing
 
 
 @compiled
-def _draw_and_solve_part(image, board, anew, tables, look, before, markers, gridlines, said):  # type: ignore[no-untyped-def]
-    """The first six of a ``Synthesis``; of the fit what belongs to markers, and what belongs to gridlines."""
-    sides, (spokes, near, offset, stencil, ahead, third) = tables
-    measured, guiding, maps, rough, stepped, known = markers
-    edges, bend, wide = sides[2], gridlines[0], said[3]
-    xy, beyond, maps = extrapolate_pattern_around(guiding, anew, maps, near, offset, stencil)
-    free = anew.copy()
-    add_neighbours(anew, edges, free)
-    if not wide:
-        about = MarkerRows(edges, ahead, third), spokes, near
-        rough = merged_rows(free, measure_roughness(guiding, maps, known, *about, free), rough)
-    drew = draw_pattern_part(image, board, (xy, maps, bend, rough), sides, look, anew, before)
-    part = _subproblem(free, beyond, rough, _held_shifts(measured, before[0], anew), edges, spokes)
-    read = _subproblem_reading(drew, part, sides[3], gridlines, look, said)
-    away, diagonal, joined = _solve_subproblem(part, read, gridlines[2], look[3], said[0])
-    where = _markers_after_step(drew[0], away, diagonal, part, measured, guiding, stepped, known)
-    measured, guiding, stepped, known = where
-    lines = _gridlines_after_step(drew, away, joined, part, read, gridlines)
-    return drew, (measured, guiding, beyond, maps, rough, stepped, known), lines
-
-
-@compiled
-def _held_shifts(measured, drawn, anew):  # type: ignore[no-untyped-def]
-    """(M, 2) px, how far the markers are from where they are drawn, 0 for those drawn ``anew`` and unknown ones."""
-    out = measured - drawn
-    for m in range(out.shape[0]):
-        if anew[m] or not np.isfinite(out[m, 0]):
-            out[m, 0], out[m, 1] = 0.0, 0.0
-    return out
-
-
-@compiled
-def _subproblem(free, beyond, rough, away, edges, spokes):  # type: ignore[no-untyped-def]
-    """The part of the pattern at ``free`` markers."""
-    which = gridlines_at(free, edges)
-    markers, ends, around = number_subproblem(which, edges, spokes)
-    kinds = free[markers], beyond[markers], rough[markers]
-    return Subproblem(which, markers, ends, around, *kinds, selected_rows(away, markers))
-
-
-@compiled
-def _subproblem_reading(drew, part, edge_cells, gridlines, look, said):  # type: ignore[no-untyped-def]
-    """What was read along the gridlines of a part, judged as all of them were."""
-    use = gridlines[3]
-    _, lines, bend, contrasts, _, sums = drew
-    noise, usual, swelling, _, changes = said
-    values, least, unjudged = PIXEL_MISFIT_RULE
-    which, frame, sigma, variance = part.gridlines, look[2], look[3], noise**2
-    sums, lines, contrasts = (
-        selected_rows(sums, which),
-        selected_rows(lines, which),
-        selected_rows(contrasts, which),
+def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines, image_state):  # type: ignore[no-untyped-def]
+    """``PartialStep``; the buffers are written."""
+    edges, reliable, diagonal = topology.edges, markers.reliable, markers.diagonal
+    xy, hidden, maps = extrapolate_pattern_around(reliable, redrawn, markers.maps, topology)
+    free, roughness = redrawn.copy(), markers.roughness
+    add_neighbours(redrawn, edges, free)
+    if not image_state.wide_blur:
+        ahead, third, spokes, near = (
+            topology.next_markers,
+            topology.third_differences,
+            topology.spokes,
+            topology.near,
+        )
+        new = measure_roughness(reliable, maps, diagonal, edges, ahead, third, spokes, near, free)
+        roughness = merged_rows(free, new, roughness)
+    noise, dot_gain = image_state.noise, image_state.dot_gain
+    state = PatternState(
+        xy, hidden, maps, roughness, gridlines.bend, gridlines.weight, drawing.sigma, noise, dot_gain
     )
-    cells, bend = selected_rows(edge_cells, which), selected_rows(bend, which)
-    gradients = shift_gradients(sums, contrasts, cells, changes, chord_midpoints(lines), frame)
-    aside = update_without_dot_gain(sums, gradients, contrasts, cells, swelling)
-    loose = np.zeros(len(which))
+    held = held_shifts(markers.measured, drawing.xy, redrawn)
+    drawing = draw_pattern_part(view, topology, buffers, drawing, redrawn, state)
+    part = subproblem_around(free, hidden, roughness, held, edges, topology.spokes)
+    read = _subproblem_reading(drawing, part, topology.edge_cells, gridlines.weight, view.frame, image_state)
+    shifts, information = _solve_subproblem(part, read, gridlines.off_diagonal)
+    markers = _markers_after_step(state, drawing.xy, shifts, information.diagonal, part, markers)
+    gridlines = _gridlines_after_step(drawing, shifts, information.off_diagonal, part, read, gridlines)
+    return PartialStep(drawing, markers, gridlines)
+
+
+@compiled
+def _subproblem_reading(drawing, part, edge_cells, weight, frame, image_state):  # type: ignore[no-untyped-def]
+    """``SubproblemReading`` from the drawing; ``weight`` (E,) are those of all gridlines before."""
+    rule, sigma, variance = PIXEL_MISFIT_RULE, drawing.sigma, image_state.noise**2
+    ids, values = part.gridlines, rule.values
+    sums, lines = selected_rows(drawing.sums, ids), selected_rows(drawing.lines, ids)
+    contrasts, bend = selected_rows(drawing.contrasts, ids), selected_rows(drawing.bend, ids)
+    cells, levels, corrected = selected_rows(edge_cells, ids), drawing.levels, drawing.corrected_levels
+    cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
+    middle = chord_midpoints(lines)
+    to_a, to_b, off = shift_gradients(
+        sums, contrasts, cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
+    )
+    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, cells, image_state.dot_gain)
+    bend_variance = np.zeros(len(ids))
     if np.any(part.roughness) or np.any(bend):
-        about = use[which], lines, part.ends, variance
-        loose = estimate_bend_variance(sums, gradients, bend, part.roughness, *about)
-    kept = update_without_bending(sums, gradients, bend, loose, variance)
-    misfit, pardon = (
-        gridline_misfits(sums, gradients, values, least),
-        bending_misfit(loose, contrasts, sigma),
-    )
-    trusted = misfit_weights(sums, misfit, usual, pardon, values, unjudged)
-    start, end, off = gradients.start, gradients.end, gradients.level_shift
-    return SubproblemReading(lines, contrasts, sums, start, end, off, bend, loose, kept, trusted, aside)
+        about = weight[ids], lines, part.ends, variance
+        bend_variance = estimate_bend_variance(sums, to_a, to_b, off, bend, part.roughness, *about)
+    bend_response = update_without_bending(sums, to_a, to_b, off, bend, bend_variance, variance)
+    misfit = gridline_misfits(sums, to_a, to_b, values, rule.min_places)
+    pardon = bending_misfit(bend_variance, contrasts, sigma)
+    new_weight = misfit_weights(sums, misfit, image_state.median_misfit, pardon, values, rule.default_weight)
+    system = GridlineSystem(sums, new_weight, lines, contrasts, part.ends, part.spokes, sigma, variance)
+    gradients = ShiftGradients(to_a, to_b, off)
+    return SubproblemReading(system, gradients, bend, bend_variance, bend_response, dot_gain_offset)
 
 
 @compiled
-def _solve_subproblem(part, read, joined, sigma, noise):  # type: ignore[no-untyped-def]
-    """How far the markers of a part are from where they are drawn, and the information's blocks; ``joined`` are those
-    of all gridlines as they were."""
-    believed, variance = read.weight * read.lines[:, KNOWN], noise**2
-    prior = np.where(part.beyond, PRIOR_HIDDEN_PX**-2, PRIOR_PX**-2)
-    diagonal, own = np.empty((len(part.markers), 3)), np.empty((len(part.gridlines), 4))
-    geometry = read.lines, read.contrasts, part.ends, part.spokes, sigma, variance, prior
-    fill_information(read.sums, believed, True, *geometry, diagonal, own)
+def _solve_subproblem(part, read, off_diagonal):  # type: ignore[no-untyped-def]
+    """(m, 2) px, the shifts of the markers of a subproblem from where they are drawn, and the ``Information``.
+
+    ``off_diagonal``: (E, 4) 1/px^2, of all gridlines before.
+    """
+    diagonal, own = fisher_information(read.system, prior_information(part.hidden), True)
     for k in range(len(own)):
         if not (part.free[part.ends[k, 0]] and part.free[part.ends[k, 1]]):
             # not all gridlines at the other end are read, which share pixels with this one
-            own[k] = joined[part.gridlines[k]]
-    right = gradient(
-        read.gradient_a, read.gradient_b, believed, variance, read.lines, part.ends, len(diagonal)
-    )
+            own[k] = off_diagonal[part.gridlines[k]]
+    right = gradient(read.system, read.gradients.start, read.gradients.end)
     explained = np.empty_like(part.shifts)
     fill_product(diagonal, own, part.ends, part.shifts, explained)
-    known = diagonal.copy()
-    for k in range(len(known)):
+    held = diagonal.copy()
+    for k in range(len(held)):
         for axis in range(2):
             right[k, axis] = right[k, axis] - explained[k, axis] if part.free[k] else 0.0
         if not part.free[k]:
-            known[k, 0], known[k, 1], known[k, 2] = HELD_INFORMATION, 0.0, HELD_INFORMATION
-    return part.shifts + solve_shifts(known, own, part.ends, right), diagonal, own
+            held[k, 0], held[k, 1], held[k, 2] = HELD_INFORMATION, 0.0, HELD_INFORMATION
+    shifts = part.shifts + solve_shifts(held, own, part.ends, right)
+    return shifts, Information(diagonal, own)
 
 
 @compiled
-def _markers_after_step(xy, away, diagonal, part, measured, guiding, stepped, known):  # type: ignore[no-untyped-def]
-    """Of all markers, the free ones of the part as they were solved: measured, guiding, strides, and what is known."""
-    far = normalized_step_lengths(away, diagonal, part.beyond)
-    measured, guiding, stepped, known = measured.copy(), guiding.copy(), stepped.copy(), known.copy()
+def _markers_after_step(state, xy, shifts, own_diagonal, part, markers):  # type: ignore[no-untyped-def]
+    """``MarkerState`` with the solution for the free markers of the subproblem; ``xy`` (M, 2) is where they are
+    drawn."""
+    length = normalized_step_lengths(shifts, own_diagonal, part.hidden)
+    measured, reliable = markers.measured.copy(), markers.reliable.copy()
+    normalized_steps, diagonal = markers.normalized_steps.copy(), markers.diagonal.copy()
     for k in np.flatnonzero(part.free):
         m = part.markers[k]
         for axis in range(2):
-            measured[m, axis] = xy[m, axis] + away[k, axis]
-            guiding[m, axis] = measured[m, axis] if np.isfinite(guiding[m, axis]) else np.nan
-        stepped[m], known[m] = far[k], diagonal[k]
-    return measured, guiding, stepped, known
+            measured[m, axis] = xy[m, axis] + shifts[k, axis]
+            reliable[m, axis] = measured[m, axis] if np.isfinite(reliable[m, axis]) else np.nan
+        normalized_steps[m], diagonal[m] = length[k], own_diagonal[k]
+    return MarkerState(
+        measured, reliable, state.hidden, state.maps, state.roughness, normalized_steps, diagonal
+    )
 
 
 @compiled
-def _gridlines_after_step(drew, away, own, part, read, gridlines):  # type: ignore[no-untyped-def]
-    """Of all gridlines, those of the part as they were read: bending, how freely, information beside, use, foot and how
-    far aside."""
-    which, (bend, loose, joined, use, foot, aside) = part.gridlines, gridlines
-    own_bend = bend_after_shift(read.bend, read.kept, away, read.lines, part.ends)
-    own_foot = foot_levels(read.contrasts, selected_rows(drew[4], which), read.level_shift)
-    bend, joined = replaced_table_rows(bend, which, own_bend), replaced_table_rows(joined, which, own)
-    loose, use = replaced_rows(loose, which, read.bend_variance), replaced_rows(use, which, read.weight)
-    foot, aside = replaced_rows(foot, which, own_foot), replaced_rows(aside, which, read.dot_gain_offset)
-    return bend, loose, joined, use, foot, aside
+def _gridlines_after_step(drawing, shifts, own_off_diagonal, part, read, gridlines):  # type: ignore[no-untyped-def]
+    """``GridlineState`` with the measurements along the gridlines of the subproblem."""
+    ids, system = part.gridlines, read.system
+    own_bend = bend_after_shift(read.bend, read.bend_response, shifts, system.lines, part.ends)
+    black = selected_rows(drawing.black, ids)
+    own_foot = foot_levels(system.contrasts, black, read.gradients.level_shift)
+    return GridlineState(
+        replaced_table_rows(gridlines.bend, ids, own_bend),
+        replaced_rows(gridlines.bend_variance, ids, read.bend_variance),
+        replaced_table_rows(gridlines.off_diagonal, ids, own_off_diagonal),
+        replaced_rows(gridlines.weight, ids, system.weight),
+        replaced_rows(gridlines.foot, ids, own_foot),
+        replaced_rows(gridlines.dot_gain_offset, ids, read.dot_gain_offset),
+    )

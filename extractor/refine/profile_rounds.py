@@ -1,10 +1,12 @@
-"""A round of profiles: they are read, judged and solved.
+"""A round of profiles: gridlines are read across, weighed, and the markers solved.
 
-One compiled function from the gridlines to the markers: between small ones, each array would be handed to Python and
-back.
+One compiled function leads from the gridlines to the markers: between small functions, every array would pass through
+Python.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,69 +20,106 @@ from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.gridline_weights import ShiftGradients, weigh_gridlines
 from extractor.refine.measure.matched_filter import read_profiles
 from extractor.refine.outliers import suspect_markers
-from extractor.refine.refinement_step import MisfitRule, solve_step, update_for_bending, with_solution
+from extractor.refine.refinement_step import (
+    BendingPrior,
+    MisfitRule,
+    ShiftGradients,
+    StepSolution,
+    solve_step,
+    update_for_bending,
+    with_solution,
+)
 from extractor.refine.solve.convergence import groups_with_any
+from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
 from extractor.refine.synthesis.residual_kernel import AA, A, B
 
 SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
-MISFIT_TOLERANCE = 0.1  # of the contrast: what glare and uneven light do to a profile
-SQUARED_CONTRAST = 3  # of a gridline's room
+MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile
+SQUARED_CONTRAST = 3  # column of the clearance
+
+
+class ProfileStep(NamedTuple):
+    """The measurements of a round of profiles, and the solution.
+
+    Attributes:
+        profile_weight: (E,) 0 to 1, how well each gridline looks like the pattern.
+        weight: (E,) 0 to 1, with which it was used.
+        bend_variance: (E,) px^2.
+        dot_gain: px.
+        dot_gain_offset: (E,) px, offset of each gridline by the dot gain.
+        solution: the markers after the step.
+    """
+
+    profile_weight: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    bend_variance: NDArray[np.float64]
+    dot_gain: float
+    dot_gain_offset: NDArray[np.float64]
+    solution: StepSolution
 
 
 def profile_step(
     view: PyramidLevel,
-    mesh: Topology,
-    fit: Estimate,
+    topology: Topology,
+    estimate: Estimate,
     lines: NDArray[np.float64],
-    across: EdgeContrasts,
+    contrasts: EdgeContrasts,
     stations: int,
     *,
     judged: bool,
 ) -> tuple[Estimate, NDArray[np.float64]]:
-    """The fit after a round of profiles across its gridlines, and (E,) how far these look as they should.
+    """A round of profiles.
 
-    They are ``judged`` by it in the last round, where they are already close; before, the best look wrong, and it
-    counts only around markers where little else is seen.
+    Args:
+        view: the image.
+        topology: of the layout.
+        estimate: before the round.
+        lines: (E, 8) its gridlines.
+        contrasts: across them.
+        stations: rows of pixels across each gridline at most.
+        judged: use gridlines by how well they look like the pattern, as in the last round, where they are already
+            close. Before, the best ones look wrong, and it counts only around markers where little else is measured.
+
+    Returns:
+        The estimate after the round, and (E,) 0 to 1, how well gridlines look like the pattern.
     """
-    before = np.ones(len(lines)) if fit.reading is None else fit.reading.weight
-    now = fit.xy, fit.beyond, fit.roughness, fit.bend, before, fit.sigma, fit.noise
-    tables = mesh.edges, mesh.spokes, mesh.edge_cells
-    read, *step = _profile_step(view.image, lines, tuple(across), now, tables, stations, judged)
-    trusted, use, loose, swelling, aside = read
-    foot = across.weights[:, 3].copy()
-    reading = GridlineReading(
-        lines, across.contrasts, foot, across.clearance, use, aside, fit.sigma, fit.noise, False
-    )
-    return with_solution(fit, step, bend_variance=loose, dot_gain=swelling, reading=reading), trusted
+    state = estimate.pattern_state()
+    step = _profile_step(view.image, lines, contrasts, state, topology, stations, judged)
+    foot = contrasts.projections[:, 3].copy()
+    look = contrasts.contrasts, foot, contrasts.clearance, step.weight, step.dot_gain_offset
+    reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
+    others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
+    return with_solution(estimate, step.solution, **others), step.profile_weight
 
 
 @compiled
-def _profile_step(image, lines, across, now, tables, most, judged):  # type: ignore[no-untyped-def]
-    """(E,) how far gridlines look as they should, how far they are used, and how freely they bend; by how much cells
-    are swollen, and (E,) gridlines aside for it; and the solution."""
-    contrasts, weights, room = across
-    xy, beyond, rough, bend, before, sigma, noise = now
-    edges, spokes, edge_cells = tables
-    values, least, unjudged = SAMPLE_MISFIT_RULE
-    sums = read_profiles(image, lines, weights, room, sigma, bending_gridlines(rough, bend, edges), most)
+def _profile_step(image, lines, across, state, topology, stations, judged):  # type: ignore[no-untyped-def]
+    """``ProfileStep`` from the gridlines (E, 8), the ``EdgeContrasts`` across them, and the ``PatternState``."""
+    contrasts, clearance = across.contrasts, across.clearance
+    edges, spokes, edge_cells = topology.edges, topology.spokes, topology.edge_cells
+    sigma, noise, rule = state.sigma, state.noise, SAMPLE_MISFIT_RULE
+    bending = bending_gridlines(state.roughness, state.bend, edges)
+    sums = read_profiles(image, lines, across.projections, clearance, sigma, bending, stations)
     gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums)))
-    swelling = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
-    aside = update_without_dot_gain(sums, gradients, contrasts, edge_cells, swelling)
-    bending = bend, rough, before, lines, edges, noise
-    loose, kept = update_for_bending(sums, gradients, *bending, values, least, unjudged)
-    trusted, _, _ = weigh_gridlines(
-        sums, gradients, MISFIT_TOLERANCE**2 * room[:, SQUARED_CONTRAST], values, least, unjudged
+    to_a, to_b = gradients.start, gradients.end
+    dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
+    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
+    prior = BendingPrior(state.bend, state.roughness, state.weight)
+    bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, noise, rule)
+    pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
+    profile_weight, _, _ = weigh_gridlines(
+        sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
     )
-    use = trusted if judged else _lenient_weights(trusted, sums, edges, spokes)
-    where = xy, beyond, edges, spokes, sigma, noise, False
-    read = trusted, use, loose, swelling, aside
-    return (read,) + solve_step(sums, gradients, bend, kept, use, lines, contrasts, *where)
+    weight = profile_weight if judged else _lenient_weights(profile_weight, sums, edges, spokes)
+    system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
+    solution = solve_step(system, gradients, state.bend, bend_response, state.xy, state.hidden, False)
+    return ProfileStep(profile_weight, weight, bend_variance, dot_gain, dot_gain_offset, solution)
 
 
 @compiled
-def _lenient_weights(trusted, sums, edges, spokes):  # type: ignore[no-untyped-def]
-    """(E,) how far gridlines are used that are judged only around markers where little else is seen."""
+def _lenient_weights(profile_weight, sums, edges, spokes):  # type: ignore[no-untyped-def]
+    """(E,) 0 to 1: weights of gridlines that are judged only around markers where little else is measured."""
     read = sums[:, AA] > 0.0
-    doubted, _ = suspect_markers(trusted, read, spokes)
-    return np.where(groups_with_any(doubted, edges), trusted, np.where(read, 1.0, 0.0))
+    suspect, _ = suspect_markers(profile_weight, read, spokes)
+    return np.where(groups_with_any(suspect, edges), profile_weight, np.where(read, 1.0, 0.0))

@@ -1,4 +1,4 @@
-"""What every step of refinement does, by profiles or by synthesis: gridlines between the markers, then the markers."""
+"""What every step of refinement does, by profiles or by synthesis: bending of the gridlines, then the markers."""
 
 from __future__ import annotations
 
@@ -24,26 +24,25 @@ from extractor.refine.measure.gridline_weights import (
     normalized_step_lengths,
     weigh_gridlines,
 )
-from extractor.refine.solve.fisher_information import Information, fill_information, gradient, solve_shifts
+from extractor.refine.solve.fisher_information import Information, fisher_information, gradient, solve_shifts
 from extractor.refine.synthesis.gridlines import (
     FIRST_RING,
-    KNOWN,
     extrapolate_markers,
     gridlines,
     local_maps,
     local_maps_at,
 )
 
-PRIOR_PX = 10.0  # how far a marker may be drawn by nothing
+PRIOR_PX = 10.0  # deviation of a marker before it is measured
 
 
 class MisfitRule(NamedTuple):
-    """How a gridline is judged by its misfit.
+    """How a gridline is weighed by its misfit.
 
     Attributes:
-        values: that each place adds.
-        least: places, beyond which it is judged.
-        unjudged: trust in one with fewer.
+        values: that each of its pixels or samples adds.
+        min_places: pixels or samples, above which it is weighed.
+        default_weight: of a gridline with fewer.
     """
 
     values: int
@@ -54,28 +53,74 @@ class MisfitRule(NamedTuple):
 PIXEL_MISFIT_RULE = MisfitRule(3, 8, 0.0)
 
 
-def extrapolate_pattern(
-    mesh: Topology, xy: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
-    """Markers, those just beyond the known ones put where they must be; which; and the map at each."""
-    whole: tuple[Any, Any, Any] = _extrapolate_pattern(
-        xy, mesh.near, mesh.ring_vectors, mesh.derivative_stencil
-    )
-    return whole
+class ExtrapolatedPattern(NamedTuple):
+    """Markers with those just beyond the known ones.
+
+    Attributes:
+        xy: (M, 2) px; unknown markers beside known ones lie where the maps of these put them.
+        hidden: (M,) bool, the markers put that way.
+        maps: (M, 2, 5) the map at each marker, as ``local_maps`` gives it.
+    """
+
+    xy: NDArray[np.float64]
+    hidden: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+
+
+class ShiftGradients(NamedTuple):
+    """Gradients of the log-likelihood by shifts of the gridlines' ends, times the variance of the noise.
+
+    Attributes:
+        start, end: (E,) squared gray levels / px, by a shift of the start and of the end along the normal (-uy, ux).
+        level_shift: (E,) squared gray levels, the change of the levels of both sides together times the contrast; 0
+            where levels stay as they are.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    level_shift: NDArray[np.float64]
+
+
+class BendingPrior(NamedTuple):
+    """What was known about the bending of gridlines before a step.
+
+    Attributes:
+        bend: (E, 2) px, how far they bend.
+        roughness: (M,) px^2, of the markers.
+        weight: (E,) 0 to 1, of the gridlines.
+    """
+
+    bend: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+
+class StepSolution(NamedTuple):
+    """Markers and gridlines after a step; fields as in ``Estimate``."""
+
+    measured: NDArray[np.float64]
+    reliable: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    normalized_steps: NDArray[np.float64]
+    information: Information
 
 
 @compiled
-def _extrapolate_pattern(xy, near, offset, stencil):  # type: ignore[no-untyped-def]
+def extrapolate_pattern(xy, topology):  # type: ignore[no-untyped-def]
+    """``ExtrapolatedPattern`` of the markers (M, 2), NaN where unknown."""
+    near, offset, stencil = topology.near, topology.ring_vectors, topology.derivative_stencil
     maps = local_maps(xy, near, offset, stencil)
-    xy, beyond = extrapolate_markers(xy, maps, near, offset)
-    return xy, beyond, maps
+    xy, hidden = extrapolate_markers(xy, maps, near, offset)
+    return ExtrapolatedPattern(xy, hidden, maps)
 
 
 @compiled
-def extrapolate_pattern_around(xy, which, maps, near, offset, stencil):  # type: ignore[no-untyped-def]
-    """What ``extrapolate_pattern`` gives, with new maps at the markers ``gridlines`` (M,) bool, and beside them."""
-    asked = which.copy()
-    for m in np.flatnonzero(which):
+def extrapolate_pattern_around(xy, selected, maps, topology):  # type: ignore[no-untyped-def]
+    """``ExtrapolatedPattern`` with new maps at the selected markers (M,) bool and their neighbours; the maps (M, 2, 5)
+    elsewhere stay."""
+    near, offset, stencil = topology.near, topology.ring_vectors, topology.derivative_stencil
+    asked = selected.copy()
+    for m in np.flatnonzero(selected):
         for k in range(FIRST_RING):
             if near[m, k] >= 0:
                 asked[near[m, k]] = True
@@ -84,70 +129,105 @@ def extrapolate_pattern_around(xy, which, maps, near, offset, stencil):  # type:
     for n in range(xy.shape[0]):
         if asked[n] or not known[n]:
             maps[n] = new[n]
-    xy, beyond = extrapolate_markers(xy, maps, near, offset)
-    return xy, beyond, maps
+    xy, hidden = extrapolate_markers(xy, maps, near, offset)
+    return ExtrapolatedPattern(xy, hidden, maps)
 
 
-def with_pattern_moved(mesh: Topology, fit: Estimate, which: NDArray[np.bool_] | None = None) -> Estimate:
-    """The fit with its pattern where the last step left the markers; if only gridlines at some are asked for (M,) bool,
-    the maps elsewhere stay as they were."""
-    if which is None:
-        xy, beyond, maps = extrapolate_pattern(mesh, fit.reliable)
+def with_pattern_moved(
+    topology: Topology, estimate: Estimate, selected: NDArray[np.bool_] | None = None
+) -> Estimate:
+    """The estimate with its pattern where the last step left the markers.
+
+    Args:
+        selected: (M,) bool, the markers whose gridlines are needed; the maps elsewhere stay. All if None.
+    """
+    if selected is None:
+        pattern = extrapolate_pattern(estimate.reliable, topology)
     else:
-        about = fit.maps, mesh.near, mesh.ring_vectors, mesh.derivative_stencil
-        xy, beyond, maps = extrapolate_pattern_around(fit.reliable, which, *about)
-    return fit._replace(xy=xy, beyond=beyond, maps=maps)
+        pattern = extrapolate_pattern_around(estimate.reliable, selected, estimate.maps, topology)
+    return estimate._replace(**pattern._asdict())
 
 
-def with_roughness(mesh: Topology, fit: Estimate) -> Estimate:
-    """The fit with how rough its markers are."""
-    rows = MarkerRows(mesh.edges, mesh.next_markers, mesh.third_differences)
-    about = rows, mesh.spokes, mesh.near, np.ones(len(mesh.spokes), np.bool_)
-    return fit._replace(roughness=measure_roughness(fit.reliable, fit.maps, fit.information.diagonal, *about))
-
-
-def gridlines_of(mesh: Topology, fit: Estimate) -> NDArray[np.float64]:
-    """(E, 8) the fit's gridlines."""
-    return np.asarray(gridlines(fit.xy, fit.maps, fit.bend, mesh.edges, mesh.edge_vectors))
-
-
-@compiled
-def update_for_bending(sums, gradients, bend, rough, use, lines, edges, noise, values, least, unjudged):  # type: ignore[no-untyped-def]
-    """(E,) px^2 how freely gridlines bend, as far as they were in ``weight`` before (E,), and (E, 6) what their bending
-    is, taken out of ``sums`` and votes in place."""
-    loose, variance = np.zeros(len(sums)), 1.0
-    if np.any(rough) or np.any(bend):
-        # what the drawing misses everywhere is no bending either
-        usual = weigh_gridlines(sums, gradients, np.zeros(len(sums)), values, least, unjudged)[2]
-        variance = max(noise, usual) ** 2 if np.isfinite(usual) else noise**2
-        loose = estimate_bend_variance(sums, gradients, bend, rough, use, lines, edges, variance)
-    return loose, update_without_bending(sums, gradients, bend, loose, variance)
-
-
-def with_solution(fit: Estimate, solution: tuple[Any, ...], **others: Any) -> Estimate:
-    """The fit with a ``solve_step``, and what else is new."""
-    measured, guiding, bend, stepped, diagonal, beside = solution
-    about = Information(diagonal, beside)
-    return fit._replace(
-        measured=measured, reliable=guiding, bend=bend, normalized_steps=stepped, information=about, **others
+def with_roughness(topology: Topology, estimate: Estimate) -> Estimate:
+    """The estimate with the roughness of its markers."""
+    about = (
+        topology.edges,
+        topology.next_markers,
+        topology.third_differences,
+        topology.spokes,
+        topology.near,
+        np.ones(len(topology.spokes), np.bool_),
     )
+    markers = estimate.reliable, estimate.maps, estimate.information.diagonal
+    return estimate._replace(roughness=measure_roughness(*markers, *about))
+
+
+def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:
+    """(E, 8) the gridlines of the estimate."""
+    where = estimate.xy, estimate.maps, estimate.bend
+    return np.asarray(gridlines(*where, topology.edges, topology.edge_vectors))
 
 
 @compiled
-def solve_step(  # type: ignore[no-untyped-def]
-    sums, gradients, bend, kept, use, lines, contrasts, xy, beyond, edges, spokes, sigma, noise, overlapping
-):
-    """Of ``Estimate``: measured, guiding, bend, strides and the information's blocks, after the step that was asked
-    for."""
-    count, variance = len(xy), noise**2
-    diagonal, beside = np.empty((count, 3)), np.empty((len(lines), 4))
-    believed = use * lines[:, KNOWN]
-    prior = np.where(beyond, PRIOR_HIDDEN_PX**-2, PRIOR_PX**-2)
-    geometry = (lines, contrasts, edges, spokes, sigma, variance, prior)
-    fill_information(sums, believed, overlapping, *geometry, diagonal, beside)
-    right = gradient(gradients.start, gradients.end, believed, variance, lines, edges, count)
-    shift = solve_shifts(diagonal, beside, edges, right)
-    least = least_information(sums, use, lines, edges, variance, count)
-    measured, guiding = markers_after_shift(xy, shift, least, use, spokes)
-    bend = bend_after_shift(bend, kept, shift, lines, edges)
-    return measured, guiding, bend, normalized_step_lengths(shift, diagonal, beyond), diagonal, beside
+def update_for_bending(sums, gradients, prior, lines, edges, noise, rule):  # type: ignore[no-untyped-def]
+    """Eliminate the bending of gridlines from the sums and gradients, in place.
+
+    Args:
+        sums: (E, 24), written.
+        gradients: ``ShiftGradients``, ``start`` and ``end`` written.
+        prior: ``BendingPrior``.
+        lines, edges: (E, 8) and (E, 2).
+        noise: gray levels, one channel.
+        rule: ``MisfitRule``.
+
+    Returns:
+        (E,) px^2 the bend variance, and (E, 6) the bend response, as ``update_without_bending`` gives it.
+    """
+    to_a, to_b, off = gradients.start, gradients.end, gradients.level_shift
+    bend_variance, variance = np.zeros(len(sums)), 1.0
+    if np.any(prior.roughness) or np.any(prior.bend):
+        # a misfit that all gridlines have is not bending
+        _, _, found = weigh_gridlines(
+            sums, to_a, to_b, np.zeros(len(sums)), rule.values, rule.min_places, rule.default_weight
+        )
+        variance = max(noise, found) ** 2 if np.isfinite(found) else noise**2
+        bend_variance = estimate_bend_variance(
+            sums, to_a, to_b, off, prior.bend, prior.roughness, prior.weight, lines, edges, variance
+        )
+    return bend_variance, update_without_bending(sums, to_a, to_b, off, prior.bend, bend_variance, variance)
+
+
+def with_solution(estimate: Estimate, solution: StepSolution, **others: Any) -> Estimate:
+    """The estimate after a step, and with other new fields."""
+    return estimate._replace(**solution._asdict(), **others)
+
+
+@compiled
+def solve_step(system, gradients, bend, bend_response, xy, hidden, overlapping):  # type: ignore[no-untyped-def]
+    """Move the markers by the shifts that the gradients ask for.
+
+    Args:
+        system: ``GridlineSystem``, bending eliminated from its sums.
+        gradients: ``ShiftGradients``, likewise.
+        bend, bend_response: (E, 2) px and (E, 6), as ``bend_after_shift`` takes them.
+        xy, hidden: (M, 2) px and (M,) bool, the markers as drawn.
+        overlapping: the sums include the gridlines' ends.
+
+    Returns:
+        ``StepSolution``.
+    """
+    lines, edges, spokes, weight = system.lines, system.edges, system.spokes, system.weight
+    information = fisher_information(system, prior_information(hidden), overlapping)
+    right = gradient(system, gradients.start, gradients.end)
+    shift = solve_shifts(information.diagonal, information.off_diagonal, edges, right)
+    least = least_information(system.sums, weight, lines, edges, system.variance, len(xy))
+    measured, reliable = markers_after_shift(xy, shift, least, weight, spokes)
+    bend = bend_after_shift(bend, bend_response, shift, lines, edges)
+    normalized_steps = normalized_step_lengths(shift, information.diagonal, hidden)
+    return StepSolution(measured, reliable, bend, normalized_steps, information)
+
+
+@compiled
+def prior_information(hidden):  # type: ignore[no-untyped-def]
+    """(M,) 1/px^2, the information about each marker before it is measured; ``hidden`` (M,) bool."""
+    return np.where(hidden, PRIOR_HIDDEN_PX**-2, PRIOR_PX**-2)

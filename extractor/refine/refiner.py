@@ -1,8 +1,8 @@
 """Stage 9: all markers are solved together, from profiles across the gridlines and then by synthesis.
 
-Profiles lead from a pixel to some hundredths of one. From there a step by synthesis is a Gauss-Newton step on the
-likelihood of the whole image, with the curvature that the overlap of the gridlines at the corners gives it: one is
-nearly all that can be had.
+Profiles reduce the error from a pixel to some hundredths of one. From there a step by synthesis is a Gauss-Newton step
+on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners. One
+such step is nearly enough.
 """
 
 from __future__ import annotations
@@ -24,7 +24,14 @@ from extractor.refine.acceptance import (
     update_obstructed_markers,
     update_unaccepted_markers,
 )
-from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate, RefinedMarkers
+from extractor.refine.estimate import (
+    Appearance,
+    EdgeContrasts,
+    Estimate,
+    RefinedMarkers,
+    places_in_view,
+    start_places,
+)
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
 from extractor.refine.measure.gridline_bending import mean_at_markers
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
@@ -42,58 +49,62 @@ from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import MIN_SIGMA_PX, SMALL_BLUR, WIDE_BLUR, SynthesisSolver
 
-SHARP_SIGMA_PX = 1.15  # of an image in focus at half its scale: the scale for it is looked at first
-SHORT_RARITY = 30  # one in so many gridlines may be smaller than that at a reduced scale
-MIN_EDGE_PX = 4.0  # edges at a reduced scale, and where blur makes one edge part of the next
+SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first
+SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale
+MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
 # A first step may be taken where usual gridlines have so many pixels, and the blur so much of what the preset asks for.
 COARSE_EDGE_PX, COARSE_BLUR = 4.5, 0.9
-# Where the drawing leaves more than so many times the noise, it explains nothing so well that it may move a marker far.
+# Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
 UNEXPLAINED_NOISE_RATIO = 3.0
 
 
 class Refiner:
-    """Refines the markers of one layout; its picture is kept from image to image, one a thread."""
+    """Refines the markers of one layout; its picture is kept from image to image, one for each thread."""
 
-    def __init__(self, mesh: Topology, preset: Preset, virtual_per_edge: int) -> None:
-        self._mesh = mesh
+    def __init__(self, topology: Topology, preset: Preset, virtual_per_edge: int) -> None:
+        self._topology = topology
         self._virtual = virtual_per_edge
-        self._steps = SCHEDULES[preset]
-        self._synthesis_solver = SynthesisSolver(mesh)
-        self._every_marker = np.ones(len(mesh.spokes), np.bool_)
+        self._schedule = SCHEDULES[preset]
+        self._synthesis_solver = SynthesisSolver(topology)
+        self._every_marker = np.ones(len(topology.spokes), np.bool_)
 
     def __call__(
-        self, sights: Pyramid, places: InitialMarkers, before: Appearance | None = None
+        self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None = None
     ) -> RefinedMarkers:
-        """Solve all markers together.
+        """Solve all markers together. A marker farther than ``acceptance.MAX_SHIFT`` edges from its place is lost.
 
         Args:
-            sights: the image.
+            pyramid: the image.
             places: where the markers were found, to about a pixel.
-            before: how the image before it looked, in a sequence.
-
-        A marker that would be moved by more than ``sure.MAX_SHIFT`` of an edge is lost.
+            before: the appearance of the image before, in a sequence.
         """
-        edge, usual = short_edges(places.xy_px, self._mesh.edges, SHORTEST_RARITY, SHORT_RARITY)
-        if before is not None and before.scale == self._reduction_scale(before.scale * before.sigma, usual):
-            view = sights.at(before.scale)
-            refined = self._final_steps(view, *self._first_estimate(view, places, places.xy_px, before), edge)
-            if refined.seen is not None and refined.seen.near(before):
+        short_edge, usual_edge = short_edges(
+            places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY
+        )
+        if before is not None and before.scale == self._reduction_scale(
+            before.scale * before.sigma, usual_edge
+        ):
+            view = pyramid.at(before.scale)
+            first = self._first_estimate(view, places, places.xy_px, before)
+            refined = self._final_steps(view, *first, short_edge)
+            if refined.appearance is not None and refined.appearance.is_similar(before):
                 return refined
-        view = sights.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual), 2))
-        fit, sides, places = self._first_estimate(view, places, places.xy_px)
-        scale = self._reduction_scale(view.scale * fit.sigma, usual)
+        view = pyramid.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
+        estimate, contrasts, places = self._first_estimate(view, places, places.xy_px)
+        scale = self._reduction_scale(view.scale * estimate.sigma, usual_edge)
         if scale > view.scale:
-            fit, sides = rescaled(fit, view, sights.at(scale)), rescaled_contrasts(sides, view.scale / scale)
+            estimate = rescaled(estimate, view, pyramid.at(scale))
+            contrasts = rescaled_contrasts(contrasts, view.scale / scale)
         elif scale < view.scale:
-            xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(fit.measured), np.nan)
-            fit, sides, places = self._first_estimate(sights.at(scale), places, xy)
-        return self._final_steps(sights.at(scale), fit, sides, places, edge, sights)
+            xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(estimate.measured), np.nan)
+            estimate, contrasts, places = self._first_estimate(pyramid.at(scale), places, xy)
+        return self._final_steps(pyramid.at(scale), estimate, contrasts, places, short_edge, pyramid)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
-        """By how much to reduce an image with this blur and edges."""
-        scale = min(int(sigma_px / self._steps.reduction_blur_px), int(edge_px / MIN_EDGE_PX))
+        """The factor by which an image with this blur and these edges is reduced."""
+        scale = min(int(sigma_px / self._schedule.reduction_blur_px), int(edge_px / MIN_EDGE_PX))
         if sigma_px > SMALL_BLUR * edge_px:
             scale = min(scale, max(int(sigma_px / MIN_BLUR_PX), int(edge_px / MIN_BLURRED_EDGE_PX)))
         return max(1, scale)
@@ -105,167 +116,200 @@ class Refiner:
         start: NDArray[np.float64],
         before: Appearance | None = None,
     ) -> tuple[Estimate, EdgeContrasts, InitialMarkers]:
-        """The inks' levels, the blur, and the first round of profiles from ``start`` (M, 2), px in the full image; and
-        the places without those that strayed."""
-        mesh = self._mesh
-        xy, beyond, maps = extrapolate_pattern(mesh, view.reduced(start))
-        nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
-        smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
-        stiff = np.zeros(len(mesh.edges))
-        seen = before or initial_appearance(view, mesh, xy)
-        about = seen.sigma, seen.noise, seen.levels, seen.pixel_noise
-        free = smooth, stiff, straight, smooth
-        fit = Estimate(xy, xy, xy, beyond, maps, *about, nothing, *free, None)
-        lines = gridlines_of(mesh, fit)
-        sides = update_edge_contrasts(view, mesh, fit, lines)
-        if before is None:
-            fit, sides = update_blur_and_bleed(view, mesh, fit, lines, sides)
-        fit, trusted = profile_step(
-            view, mesh, fit, lines, sides, self._steps.max_profile_rows[0], judged=False
+        """The levels of the inks, the blur, and the first round of profiles.
+
+        Args:
+            view: the image.
+            places: of the full image.
+            start: (M, 2) px in the full image, where the profiles are.
+            before: the appearance of the image before, in a sequence.
+
+        Returns:
+            The estimate, the contrasts across the gridlines, and the places without outliers.
+        """
+        topology = self._topology
+        markers, edges = len(topology.spokes), len(topology.edges)
+        xy, hidden, maps = extrapolate_pattern(view.reduced(start), topology)
+        look = before or initial_appearance(view, topology, xy)
+        estimate = Estimate(
+            xy=xy,
+            measured=xy,
+            reliable=xy,
+            hidden=hidden,
+            maps=maps,
+            sigma=look.sigma,
+            noise=look.noise,
+            levels=look.levels,
+            pixel_noise=look.pixel_noise,
+            information=Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
+            roughness=np.zeros(markers),
+            bend_variance=np.zeros(edges),
+            bend=np.zeros((edges, 2)),
+            normalized_steps=np.zeros(markers),
+            reading=None,
         )
-        fit, places = correct_outliers(view, mesh, fit, trusted, places)
-        return fit, sides, places
+        lines = gridlines_of(topology, estimate)
+        contrasts = update_edge_contrasts(view, topology, estimate, lines)
+        if before is None:
+            estimate, contrasts = update_blur_and_bleed(view, topology, estimate, lines, contrasts)
+        stations = self._schedule.max_profile_rows[0]
+        estimate, profile_weight = profile_step(
+            view, topology, estimate, lines, contrasts, stations, judged=False
+        )
+        estimate, places = correct_outliers(view, topology, estimate, profile_weight, places)
+        return estimate, contrasts, places
 
     def _final_steps(
         self,
         view: PyramidLevel,
-        fit: Estimate,
-        sides: EdgeContrasts,
+        estimate: Estimate,
+        contrasts: EdgeContrasts,
         places: InitialMarkers,
         edge_px: float,
-        sights: Pyramid | None = None,
+        pyramid: Pyramid | None = None,
     ) -> RefinedMarkers:
-        """The last round of profiles, and synthesis where the blur asks for it; ``edge_px`` is a short edge. With
-        ``sights``, a first step may be taken at twice the scale, where blur and usual gridlines allow that and only
-        short ones do not."""
-        mesh, steps, places, edge_px = (
-            self._mesh,
-            self._steps,
-            _at_reduced_scale(view, places),
-            edge_px / view.scale,
-        )
-        if fit.dot_gain != 0.0:
-            places = replace(places, xy_px=markers_without_dot_gain(places.xy_px, mesh.cells, fit.dot_gain))
-        start = with_pattern_moved(mesh, fit)
-        if fit.sigma < steps.sharp_blur_share * edge_px and view.scale < steps.reduced:
-            start = with_roughness(mesh, start)
-            lines = gridlines_of(mesh, start)
-            fit, use = profile_step(view, mesh, start, lines, sides, steps.max_profile_rows[1], judged=True)
-            xy, cov = self._accepted_markers(fit, places)
-            strays, doubted = find_outliers(mesh, fit, xy, use, places.edge_px)
-            xy[strays], cov[strays] = np.nan, np.nan
-            update_obstructed_markers(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
-            return self._refined_markers(view, fit, xy, cov, ~doubted, places)
-        coarser = start.sigma >= 2 * COARSE_BLUR * steps.reduction_blur_px
-        blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
-        usual_px, spent = median_edge(start.xy, mesh.edges) if blurred else edge_px, 0.0
-        if sights and coarser and usual_px >= 2 * COARSE_EDGE_PX:
-            start, spent = self._coarse_step(view, start, sights.at(2 * view.scale))
-        fit = self._synthesis_solver.steps(view, start, steps, edge_px, usual_px, spent)
-        return self._accept_or_recover(view, fit, sides, places)
+        """The last round of profiles, or synthesis where the blur asks for it.
 
-    def _coarse_step(self, view: PyramidLevel, fit: Estimate, coarse: PyramidLevel) -> tuple[Estimate, float]:
-        """The fit after a first step in a coarser view, and what this cost: the markers start nearer then, for a
-        fraction of a step."""
-        stepped, spent = self._synthesis_solver.first_step(coarse, rescaled(fit, view, coarse))
-        return with_pattern_moved(self._mesh, rescaled(stepped, coarse, view)), spent
+        Args:
+            view: the image.
+            estimate, contrasts: after the first round of profiles.
+            places, edge_px: the places and a short edge, of the full image.
+            pyramid: allows a first step at twice the scale, where blur and usual gridlines allow that and only short
+                gridlines do not.
+        """
+        topology, schedule = self._topology, self._schedule
+        places, edge_px = places_in_view(view, places), edge_px / view.scale
+        if estimate.dot_gain != 0.0:
+            xy = markers_without_dot_gain(places.xy_px, topology.cells, estimate.dot_gain)
+            places = replace(places, xy_px=xy)
+        start = with_pattern_moved(topology, estimate)
+        if estimate.sigma < schedule.sharp_blur_share * edge_px and view.scale < schedule.reduced:
+            return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
+        coarser = start.sigma >= 2 * COARSE_BLUR * schedule.reduction_blur_px
+        blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
+        usual_px, spent = median_edge(start.xy, topology.edges) if blurred else edge_px, 0.0
+        if pyramid and coarser and usual_px >= 2 * COARSE_EDGE_PX:
+            start, spent = self._coarse_step(view, start, pyramid.at(2 * view.scale))
+        estimate = self._synthesis_solver.steps(view, start, schedule, edge_px, usual_px, spent)
+        return self._accept_or_recover(view, estimate, contrasts, places)
+
+    def _final_profiles(
+        self, view: PyramidLevel, start: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
+    ) -> RefinedMarkers:
+        """The markers after the last round of profiles; outliers are removed."""
+        topology, stations = self._topology, self._schedule.max_profile_rows[1]
+        lines = gridlines_of(topology, start)
+        estimate, profile_weight = profile_step(
+            view, topology, start, lines, contrasts, stations, judged=True
+        )
+        xy, cov = self._accepted_markers(estimate, places)
+        outliers, suspect = find_outliers(topology, estimate, xy, profile_weight, places.edge_px)
+        xy[outliers], cov[outliers] = np.nan, np.nan
+        update_obstructed_markers(xy, cov, suspect, start_places(places))
+        return self._refined_markers(view, estimate, xy, cov, ~suspect, places)
+
+    def _coarse_step(
+        self, view: PyramidLevel, estimate: Estimate, coarse: PyramidLevel
+    ) -> tuple[Estimate, float]:
+        """The estimate after a first step in a coarser view, and the effort.
+
+        The markers start nearer then, for a fraction of a step.
+        """
+        stepped, spent = self._synthesis_solver.first_step(coarse, rescaled(estimate, view, coarse))
+        return with_pattern_moved(self._topology, rescaled(stepped, coarse, view)), spent
 
     def _accept_or_recover(
-        self, view: PyramidLevel, fit: Estimate, sides: EdgeContrasts, places: InitialMarkers
+        self, view: PyramidLevel, estimate: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
     ) -> RefinedMarkers:
-        """What is sure; where the drawing does not explain the image, as in glare, what many profiles say."""
-        xy, cov = self._accepted_markers(fit, places)
-        strange = fit.noise > UNEXPLAINED_NOISE_RATIO * fit.pixel_noise
+        """The accepted markers; where the drawing does not explain the image, as in glare, those by many profiles."""
+        xy, cov = self._accepted_markers(estimate, places)
+        unexplained = estimate.noise > UNEXPLAINED_NOISE_RATIO * estimate.pixel_noise
         start = places.xy_px, places.edge_px
-        unsure, some = update_unaccepted_markers(xy, cov, fit.reliable, *start, strange, fit.dot_gain)
+        unaccepted, some = update_unaccepted_markers(
+            xy, cov, estimate.reliable, *start, unexplained, estimate.dot_gain
+        )
         if not some:
-            return self._refined_markers(view, fit, xy, cov, ~unsure, places)
-        there = with_pattern_moved(self._mesh, fit, unsure)
-        lost = update_lost_markers(xy, cov, unsure, there.xy, *start)
-        fill_recovered_markers(view, self._mesh, there, sides, places, lost, xy, cov)
-        return self._refined_markers(view, fit, xy, cov, ~lost, places)
+            return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
+        moved = with_pattern_moved(self._topology, estimate, unaccepted)
+        lost = update_lost_markers(xy, cov, unaccepted, moved.xy, *start)
+        fill_recovered_markers(view, self._topology, moved, contrasts, places, lost, xy, cov)
+        return self._refined_markers(view, estimate, xy, cov, ~lost, places)
 
     def _refined_markers(
         self,
         view: PyramidLevel,
-        fit: Estimate,
+        estimate: Estimate,
         xy: NDArray[np.float64],
         cov: NDArray[np.float64],
         explained: NDArray[np.bool_],
         places: InitialMarkers,
     ) -> RefinedMarkers:
-        """The markers at the image's full scale; what was lost though all triangles agree on it is where these say."""
-        mesh, scale, reading = self._mesh, view.scale, fit.reading
+        """The markers at the image's full scale. A lost marker on which all triangles agree lies where these put it."""
+        scale, reading = view.scale, estimate.reading
         assert reading is not None
         picture = self._synthesis_solver.buffers(view.image.shape).synthetic_image
         points = measure_virtual_markers(view.image, picture, reading, self._virtual, scale)
-        left = places.xy_px, places.edge_px, places.agreed
-        xy, cov, free = _at_full_scale(xy, cov, fit.bend_variance, mesh.spokes, *left, scale)
-        blur, noise = scale * fit.sigma, scale * fit.noise
-        seen = Appearance(scale, fit.sigma, fit.noise, fit.levels, fit.pixel_noise) if reading.drawn else None
-        return RefinedMarkers(xy, cov, explained, free, blur, noise, seen, points)
+        start, spokes = start_places(places), self._topology.spokes
+        xy, cov, bend_deviation = _at_full_scale(xy, cov, estimate.bend_variance, spokes, start, scale)
+        look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
+        appearance = Appearance(scale, *look) if reading.drawn else None
+        blur, noise = scale * estimate.sigma, scale * estimate.noise
+        return RefinedMarkers(xy, cov, explained, bend_deviation, blur, noise, appearance, points)
 
     def _accepted_markers(
-        self, fit: Estimate, places: InitialMarkers
+        self, estimate: Estimate, places: InitialMarkers
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Markers and covariances of a fit; NaN where it is far from the places or not sure."""
-        tables = self._mesh.edges, self._mesh.spokes
-        start = places.xy_px, places.edge_px, places.whole
-        xy, cov = accepted_markers(
-            fit.measured, *fit.information, fit.bend_variance, *tables, *start, self._every_marker
-        )
-        assert fit.reading is not None
-        add_dirt_variance(cov, fit.reading.weight, self._mesh.spokes, places.edge_px)
-        if fit.convergence_cov_px2 is not None:
-            cov += fit.convergence_cov_px2
+        """Markers and covariances of an estimate; NaN where not accepted."""
+        measured, spokes = (estimate.measured, estimate.information), self._topology.spokes
+        tables = self._topology.edges, spokes, start_places(places), self._every_marker
+        xy, cov = accepted_markers(*measured, estimate.bend_variance, *tables)
+        assert estimate.reading is not None
+        add_dirt_variance(cov, estimate.reading.weight, spokes, places.edge_px)
+        if estimate.convergence_cov_px2 is not None:
+            cov += estimate.convergence_cov_px2
         return xy, cov
 
 
-def rescaled(fit: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:
-    """A fit of one view in another one of another scale."""
+def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:
+    """An estimate of one view in another view of another scale."""
     ratio = old.scale / view.scale
     # a pixel's own variance is a twelfth of its area
-    blur2 = (old.scale * fit.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
-    there = 0.5 * ratio - 0.5  # of a pixel's middle
-    return fit._replace(
-        xy=ratio * fit.xy + there,
-        measured=ratio * fit.measured + there,
-        reliable=ratio * fit.reliable + there,
-        maps=ratio * fit.maps,
+    blur2 = (old.scale * estimate.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
+    shift = 0.5 * ratio - 0.5  # of a pixel's middle
+    blocks = estimate.information
+    return estimate._replace(
+        xy=ratio * estimate.xy + shift,
+        measured=ratio * estimate.measured + shift,
+        reliable=ratio * estimate.reliable + shift,
+        maps=ratio * estimate.maps,
         sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
-        dot_gain=ratio * fit.dot_gain,
-        noise=max(ratio * fit.noise, MIN_NOISE),
-        pixel_noise=max(ratio * fit.pixel_noise, MIN_NOISE),
-        levels=fit.levels._replace(slope=fit.levels.slope / ratio),
-        bend=ratio * fit.bend,
-        information=Information(fit.information.diagonal / ratio**2, fit.information.beside / ratio**2),
+        dot_gain=ratio * estimate.dot_gain,
+        noise=max(ratio * estimate.noise, MIN_NOISE),
+        pixel_noise=max(ratio * estimate.pixel_noise, MIN_NOISE),
+        levels=estimate.levels._replace(slope=estimate.levels.slope / ratio),
+        bend=ratio * estimate.bend,
+        information=Information(blocks.diagonal / ratio**2, blocks.off_diagonal / ratio**2),
     )
 
 
-def rescaled_contrasts(sides: EdgeContrasts, ratio: float) -> EdgeContrasts:
-    """What changes across the gridlines in a view in which these are so many times as long."""
-    room = sides.clearance.copy()
-    room[:, 0] *= ratio
-    return sides._replace(clearance=room)
+def rescaled_contrasts(contrasts: EdgeContrasts, ratio: float) -> EdgeContrasts:
+    """The contrasts in a view in which the gridlines are longer by the factor ``ratio``."""
+    clearance = contrasts.clearance.copy()
+    clearance[:, 0] *= ratio
+    return contrasts._replace(clearance=clearance)
 
 
 @compiled
-def _at_full_scale(xy, cov, loose, spokes, start, edge, agreed, scale):  # type: ignore[no-untyped-def]
-    """Markers and covariances in the full image, and (M,) px how freely gridlines bend at each; what was lost though
-    triangles ``agreed`` is where these put it."""
-    places, wide, free = np.empty_like(xy), scale**2 * cov, scale * np.sqrt(mean_at_markers(loose, spokes))
+def _at_full_scale(xy, cov, bend_variance, spokes, places, scale):  # type: ignore[no-untyped-def]
+    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image, and (M,) px, the deviation of the bending at
+    each; lost markers on which triangles agree lie where these put them."""
+    start, out, out_cov = places.xy_px, np.empty_like(xy), scale**2 * cov
+    bend_deviation = scale * np.sqrt(mean_at_markers(bend_variance, spokes))
     for m in range(xy.shape[0]):
-        left = np.isnan(xy[m, 0]) and agreed[m] and np.isfinite(start[m, 0])
+        from_places = np.isnan(xy[m, 0]) and places.agreed[m] and np.isfinite(start[m, 0])
         for axis in range(2):
-            places[m, axis] = ((start[m, axis] if left else xy[m, axis]) + 0.5) * scale - 0.5
-        if left:
-            wide[m, 0, 0] = wide[m, 1, 1] = scale**2 * (AGREED_DEVIATION * edge[m]) ** 2
-            wide[m, 0, 1] = wide[m, 1, 0] = 0.0
-    return places, wide, free
-
-
-def _at_reduced_scale(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
-    """Places of the full image in a reduced one."""
-    return InitialMarkers(
-        view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.whole
-    )
+            out[m, axis] = ((start[m, axis] if from_places else xy[m, axis]) + 0.5) * scale - 0.5
+        if from_places:
+            out_cov[m, 0, 0] = out_cov[m, 1, 1] = scale**2 * (AGREED_DEVIATION * places.edge_px[m]) ** 2
+            out_cov[m, 0, 1] = out_cov[m, 1, 0] = 0.0
+    return out, out_cov, bend_deviation

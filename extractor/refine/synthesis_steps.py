@@ -1,13 +1,13 @@
-"""A step by synthesis: the pattern is drawn, and read against the image; again only around markers that still move.
+"""Steps by synthesis: the pattern is drawn and compared with the image; again only around markers that still move.
 
-One step is nearly all that can be had. Where a marker stepped far, its gridlines were not where they were read, and
-what they said holds no longer: a step is taken around it, between all others, whose votes stay valid for where they
-were read.
+One step is nearly enough. Where a marker stepped far, its gridlines were not where they were read, and their sums hold
+no longer: a step is taken around it, between all other markers, whose sums stay valid.
 """
 
 from __future__ import annotations
 
 import threading
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,9 @@ from extractor.refine.measure.gridline_weights import (
 from extractor.refine.partial_step import partial_step
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
+    BendingPrior,
+    ShiftGradients,
+    StepSolution,
     solve_step,
     update_for_bending,
     with_pattern_moved,
@@ -37,256 +40,319 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.solve.convergence import (
     WIDE_BLUR_REMAINDER,
+    ConvergenceRule,
     bent_share,
     convergence_covariance,
     median_deviation,
     step_effort,
     unconverged_markers,
 )
+from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.blur_bleed import adapt_levels_to_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
 from extractor.refine.synthesis.ink_levels import LevelChange, level_change
 from extractor.refine.synthesis.residual_kernel import update_known_contrasts
 
-MIN_SIGMA_PX = 0.4  # blur and pixel; the bare pixel has 0.29
+MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 MAX_BLUR_CHANGE = 0.3  # of the blur, in one step
-BLUR_TOLERANCE = 0.03  # of the blur, by which it may be wrong in a drawing that is kept
-LEVEL_TOLERANCE = 0.006  # likewise, of the levels. Both may be wrong by more where markers are by that:
-BLUR_NOISE_FACTOR, LEVEL_NOISE_FACTOR = 0.75, 0.18  # of how far noise moves these, in units of the blur
-MAX_BLUR_TOLERANCE = 0.2  # of the blur, which no noise explains
-SMALL_BLUR = 0.12  # of a short edge; beyond that, blur, levels and places settle together;
-MIN_BEND = 0.02  # of an edge, and where gridlines are bent by more,
+BLUR_TOLERANCE = 0.03  # relative error of the blur of a drawing that is kept
+LEVEL_TOLERANCE = (
+    0.006  # likewise, of the levels. Both may be larger where the markers' deviation explains it:
+)
+BLUR_NOISE_FACTOR, LEVEL_NOISE_FACTOR = (
+    0.75,
+    0.18,
+)  # relative error per deviation of a marker in units of the blur
+MAX_BLUR_TOLERANCE = 0.2  # relative error of the blur that no deviation explains
+SMALL_BLUR = 0.12  # of a short edge; above that, blur, levels and places converge together;
+MIN_BEND = 0.02  # of an edge, and where gridlines bend by more,
 MAX_BENT_SHARE = 0.25  # of them, each step bends others. Then
 HARD_EFFORT = 1.5  # times the effort is allowed
-WIDE_BLUR = 0.1  # of a usual edge: where neighbours' errors look like bending
-# Wide blur and low levels look alike: what a step sees of a change of blur is less than that by as much as it exceeds
-# UNMIXED of an edge, times MIXED (rendered patterns), and at most by
+WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending
+# Wide blur and low levels look alike: a step measures less of a change of blur than there is, by the factor
+# 1 - BLUR_LEVEL_COUPLING * (blur / edge - UNCOUPLED_BLUR) (rendered patterns), at least 1 - MAX_COUPLING.
 BLUR_LEVEL_COUPLING, UNCOUPLED_BLUR, MAX_COUPLING = 7.2, 0.065, 0.8
-# Gridlines overlap where blur is wide: a step falls short by the square of blur over edge, times OVERLAP (rendered
-# patterns, shifted), and at most by
+# Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
+# (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = 2  # more steps there at least, after which no fewer markers move,
-WIDE_EFFORT = 0.6  # and of the effort allowed, so much in images of
+WIDE_PATIENCE = 2  # steps there at least, after which no fewer markers move,
+WIDE_EFFORT = 0.6  # and share of the effort that is allowed in images of
 USUAL_PIXELS = 640 * 480  # and more in larger ones, which take longer anyway
 MAX_STEPS = 10
-MAX_EXPLAINED_NOISE = (
-    2.0  # times the noise inside the cells: what a drawing leaves that explains all but dirt
-)
+MAX_EXPLAINED_NOISE = 2.0  # times the noise inside the cells, in a drawing that explains all but dirt
 MAX_BUFFERS = 2  # kept, for images of so many shapes: a frame, and its coarser view
-MAX_PARTIAL_SHARE = 0.7  # of the markers may be drawn anew; for more, everything is
-MAX_PARTIAL_SHARE_DIRTY = 0.45  # of them, once dirt has moved some: it is dirt that moves so many, too
+MAX_PARTIAL_SHARE = 0.7  # of the markers that are drawn again; above, everything is
+MAX_PARTIAL_SHARE_DIRTY = 0.45  # of them, once dirt has moved some: dirt moves so many, too
 NO_CLEARANCE = np.empty((0, 4))
 
 
-class SynthesisSolver:
-    """Takes steps by synthesis; the picture it draws is kept from image to image, one a thread."""
+class SynthesisReading(NamedTuple):
+    """The measurements along the gridlines of a drawing, and the solution.
 
-    def __init__(self, mesh: Topology) -> None:
-        self._mesh = mesh
+    Attributes:
+        weight: (E,) 0 to 1.
+        median_misfit: squared gray levels.
+        bend_variance: (E,) px^2.
+        foot: (E,), as in ``GridlineReading``.
+        dot_gain: px.
+        dot_gain_offset: (E,) px.
+        blur_change: px, by which the blur is larger than drawn.
+        noise: gray levels, one channel.
+        solution: the markers after the step.
+    """
+
+    weight: NDArray[np.float64]
+    median_misfit: float
+    bend_variance: NDArray[np.float64]
+    foot: NDArray[np.float64]
+    dot_gain: float
+    dot_gain_offset: NDArray[np.float64]
+    blur_change: float
+    noise: float
+    solution: StepSolution
+
+
+class SynthesisSolver:
+    """Takes steps by synthesis. The picture that it draws is kept from image to image, one for each thread.
+
+    Copies and pickles have no picture; they draw their own.
+    """
+
+    def __init__(self, topology: Topology) -> None:
+        self._topology = topology
+        self._kept = threading.local()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the pictures of the threads."""
+        return {name: value for name, value in self.__dict__.items() if name != "_kept"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
         self._kept = threading.local()
 
     def buffers(self, shape: tuple[int, ...]) -> DrawingBuffers:
-        """With the pattern over black as it was last drawn in an image of this shape."""
-        boards: dict[tuple[int, ...], DrawingBuffers] | None = getattr(self._kept, "boards", None)
-        if boards is None:
-            boards = self._kept.boards = {}
-        if shape not in boards:
-            while len(boards) >= MAX_BUFFERS:
-                del boards[next(iter(boards))]
-            boards[shape] = allocate_drawing_buffers(shape, self._mesh)
-        return boards[shape]
+        """The thread's buffers for images of a shape (H, W, 3), with the pattern as it was last drawn."""
+        kept: dict[tuple[int, ...], DrawingBuffers] | None = getattr(self._kept, "buffers", None)
+        if kept is None:
+            kept = self._kept.buffers = {}
+        if shape not in kept:
+            while len(kept) >= MAX_BUFFERS:
+                del kept[next(iter(kept))]
+            kept[shape] = allocate_drawing_buffers(shape, self._topology)
+        return kept[shape]
 
-    def first_step(self, view: PyramidLevel, fit: Estimate) -> tuple[Estimate, float]:
-        """The fit after a first step from everything, and its effort: far from the markers' places, gridlines that may
-        bend would follow what these still lack."""
-        fit, drawing = self._full_step(view, _without_bending(fit))
-        return _overlap_corrected(fit, drawing), step_effort(drawing.edge_px)
+    def first_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, float]:
+        """The estimate after a first step from everything, and the effort.
+
+        No gridline may bend: far from the markers' places, gridlines would take up the error of the markers.
+        """
+        estimate, drawing = self._full_step(view, _without_bending(estimate))
+        return _overlap_corrected(estimate, drawing), step_effort(drawing.edge_px)
 
     def steps(
         self,
         view: PyramidLevel,
-        fit: Estimate,
-        steps: Schedule,
+        estimate: Estimate,
+        schedule: Schedule,
         edge_px: float,
         usual_px: float,
         spent: float = 0.0,
     ) -> Estimate:
-        """The fit after as many steps as it takes, or as a preset allows.
+        """The estimate after steps until it converges, or as many as a preset allows.
 
         Args:
+            view: the image.
+            estimate: with its pattern where the last step left the markers.
+            schedule: of the preset.
             edge_px, usual_px: a short edge in the view, and a usual one, if these are much blurred.
             spent: the effort of a step that has already been taken.
         """
         begun = spent > 0.0
-        wide = fit.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
-        fit, drawing = self._full_step(view, self._with_bending(fit, wide))
-        size, least, tries, soiled = drawing.edge_px, len(fit.xy), 0, False
-        share = _wide_blur_effort_share(view) if wide else 1.0
-        patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
-        many = 1.0 if wide else steps.max_partial_share
-        resolved = np.inf if wide or steps.near == 0.0 else SMALL_BLUR
-        spent += step_effort(size)
+        wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
+        estimate, drawing = self._full_step(view, self._with_bending(estimate, wide_blur))
+        drawn_edge_px, least_moving, idle_steps, dirt_found = drawing.edge_px, len(estimate.xy), 0, False
+        effort_share = _wide_blur_effort_share(view) if wide_blur else 1.0
+        patience = max(schedule.patience, WIDE_PATIENCE) if wide_blur else schedule.patience
+        spent += step_effort(drawn_edge_px)
         for step in range(MAX_STEPS - 1):
-            there = _overlap_corrected(fit, drawing)
-            hard = not wide and _converges_slowly(fit, edge_px)
-            allowed = steps.max_synthesis_effort * (HARD_EFFORT if hard else share)
-            if (begun or step > 0) and spent + step_effort(size, 0.0) > allowed:
-                break  # whatever still moves
-            assert fit.reading is not None
-            moves = there.measured, drawing.xy, fit.normalized_steps
-            explained = fit.noise < MAX_EXPLAINED_NOISE * fit.pixel_noise
-            rule = (
-                steps.near,
-                drawing.sigma,
-                resolved,
-                steps.converged_deviations,
-                steps.max_moving_share,
-                many,
-                steps.max_partial_share_in_dirt,
-                explained,
+            corrected = _overlap_corrected(estimate, drawing)
+            slow = not wide_blur and _converges_slowly(estimate, edge_px)
+            allowed = schedule.max_synthesis_effort * (HARD_EFFORT if slow else effort_share)
+            if (begun or step > 0) and spent + step_effort(drawn_edge_px, 0.0) > allowed:
+                break
+            redrawn, moving, dirty = self._unconverged(corrected, drawing, schedule, wide_blur)
+            changed = _has_appearance_changed(estimate, drawing, schedule.converged_deviations) and (
+                wide_blur or not dirty
             )
-            tables = fit.reading.weight, self._mesh.spokes, self._mesh.edges
-            anew, moving, dirty = unconverged_markers(*moves, *rule, *tables)
-            other = _has_appearance_changed(fit, drawing, steps.converged_deviations) and (wide or not dirty)
-            count = np.count_nonzero(anew)
-            everything = bool(other or count > MAX_PARTIAL_SHARE * len(anew))
-            spent += step_effort(size, None if everything else count / len(anew))
-            tries = tries + 1 if moving >= least and not other else 0
-            soiled = soiled or dirty
-            by_dirt = dirty or (soiled and count > MAX_PARTIAL_SHARE_DIRTY * len(anew))
-            ended = tries == patience or (by_dirt and not everything and step >= steps.max_steps_in_dirt)
+            count = np.count_nonzero(redrawn)
+            everything = bool(changed or count > MAX_PARTIAL_SHARE * len(redrawn))
+            spent += step_effort(drawn_edge_px, None if everything else count / len(redrawn))
+            # what moves no fewer markers again and again is nothing that a drawing could explain
+            idle_steps = idle_steps + 1 if moving >= least_moving and not changed else 0
+            dirt_found = dirt_found or dirty
+            by_dirt = dirty or (dirt_found and count > MAX_PARTIAL_SHARE_DIRTY * len(redrawn))
+            ended = idle_steps == patience or (
+                by_dirt and not everything and step >= schedule.max_steps_in_dirt
+            )
             if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
                 break
-            least = min(least, len(fit.xy) if other else moving)
+            least_moving = min(least_moving, len(estimate.xy) if changed else moving)
             if everything:
-                fit, drawing = self._full_step(
-                    view, self._with_bending(with_pattern_moved(self._mesh, there), wide)
-                )
+                moved = with_pattern_moved(self._topology, corrected)
+                estimate, drawing = self._full_step(view, self._with_bending(moved, wide_blur))
             else:
-                fit = fit._replace(reliable=there.reliable)
-                fit, drawing = self._partial_step(view, fit, drawing, anew, wide)
+                estimate = estimate._replace(reliable=corrected.reliable)
+                estimate, drawing = self._partial_step(view, estimate, drawing, redrawn, wide_blur)
         else:
-            there = _overlap_corrected(fit, drawing)
-        slow = WIDE_BLUR_REMAINDER * (drawing.sigma / size) ** 2 if wide else 0.0
-        return there._replace(
-            convergence_cov_px2=convergence_covariance(there.measured - drawing.xy, drawing.sigma, slow)
+            corrected = _overlap_corrected(estimate, drawing)
+        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawn_edge_px) ** 2 if wide_blur else 0.0
+        cov = convergence_covariance(corrected.measured - drawing.xy, drawing.sigma, remaining)
+        return corrected._replace(convergence_cov_px2=cov)
+
+    def _unconverged(
+        self, estimate: Estimate, drawing: Synthesis, schedule: Schedule, wide_blur: bool
+    ) -> tuple[NDArray[np.bool_], int, bool]:
+        """``UnconvergedMarkers`` after a step."""
+        assert estimate.reading is not None
+        unlimited = wide_blur or schedule.near == 0.0
+        rule = ConvergenceRule(
+            converged_blur_share=schedule.near,
+            sigma=drawing.sigma,
+            max_blur_share=np.inf if unlimited else SMALL_BLUR,
+            converged_deviations=schedule.converged_deviations,
+            max_moving_share=schedule.max_moving_share,
+            max_partial_share=1.0 if wide_blur else schedule.max_partial_share,
+            max_partial_share_in_dirt=schedule.max_partial_share_in_dirt,
+            explained=estimate.noise < MAX_EXPLAINED_NOISE * estimate.pixel_noise,
         )
+        moves = estimate.measured, drawing.xy, estimate.normalized_steps
+        tables = estimate.reading.weight, self._topology.spokes, self._topology.edges
+        unconverged: tuple[NDArray[np.bool_], int, bool] = unconverged_markers(*moves, rule, *tables)
+        return unconverged
 
-    def _with_bending(self, fit: Estimate, wide: bool) -> Estimate:
-        """The fit with how freely its gridlines may bend: not at all where the blur is ``wide``. There they would
-        follow what the markers beside them still lack, and these would hardly move."""
-        return _without_bending(fit) if wide else with_roughness(self._mesh, fit)
+    def _with_bending(self, estimate: Estimate, wide_blur: bool) -> Estimate:
+        """The estimate with the roughness that lets its gridlines bend; with none where the blur is wide.
 
-    def _full_step(self, view: PyramidLevel, fit: Estimate) -> tuple[Estimate, Synthesis]:
+        There the gridlines would take up the error of the markers beside them, which would hardly move.
+        """
+        return _without_bending(estimate) if wide_blur else with_roughness(self._topology, estimate)
+
+    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from everything."""
-        drawing = draw_pattern(view, self._mesh, fit, self.buffers(view.image.shape))
-        return self._update_estimate(view.frame, fit, drawing), drawing
+        drawing = draw_pattern(view, self._topology, estimate, self.buffers(view.image.shape))
+        return self._update_estimate(view.frame, estimate, drawing), drawing
 
     def _partial_step(
-        self, view: PyramidLevel, fit: Estimate, drawing: Synthesis, anew: NDArray[np.bool_], wide: bool
+        self,
+        view: PyramidLevel,
+        estimate: Estimate,
+        drawing: Synthesis,
+        redrawn: NDArray[np.bool_],
+        wide_blur: bool,
     ) -> tuple[Estimate, Synthesis]:
-        """A step around the markers that are ``anew`` (M,) bool, from what else was read."""
-        return partial_step(view, self._mesh, fit, drawing, anew, self.buffers(view.image.shape), wide)
+        """A step around the markers to draw again (M,) bool, with the sums of all others as they were."""
+        buffers = self.buffers(view.image.shape)
+        return partial_step(view, self._topology, estimate, drawing, redrawn, buffers, wide_blur)
 
-    def _update_estimate(self, frame: PolynomialFrame, fit: Estimate, drawing: Synthesis) -> Estimate:
-        """The fit after the step that what was read asks for."""
-        mesh, levels, bettered = self._mesh, drawing.levels, drawing.corrected_levels
-        assert fit.reading is not None
-        changes = LevelChange(bettered.cell - levels.cell, bettered.black - levels.black)
-        now = fit.xy, fit.beyond, fit.roughness, drawing.bend, fit.reading.weight, fit.noise
-        seen = drawing.lines, drawing.contrasts, drawing.black, drawing.sums, drawing.sigma
-        tables = mesh.edges, mesh.spokes, mesh.cells, mesh.edge_cells
-        inks = bettered.cell, bettered.slope
-        read, wider, noise, *step = _update_and_solve(seen, changes, inks, now, tables, frame)
-        use, usual, loose, foot, swelling, aside = read
-        how = NO_CLEARANCE, use, aside, drawing.sigma, noise, True
-        reading = GridlineReading(drawing.lines, drawing.contrasts, foot, *how)
-        sigma = _blur_after_step(drawing.sigma, drawing.edge_px, wider)
+    def _update_estimate(self, frame: PolynomialFrame, estimate: Estimate, drawing: Synthesis) -> Estimate:
+        """The estimate after the step that the sums of the drawing ask for."""
+        topology, levels = self._topology, drawing.corrected_levels
+        read = _update_and_solve(drawing, estimate.pattern_state(), topology, frame)
+        how = NO_CLEARANCE, read.weight, read.dot_gain_offset, drawing.sigma, read.noise, True
+        reading = GridlineReading(drawing.lines, drawing.contrasts, read.foot, *how)
+        sigma = _blur_after_step(drawing.sigma, drawing.edge_px, read.blur_change)
         if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
-            bettered = adapt_levels_to_blur(bettered, fit.xy, mesh, drawing.sigma, sigma)
-        about = {
-            "bend_variance": loose,
-            "reading": reading,
-            "noise": noise,
-            "sigma": sigma,
-            "levels": bettered,
-        }
-        return with_solution(fit, step, median_misfit=usual, dot_gain=swelling, **about)
+            levels = adapt_levels_to_blur(levels, estimate.xy, topology, drawing.sigma, sigma)
+        return with_solution(
+            estimate,
+            read.solution,
+            bend_variance=read.bend_variance,
+            reading=reading,
+            noise=read.noise,
+            sigma=sigma,
+            levels=levels,
+            median_misfit=read.median_misfit,
+            dot_gain=read.dot_gain,
+        )
 
 
 @compiled
-def _update_and_solve(seen, changes, inks, now, tables, frame):  # type: ignore[no-untyped-def]
-    """Use, usual misfit, looseness and foot of what was ``seen``, by how much cells are swollen, and gridlines aside
-    for it; by how much it says that the blur is larger; its noise; and the solution.
-
-    Args:
-        seen: lines, contrasts, black, sums and blur of a drawing.
-        changes: of the cells' levels (K, 3) and of the black's polynomial (3, 10) since.
-        inks: the levels now, and their slopes.
-    """
-    lines, contrasts, black, read, sigma = seen
-    xy, beyond, rough, bend, before, noise = now
-    edges, spokes, cells, edge_cells = tables
-    values, least, unjudged = PIXEL_MISFIT_RULE
-    sums = read.copy()
-    gradients = shift_gradients(sums, contrasts, edge_cells, changes, chord_midpoints(lines), frame)
-    swelling = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
-    aside = update_without_dot_gain(sums, gradients, contrasts, edge_cells, swelling)
-    said = bend, rough, before, lines, edges, noise
-    loose, kept = update_for_bending(sums, gradients, *said, values, least, unjudged)
-    use, usual, found = weigh_gridlines(
-        sums, gradients, bending_misfit(loose, contrasts, sigma), values, least, unjudged
+def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyped-def]
+    """``SynthesisReading`` of a drawing; gridlines beside unknown cells are marked as not known in its ``lines``."""
+    lines, contrasts, sums, sigma = drawing.lines, drawing.contrasts, drawing.sums.copy(), drawing.sigma
+    edges, spokes, cells, edge_cells = (
+        topology.edges,
+        topology.spokes,
+        topology.cells,
+        topology.edge_cells,
     )
-    noise = found if np.isfinite(found) else noise
-    where = xy, beyond, edges, spokes, sigma, noise, True
-    step = solve_step(sums, gradients, bend, kept, use, lines, contrasts, *where)
-    current = update_known_contrasts(lines, xy, cells, edge_cells, inks[0], inks[1])
-    wider = blur_change(sums, aside, use, contrasts, current, sigma)
-    foot = foot_levels(contrasts, black, gradients.level_shift)
-    return ((use, usual, loose, foot, swelling, aside), wider, noise) + step
+    levels, corrected, rule = drawing.levels, drawing.corrected_levels, PIXEL_MISFIT_RULE
+    cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
+    middle = chord_midpoints(lines)
+    to_a, to_b, off = shift_gradients(
+        sums, contrasts, edge_cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
+    )
+    dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
+    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
+    gradients = ShiftGradients(to_a, to_b, off)
+    prior = BendingPrior(drawing.bend, state.roughness, state.weight)
+    bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, state.noise, rule)
+    pardon = bending_misfit(bend_variance, contrasts, sigma)
+    weight, median_misfit, found = weigh_gridlines(
+        sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
+    )
+    noise = found if np.isfinite(found) else state.noise
+    system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
+    solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
+    current = update_known_contrasts(lines, state.xy, cells, edge_cells, corrected.cell, corrected.slope)
+    wider = blur_change(sums, dot_gain_offset, weight, contrasts, current, sigma)
+    foot = foot_levels(contrasts, drawing.black, off)
+    return SynthesisReading(
+        weight, median_misfit, bend_variance, foot, dot_gain, dot_gain_offset, wider, noise, solution
+    )
 
 
-def _without_bending(fit: Estimate) -> Estimate:
-    """The fit with gridlines that may not bend."""
-    return fit._replace(roughness=np.zeros_like(fit.roughness), bend=np.zeros_like(fit.bend))
+def _without_bending(estimate: Estimate) -> Estimate:
+    """The estimate with gridlines that may not bend."""
+    roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
+    return estimate._replace(roughness=roughness, bend=bend)
 
 
-def _blur_after_step(sigma: float, edge_px: float, wider: float) -> float:
-    """The blur, px, where gridlines say that it is so much ``wider`` than was drawn."""
-    wider /= 1.0 - min(max(BLUR_LEVEL_COUPLING * (sigma / edge_px - UNCOUPLED_BLUR), 0.0), MAX_COUPLING)
-    return max(sigma + min(max(wider, -MAX_BLUR_CHANGE * sigma), MAX_BLUR_CHANGE * sigma), MIN_SIGMA_PX)
+def _blur_after_step(sigma: float, edge_px: float, change: float) -> float:
+    """The blur, px, where gridlines show a ``change``, px, of the drawn blur ``sigma``, px."""
+    change /= 1.0 - min(max(BLUR_LEVEL_COUPLING * (sigma / edge_px - UNCOUPLED_BLUR), 0.0), MAX_COUPLING)
+    return max(sigma + min(max(change, -MAX_BLUR_CHANGE * sigma), MAX_BLUR_CHANGE * sigma), MIN_SIGMA_PX)
 
 
-def _overlap_corrected(fit: Estimate, drawing: Synthesis) -> Estimate:
-    """The fit after a step that goes as far as it would have gone, did gridlines not overlap."""
-    hidden = min(OVERLAP_FACTOR * (drawing.sigma / drawing.edge_px) ** 2, MAX_OVERLAP)
-    more = hidden / (1.0 - hidden) * (fit.measured - drawing.xy)
-    measured = fit.measured + more
-    return fit._replace(measured=measured, reliable=np.where(np.isnan(fit.reliable), np.nan, measured))
+def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:
+    """The estimate after a step that is as long as it would be if gridlines did not overlap."""
+    missing = min(OVERLAP_FACTOR * (drawing.sigma / drawing.edge_px) ** 2, MAX_OVERLAP)
+    measured = estimate.measured + missing / (1.0 - missing) * (estimate.measured - drawing.xy)
+    reliable = np.where(np.isnan(estimate.reliable), np.nan, measured)
+    return estimate._replace(measured=measured, reliable=reliable)
 
 
 def _wide_blur_effort_share(view: PyramidLevel) -> float:
-    """Of the effort that a preset allows."""
+    """The share of the preset's effort that is allowed where blur is wide."""
     pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
     return float(min(WIDE_EFFORT * max(pixels / USUAL_PIXELS, 1.0), 1.0))
 
 
-def _converges_slowly(fit: Estimate, edge_px: float) -> bool:
+def _converges_slowly(estimate: Estimate, edge_px: float) -> bool:
     """Whether some gridlines are much blurred for their length, or many are bent; ``edge_px`` is a short edge."""
-    return fit.sigma > SMALL_BLUR * edge_px or bool(bent_share(fit.bend, MIN_BEND * edge_px) > MAX_BENT_SHARE)
+    if estimate.sigma > SMALL_BLUR * edge_px:
+        return True
+    return bool(bent_share(estimate.bend, MIN_BEND * edge_px) > MAX_BENT_SHARE)
 
 
-def _has_appearance_changed(fit: Estimate, drawing: Synthesis, enough: float) -> bool:
-    """Whether the blur or the levels were found to be others than those drawn, by more than what noise of
-    ``converged_deviations``
-    standard deviations of a marker makes of them."""
-    blur = abs(fit.sigma - drawing.sigma) / drawing.sigma
-    levels = level_change(drawing.levels.cell, fit.levels.cell)
+def _has_appearance_changed(estimate: Estimate, drawing: Synthesis, converged_deviations: float) -> bool:
+    """Whether blur or levels of the estimate differ from those drawn, by more than the noise that
+    ``converged_deviations`` standard deviations of a marker make."""
+    blur = abs(estimate.sigma - drawing.sigma) / drawing.sigma
+    levels = level_change(drawing.levels.cell, estimate.levels.cell)
     if blur < BLUR_TOLERANCE and levels < LEVEL_TOLERANCE:
         return False
-    noise = enough * median_deviation(fit.information.diagonal) / drawing.sigma
-    same = (
-        min(max(BLUR_TOLERANCE, BLUR_NOISE_FACTOR * noise), MAX_BLUR_TOLERANCE),
-        max(LEVEL_TOLERANCE, LEVEL_NOISE_FACTOR * noise),
-    )
-    return bool(blur > same[0] or levels > same[1])
+    noise = converged_deviations * median_deviation(estimate.information.diagonal) / drawing.sigma
+    max_blur = min(max(BLUR_TOLERANCE, BLUR_NOISE_FACTOR * noise), MAX_BLUR_TOLERANCE)
+    max_levels = max(LEVEL_TOLERANCE, LEVEL_NOISE_FACTOR * noise)
+    return bool(blur > max_blur or levels > max_levels)

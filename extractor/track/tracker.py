@@ -225,7 +225,7 @@ class Tracker:
         last = self._state
         before = last.xy_px if last is not None and not last.gap else None
         known = markers.status == Status.MEASURED
-        seen = markers.stages["refine"].seen
+        seen = markers.stages["refine"].appearance
         self._state = _TrackState(
             markers.xy_px, known, before, look, seen, bool(markers.mirrored), expected, age
         )

@@ -1,22 +1,67 @@
-"""A marker and its ring of neighbours: the neighbours eliminated one after the other, for many markers at once.
+"""Elimination of a marker's neighbours, one after the other, for many markers at once.
 
-Once around the marker, a neighbour is joined to the next one and to the marker, the first also to the last: while they
-are eliminated in turn, nobody else is ever joined to the one whose turn it is.
+Going round the marker, a neighbour is joined to the next one and to the marker; the first one also to the last. So the
+neighbour that is eliminated next is never joined to any other.
 
-``LANES`` markers stand side by side. In ``rows`` every neighbour but the last has ``NEIGHBOUR_ROWS`` rows of them:
-its own
-block as xx, xy, yy, then the blocks (2, 2) that join it to the next one, to the last one and to the middle. ``tail``
-has the last one's own, to the middle, and the middle's own.
+``LANES`` markers stand side by side. In ``rows`` every neighbour but the last has ``NEIGHBOUR_ROWS`` rows: its own
+block as xx, xy, yy, then the blocks (2, 2) that join it to the next neighbour, to the last one and to the middle.
+``tail`` has the last neighbour's own block, its block to the middle, and the middle's own block.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled, inlined, vectorized
 
 LANES, NEIGHBOUR_ROWS, TAIL_ROWS = 32, 15, 10
-MIDDLE = 7  # its first row in the tail
+MIDDLE = 7  # first row of the middle in the tail
+
+
+class EliminationBlocks(NamedTuple):
+    """The information matrix, prepared for the elimination of the markers around each marker.
+
+    Attributes:
+        off_diagonal: (E, 4) 1/px^2, as in ``Information``.
+        losses: (E, 2, 3) 1/px^2, what the block at each end of an edge loses as xx, xy, yy when the marker at the other
+            end is eliminated.
+        remainders: (M, 3) 1/px^2, the markers' blocks less the losses by all of their neighbours.
+        edges: (E, 2), spokes: (M, 6) as in ``Topology``.
+        neighbours: (M, 6) the marker at the other end of each spoke, -1 where that edge has no information.
+    """
+
+    off_diagonal: NDArray[np.float64]
+    losses: NDArray[np.float64]
+    remainders: NDArray[np.float64]
+    edges: NDArray[np.int32]
+    spokes: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+
+
+class RingBuffers(NamedTuple):
+    """Memory for the elimination of the rings around ``LANES`` markers.
+
+    Attributes:
+        markers, edges, blocks: (6,), (6,) and (6, 3) the neighbours of one marker, the edges to them, and their blocks.
+        rows, tail: the blocks of all lanes, as the module describes them.
+    """
+
+    markers: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    blocks: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    tail: NDArray[np.float64]
+
+
+@compiled
+def allocate_ring_buffers():  # type: ignore[no-untyped-def]
+    """``RingBuffers`` without content."""
+    # rows beyond those of five neighbours are written when the fifth is eliminated, and not read
+    rows, tail = np.empty(6 * NEIGHBOUR_ROWS * LANES), np.empty(TAIL_ROWS * LANES)
+    return RingBuffers(np.empty(6, np.int64), np.empty(6, np.int64), np.empty((6, 3)), rows, tail)
 
 
 @vectorized
@@ -24,7 +69,7 @@ def _update_without_first(rows, tail):  # type: ignore[no-untyped-def]
     """Eliminate the first neighbours from those after them, from the last ones and from the middles.
 
     A direction without positive information is left out. All rows lie at constant distances, so that the compiler
-    sees that lanes do not meet.
+    sees that lanes do not overlap.
     """
     for k in range(LANES):
         xx, xy, yy = rows[k], rows[k + LANES], rows[k + 2 * LANES]
@@ -85,12 +130,12 @@ def _update_without_last(tail):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def eliminated_blocks(diagonal, beside, edges):  # type: ignore[no-untyped-def]
-    """(E, 2, 3): what the block at each end of an edge loses as xx, xy, yy when the marker at the other is eliminated;
-    and (M, 3) the blocks without what all their neighbours take."""
-    lost, left = np.empty((edges.shape[0], 2, 3)), diagonal.copy()
+def prepare_elimination(diagonal, off_diagonal, edges, spokes):  # type: ignore[no-untyped-def]
+    """``EliminationBlocks`` of an information matrix; all markers of ``edges`` must have a positive definite block."""
+    losses, remainders = np.empty((edges.shape[0], 2, 3)), diagonal.copy()
     for e in range(edges.shape[0]):
-        b0, b1, b2, b3 = beside[e, 0], beside[e, 1], beside[e, 2], beside[e, 3]
+        b0, b1 = off_diagonal[e, 0], off_diagonal[e, 1]
+        b2, b3 = off_diagonal[e, 2], off_diagonal[e, 3]
         for side in range(2):
             n, p = edges[e, side], edges[e, 1 - side]
             px, pxy, py = diagonal[p, 0], diagonal[p, 1], diagonal[p, 2]
@@ -98,77 +143,90 @@ def eliminated_blocks(diagonal, beside, edges):  # type: ignore[no-untyped-def]
             xx = (py * b0 * b0 - 2 * pxy * b0 * b1 + px * b1 * b1) * inverse
             xy = (py * b0 * b2 - pxy * (b0 * b3 + b1 * b2) + px * b1 * b3) * inverse
             yy = (py * b2 * b2 - 2 * pxy * b2 * b3 + px * b3 * b3) * inverse
-            lost[e, side, 0], lost[e, side, 1], lost[e, side, 2] = xx, xy, yy
-            left[n, 0] -= xx
-            left[n, 1] -= xy
-            left[n, 2] -= yy
+            losses[e, side, 0], losses[e, side, 1], losses[e, side, 2] = xx, xy, yy
+            remainders[n, 0] -= xx
+            remainders[n, 1] -= xy
+            remainders[n, 2] -= yy
             b1, b2 = b2, b1
-    return lost, left
+    neighbours = _neighbour_markers(off_diagonal, edges, spokes)
+    return EliminationBlocks(off_diagonal, losses, remainders, edges, spokes, neighbours)
 
 
 @compiled
-def neighbour_markers(beside, edges, spokes):  # type: ignore[no-untyped-def]
-    """(M, 6): the marker at the other end of each edge, -1 where the edge tells nothing."""
+def _neighbour_markers(off_diagonal, edges, spokes):  # type: ignore[no-untyped-def]
+    """(M, 6): the marker at the other end of each edge, -1 where the edge has no information."""
     out = np.full(spokes.shape, -1, np.int32)
     for m in range(spokes.shape[0]):
         for k in range(spokes.shape[1]):
             e = spokes[m, k]
-            if e >= 0 and (beside[e, 0] != 0.0 or beside[e, 3] != 0.0):
+            if e >= 0 and (off_diagonal[e, 0] != 0.0 or off_diagonal[e, 3] != 0.0):
                 out[m, k] = edges[e, 0] + edges[e, 1] - m
     return out
 
 
 @compiled
-def _fill_block(rows, at, e, forward, beside):  # type: ignore[no-untyped-def]
-    """Write edge e's block into four rows, seen from its first marker if ``forward``."""
-    rows[at], rows[at + 3 * LANES] = beside[e, 0], beside[e, 3]
-    rows[at + LANES], rows[at + 2 * LANES] = beside[e, 1 if forward else 2], beside[e, 2 if forward else 1]
+def _fill_block(rows, at, e, forward, off_diagonal):  # type: ignore[no-untyped-def]
+    """Write edge e's block into four rows, from its first to its second marker if ``forward``."""
+    rows[at], rows[at + 3 * LANES] = off_diagonal[e, 0], off_diagonal[e, 3]
+    rows[at + LANES] = off_diagonal[e, 1 if forward else 2]
+    rows[at + 2 * LANES] = off_diagonal[e, 2 if forward else 1]
 
 
 @inlined
-def fill_ring(m, k, lost, left, beside, edges, spokes, others, ring, spoke, own, rows, tail):  # type: ignore[no-untyped-def]
-    """Write the neighbours of marker m, and what joins them to each other and to it, into lane k."""
+def fill_ring(m, lane, matrix, ring):  # type: ignore[no-untyped-def]
+    """Write the neighbours of marker m, and the blocks that join them to each other and to the marker, into a lane.
+
+    Args:
+        m: the marker.
+        lane: 0 to ``LANES`` - 1.
+        matrix: ``EliminationBlocks``.
+        ring: ``RingBuffers``, written; the lane must hold zeros.
+    """
+    off_diagonal, losses, remainders = matrix.off_diagonal, matrix.losses, matrix.remainders
+    edges, spokes, neighbours = matrix.edges, matrix.spokes, matrix.neighbours
+    markers, ring_edges, blocks, rows, tail = ring.markers, ring.edges, ring.blocks, ring.rows, ring.tail
     count = 0
     for i in range(spokes.shape[1]):
-        n, e = others[m, i], spokes[m, i]
+        n, e = neighbours[m, i], spokes[m, i]
         if n >= 0:
             side = 1 if edges[e, 0] == m else 0
-            ring[count], spoke[count] = n, e
+            markers[count], ring_edges[count] = n, e
             for c in range(3):
-                own[count, c] = left[n, c] + lost[e, side, c]
+                blocks[count, c] = remainders[n, c] + losses[e, side, c]
             count += 1
     last = count - 1
     for i in range(count if count > 2 else last):
         j = i + 1 if i < last else 0
         e = -1
         for c in range(spokes.shape[1]):
-            if others[ring[i], c] == ring[j]:
-                e = spokes[ring[i], c]
+            if neighbours[markers[i], c] == markers[j]:
+                e = spokes[markers[i], c]
         if e < 0:
             continue
-        side = 0 if edges[e, 0] == ring[i] else 1
+        side = 0 if edges[e, 0] == markers[i] else 1
         for c in range(3):
-            own[i, c] += lost[e, side, c]
-            own[j, c] += lost[e, 1 - side, c]
+            blocks[i, c] += losses[e, side, c]
+            blocks[j, c] += losses[e, 1 - side, c]
         if j == 0:
-            _fill_block(rows, 7 * LANES + k, e, side == 1, beside)
+            _fill_block(rows, 7 * LANES + lane, e, side == 1, off_diagonal)
         else:
-            _fill_block(
-                rows, (NEIGHBOUR_ROWS * i + (7 if j == last else 3)) * LANES + k, e, side == 0, beside
-            )
+            first_row = NEIGHBOUR_ROWS * i + (7 if j == last else 3)
+            _fill_block(rows, first_row * LANES + lane, e, side == 0, off_diagonal)
     for i in range(last):
         for c in range(3):
-            rows[(NEIGHBOUR_ROWS * i + c) * LANES + k] = own[i, c]
-        _fill_block(rows, (NEIGHBOUR_ROWS * i + 11) * LANES + k, spoke[i], edges[spoke[i], 1] == m, beside)
+            rows[(NEIGHBOUR_ROWS * i + c) * LANES + lane] = blocks[i, c]
+        e = ring_edges[i]
+        _fill_block(rows, (NEIGHBOUR_ROWS * i + 11) * LANES + lane, e, edges[e, 1] == m, off_diagonal)
     if count > 0:
         for c in range(3):
-            tail[c * LANES + k] = own[last, c]
-        _fill_block(tail, 3 * LANES + k, spoke[last], edges[spoke[last], 1] == m, beside)
+            tail[c * LANES + lane] = blocks[last, c]
+        e = ring_edges[last]
+        _fill_block(tail, 3 * LANES + lane, e, edges[e, 1] == m, off_diagonal)
 
 
 @compiled
 def update_without_ring(rows, tail):  # type: ignore[no-untyped-def]
-    """What is left of the middles' own blocks, in place."""
+    """Eliminate all neighbours of all lanes; the middles' own blocks remain in ``tail``."""
     for i in range(5):
         _update_without_first(rows[NEIGHBOUR_ROWS * i * LANES :], tail)
     _update_without_last(tail)

@@ -1,28 +1,52 @@
-"""What the gridlines that meet at a marker share: the pixels near it.
+"""The pixels near a marker, which the gridlines that meet there share.
 
-With two gridlines at the angle q the derivatives overlap by the integrals of t^i u^j exp(-|t a - u b|^2 / 4 s^2) /
-4 pi s^2 over the two rays, which have closed forms.
+The derivatives by two gridlines with the directions a and b overlap by the integrals of
+t^i u^j exp(-|t a - u b|^2 / 4 s^2) / 4 pi s^2 over the two rays, which have closed forms.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from extractor.numeric.compilation import compiled, vectorized
-from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY
+from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY
 from extractor.refine.synthesis.residual_kernel import AA, BB
 
-MIN_ANGLE = 0.4  # rad; the closed forms are for long gridlines, and two at a smaller angle are not
-MIN_END_INFORMATION = 0.75  # of a gridline's information is left at least where its ends are blurred
-# The gridlines at one marker side by side, zero where there are fewer: direction away from it, color, weight, 1 /
-# length; sums over the others of their normals times the overlap: near with near end, theirs near with its far end.
+MIN_ANGLE = 0.4  # rad; the closed forms hold for long gridlines, which two at a smaller angle are not
+MIN_END_INFORMATION = 0.75  # least share of a gridline's information that is left where its ends are blurred
+# Rows of the gridlines at one marker, zero where there are fewer: direction away from the marker, color, weight,
+# 1 / length; sums over the other gridlines of their normals times the overlap: near end with near end, their near end
+# with its far end.
 AX, AY, C0, C1, C2, WEIGHT, INVERSE_LENGTH, NEAR_X, NEAR_Y, FAR_X, FAR_Y = range(0, 88, 8)
 
 
+class GridlineEnd(NamedTuple):
+    """A gridline at one marker.
+
+    Attributes:
+        x, y: its direction away from the marker.
+        red, green, blue: its contrast, gray levels.
+        weight: 0 to 1.
+        inverse_length: 1/px.
+    """
+
+    x: float
+    y: float
+    red: float
+    green: float
+    blue: float
+    weight: float
+    inverse_length: float
+
+
 def _closed_forms() -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """r a and r^3 b as polynomials in r = sqrt(1 - cosine), good to 1e-7, with s the sine and p the angle between one
-    gridline and the other's continuation: a = p / s and b = (s + p cosine) / s^3 are the integrals for i + j = 0 and
-    i = j = 1."""
+    """Coefficients of r a and r^3 b as polynomials in r = sqrt(1 - cosine), accurate to 1e-7.
+
+    With s the sine and p the angle between one gridline and the continuation of the other, a = p / s is the integral
+    for i = j = 0 and b = (s + p cosine) / s^3 that for i = j = 1.
+    """
     r = np.linspace(np.sqrt(1 - np.cos(MIN_ANGLE)), np.sqrt(2 - 1e-3), 400)
     cosine = 1 - r * r
     s, p = np.sqrt(1 - cosine * cosine), np.pi - np.arccos(cosine)
@@ -39,8 +63,17 @@ MAX_COSINE = float(np.cos(MIN_ANGLE))
 
 @vectorized
 def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
-    """How much two gridlines from one marker overlap there, given 1 / length of both: near with near end, near with
-    far end of the second, near with far end of the first."""
+    """The overlap of the derivatives by two gridlines that leave one marker.
+
+    Args:
+        cosine: of the angle between them.
+        first, second: 1/px, 1 / length of each.
+        sigma: the blur, px.
+
+    Returns:
+        The overlap of near end with near end, of near end with the far end of the second, and of near end with the far
+        end of the first.
+    """
     rest = 1.0 - min(max(cosine, -1.0), MAX_COSINE)
     per = 1.0 / np.sqrt(rest)
     r = rest * per
@@ -53,12 +86,14 @@ def overlap(cosine, first, second, sigma):  # type: ignore[no-untyped-def]
 
 
 @vectorized
-def _accumulate_overlaps(rows, i, ax, ay, c0, c1, c2, weight, short, nx, ny, sigma):  # type: ignore[no-untyped-def]
-    """Add what gridline i (its normal n) shares with all at its marker to their sums."""
+def _accumulate_overlaps(rows, i, gridline, nx, ny, sigma):  # type: ignore[no-untyped-def]
+    """Add the overlaps of gridline i (``GridlineEnd``, normal n) with all gridlines at its marker to their sums."""
+    weight, inverse_length = gridline.weight, gridline.inverse_length
     for k in range(8):
-        color = c0 * rows[C0 + k] + c1 * rows[C1 + k] + c2 * rows[C2 + k]
+        color = gridline.red * rows[C0 + k] + gridline.green * rows[C1 + k] + gridline.blue * rows[C2 + k]
         dot = 0.0 if k == i else color * min(weight, rows[WEIGHT + k])
-        near, far, _ = overlap(ax * rows[AX + k] + ay * rows[AY + k], short, rows[INVERSE_LENGTH + k], sigma)
+        cosine = gridline.x * rows[AX + k] + gridline.y * rows[AY + k]
+        near, far, _ = overlap(cosine, inverse_length, rows[INVERSE_LENGTH + k], sigma)
         near, far = dot * near, dot * far
         rows[NEAR_X + k] += near * nx
         rows[NEAR_Y + k] += near * ny
@@ -67,64 +102,73 @@ def _accumulate_overlaps(rows, i, ax, ay, c0, c1, c2, weight, short, nx, ny, sig
 
 
 @compiled
-def _fill_gridlines_at_marker(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen):  # type: ignore[no-untyped-def]
-    """Lay the gridlines at marker m side by side, their numbers into ``seen``; how many."""
-    count = 0
+def _fill_gridlines_at_marker(m, system, rows, numbers):  # type: ignore[no-untyped-def]
+    """Write the gridlines at marker m into ``rows`` and their numbers into ``numbers`` (8,); return their count."""
+    sums, lines, contrasts, edges, spokes = (
+        system.sums,
+        system.lines,
+        system.contrasts,
+        system.edges,
+        system.spokes,
+    )
+    sigma, count = system.sigma, 0
     for k in range(spokes.shape[1]):
         e = spokes[m, k]
-        if e < 0 or weight[e] == 0.0:
+        if e < 0 or system.weight[e] * lines[e, KNOWN] == 0.0:
             continue
         # the direction in which the curved gridline leaves the marker
-        out = 1.0 if edges[e, 0] == m else -1.0
-        slope = lines[e, LEAVE] if out > 0.0 else lines[e, ARRIVE]
-        size = out / np.sqrt(1.0 + slope * slope)
+        sense = 1.0 if edges[e, 0] == m else -1.0
+        slope = lines[e, LEAVE] if sense > 0.0 else lines[e, ARRIVE]
+        size = sense / np.sqrt(1.0 + slope * slope)
         rows[AX + count] = size * (lines[e, UX] - slope * lines[e, UY])
         rows[AY + count] = size * (lines[e, UY] + slope * lines[e, UX])
-        # a gridline that the image's border cuts shares the less the less of it was read
+        # the smaller the measured part of a gridline that the image's border cuts, the less it shares
         c0, c1, c2 = contrasts[e, 0], contrasts[e, 1], contrasts[e, 2]
-        whole = (c0 * c0 + c1 * c1 + c2 * c2) * lines[e, LENGTH] / (6.0 * np.sqrt(np.pi) * sigma)
-        part = min((sums[e, AA] if out > 0.0 else sums[e, BB]) / max(MIN_END_INFORMATION * whole, 1e-12), 1.0)
+        uncut = (c0 * c0 + c1 * c1 + c2 * c2) * lines[e, LENGTH] / (6.0 * np.sqrt(np.pi) * sigma)
+        end_sum = sums[e, AA] if sense > 0.0 else sums[e, BB]
+        part = min(end_sum / max(MIN_END_INFORMATION * uncut, 1e-12), 1.0)
         rows[C0 + count], rows[C1 + count], rows[C2 + count] = part * c0, part * c1, part * c2
-        rows[WEIGHT + count], rows[INVERSE_LENGTH + count] = weight[e], 1.0 / lines[e, LENGTH]
-        seen[count] = e
+        rows[WEIGHT + count], rows[INVERSE_LENGTH + count] = system.weight[e], 1.0 / lines[e, LENGTH]
+        numbers[count] = e
         count += 1
     return count
 
 
 @compiled
-def add_shared_pixels(  # type: ignore[no-untyped-def]
-    sums, weight, lines, contrasts, edges, spokes, sigma, variance, diagonal, beside
-):
-    """Add what gridlines share to the matrix's blocks, in units of the noise's variance."""
-    rows, seen = np.zeros(88), np.empty(8, np.int64)
-    for m in range(spokes.shape[0]):
+def add_shared_pixels(system, diagonal, off_diagonal):  # type: ignore[no-untyped-def]
+    """Add the information of shared pixels to the matrix.
+
+    Args:
+        system: ``GridlineSystem``.
+        diagonal, off_diagonal: (M, 3) and (E, 4) 1/px^2, as in ``Information``; written.
+    """
+    lines, edges, variance = system.lines, system.edges, system.variance
+    rows, numbers = np.zeros(88), np.empty(8, np.int64)
+    for m in range(system.spokes.shape[0]):
         for k in range(88):
             rows[k] = 0.0
-        count = _fill_gridlines_at_marker(m, sums, weight, lines, contrasts, edges, spokes, sigma, rows, seen)
+        count = _fill_gridlines_at_marker(m, system, rows, numbers)
         for i in range(count):
-            nx, ny = -lines[seen[i], UY] / variance, lines[seen[i], UX] / variance
-            color = rows[C0 + i], rows[C1 + i], rows[C2 + i]
-            _accumulate_overlaps(
-                rows,
-                i,
+            nx, ny = -lines[numbers[i], UY] / variance, lines[numbers[i], UX] / variance
+            gridline = GridlineEnd(
                 rows[AX + i],
                 rows[AY + i],
-                *color,
+                rows[C0 + i],
+                rows[C1 + i],
+                rows[C2 + i],
                 rows[WEIGHT + i],
                 rows[INVERSE_LENGTH + i],
-                nx,
-                ny,
-                sigma,
             )
+            _accumulate_overlaps(rows, i, gridline, nx, ny, system.sigma)
         for i in range(count):
-            e = seen[i]
+            e = numbers[i]
             nx, ny = -lines[e, UY], lines[e, UX]
             x, y = rows[NEAR_X + i], rows[NEAR_Y + i]
             diagonal[m, 0] += x * nx
             diagonal[m, 1] += x * ny
             diagonal[m, 2] += y * ny
             x, y, swap = rows[FAR_X + i], rows[FAR_Y + i], 0 if edges[e, 0] == m else 1
-            beside[e, 0] += x * nx
-            beside[e, 1 + swap] += x * ny
-            beside[e, 2 - swap] += y * nx
-            beside[e, 3] += y * ny
+            off_diagonal[e, 0] += x * nx
+            off_diagonal[e, 1 + swap] += x * ny
+            off_diagonal[e, 2 - swap] += y * nx
+            off_diagonal[e, 3] += y * ny

@@ -1,33 +1,70 @@
-"""Some gridlines and the markers at their ends, as if there were no others: for use inside compiled loops."""
+"""A subproblem: some gridlines and the markers at their ends, numbered as if there were no others."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 
 
+class SubproblemNumbering(NamedTuple):
+    """The markers of n gridlines, numbered among themselves.
+
+    Attributes:
+        markers: (m,) the markers at the gridlines' ends.
+        ends: (n, 2) places of each gridline's ends in ``markers``.
+        spokes: (m, 6) places of the gridlines at each marker among the n, -1 for none.
+    """
+
+    markers: NDArray[np.int64]
+    ends: NDArray[np.int32]
+    spokes: NDArray[np.int32]
+
+
+class Subproblem(NamedTuple):
+    """Some gridlines (n) and the markers at their ends (m), numbered among themselves.
+
+    Attributes:
+        gridlines: (n,) the gridlines.
+        markers, ends, spokes: as in ``SubproblemNumbering``.
+        free: (m,) bool, all gridlines at the marker belong to the subproblem.
+        hidden: (m,) bool.
+        roughness: (m,) px^2.
+        shifts: (m, 2) px, of each marker from where it is drawn.
+    """
+
+    gridlines: NDArray[np.int64]
+    markers: NDArray[np.int64]
+    ends: NDArray[np.int32]
+    spokes: NDArray[np.int32]
+    free: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+    roughness: NDArray[np.float64]
+    shifts: NDArray[np.float64]
+
+
 @compiled
-def gridlines_at(which, edges):  # type: ignore[no-untyped-def]
-    """The gridlines with an end at one of ``gridlines`` (M,) bool."""
+def gridlines_at(selected, edges):  # type: ignore[no-untyped-def]
+    """(n,) the gridlines with an end at a selected marker (M,) bool."""
     out, count = np.empty(len(edges), np.int64), 0
     for e in range(len(edges)):
         out[count] = e
-        count += which[edges[e, 0]] or which[edges[e, 1]]
+        count += selected[edges[e, 0]] or selected[edges[e, 1]]
     return out[:count]
 
 
 @compiled
-def number_subproblem(which, edges, spokes):  # type: ignore[no-untyped-def]
-    """The markers at the ends of the gridlines ``gridlines`` (n,), as if there were no others: their numbers (m,),
-    these
-    gridlines' ends among them, and the gridlines around each among these, -1 for those that are not."""
+def number_subproblem(gridlines, edges, spokes):  # type: ignore[no-untyped-def]
+    """``SubproblemNumbering`` of gridlines (n,); ``edges`` (E, 2) and ``spokes`` (M, 6) as in ``Topology``."""
     number, place = np.full(len(spokes), -1, np.int32), np.full(len(edges), -1, np.int32)
-    markers, ends, count = np.empty(len(spokes), np.int64), np.empty((len(which), 2), np.int32), 0
-    for k in range(len(which)):
-        place[which[k]] = k
+    markers, ends, count = np.empty(len(spokes), np.int64), np.empty((len(gridlines), 2), np.int32), 0
+    for k in range(len(gridlines)):
+        place[gridlines[k]] = k
         for side in range(2):
-            m = edges[which[k], side]
+            m = edges[gridlines[k], side]
             if number[m] < 0:
                 number[m], markers[count] = count, m
                 count += 1
@@ -37,24 +74,52 @@ def number_subproblem(which, edges, spokes):  # type: ignore[no-untyped-def]
         for i in range(spokes.shape[1]):
             e = spokes[markers[k], i]
             around[k, i] = place[e] if e >= 0 else -1
-    return markers[:count], ends, around
+    return SubproblemNumbering(markers[:count], ends, around)
 
 
 @compiled
-def selected_rows(table, which):  # type: ignore[no-untyped-def]
-    """Some rows of a table of two dimensions."""
-    out = np.empty((len(which), table.shape[1]), table.dtype)
-    for i in range(len(which)):
-        for k in range(table.shape[1]):
-            out[i, k] = table[which[i], k]
+def held_shifts(measured, drawn, redrawn):  # type: ignore[no-untyped-def]
+    """(M, 2) px, the shifts of the markers from where they are drawn; 0 for those drawn again and unknown ones."""
+    out = measured - drawn
+    for m in range(out.shape[0]):
+        if redrawn[m] or not np.isfinite(out[m, 0]):
+            out[m, 0], out[m, 1] = 0.0, 0.0
     return out
 
 
 @compiled
-def replaced_table_rows(table, which, rows):  # type: ignore[no-untyped-def]
-    """A table of two dimensions with other rows at these numbers (n,)."""
-    out = table.copy()
-    for i in range(len(which)):
+def subproblem_around(free, hidden, roughness, shifts, edges, spokes):  # type: ignore[no-untyped-def]
+    """The subproblem of the gridlines at some markers.
+
+    Args:
+        free: (M,) bool, the markers.
+        hidden, roughness, shifts: (M,) bool, (M,) px^2 and (M, 2) px, of all markers.
+        edges, spokes: (E, 2) and (M, 6), as in ``Topology``.
+
+    Returns:
+        ``Subproblem``.
+    """
+    gridlines = gridlines_at(free, edges)
+    markers, ends, around = number_subproblem(gridlines, edges, spokes)
+    kinds = free[markers], hidden[markers], roughness[markers]
+    return Subproblem(gridlines, markers, ends, around, *kinds, selected_rows(shifts, markers))
+
+
+@compiled
+def selected_rows(table, numbers):  # type: ignore[no-untyped-def]
+    """The rows of a two-dimensional table with these numbers (n,)."""
+    out = np.empty((len(numbers), table.shape[1]), table.dtype)
+    for i in range(len(numbers)):
         for k in range(table.shape[1]):
-            out[which[i], k] = rows[i, k]
+            out[i, k] = table[numbers[i], k]
+    return out
+
+
+@compiled
+def replaced_table_rows(table, numbers, rows):  # type: ignore[no-untyped-def]
+    """A copy of a two-dimensional table with other ``rows`` (n, k) at these numbers (n,)."""
+    out = table.copy()
+    for i in range(len(numbers)):
+        for k in range(table.shape[1]):
+            out[numbers[i], k] = rows[i, k]
     return out
