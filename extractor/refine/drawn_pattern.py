@@ -107,20 +107,17 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     """``Synthesis`` of a ``PatternState`` with ``InkLevels`` within the box (4,)."""
     image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
     xy, bend, sigma = state.xy, state.bend, state.sigma
-    frame = view.frame
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = levels.cell, levels.slope
     lines = gridlines(xy, state.maps, bend, edges, topology.edge_vectors)
     contrasts = update_known_contrasts(lines, xy, cells, topology.edge_cells, cell, slope)
     fill_zeros(picture, box)
     strokes.used[:] = 0
-    every, colors = np.ones(len(cells), np.bool_), (cell, slope, sigma, box, picture, strokes)
-    draw_cells(every, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    black = black_levels_at(levels.black, chord_midpoints(lines), frame.x, frame.y, frame.scale)
-    bending = bending_gridlines(state.roughness, bend, edges)
-    sums = accumulate_residual_sums(
-        image, picture, lines, contrasts, black, sigma, box, bending, buffers.residual
-    )
+    every, geometry = np.ones(len(cells), np.bool_), CellGeometry(xy, cells, cell_edges, edges, lines)
+    draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
+    black = black_levels_at(levels.black, chord_midpoints(lines), view.frame)
+    drawn = DrawnGridlines(lines, contrasts, black, bending_gridlines(state.roughness, bend, edges))
+    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, buffers.residual)
     corrected = _corrected_levels(view, picture, topology, xy, cell, state.noise)
     edge_px = median_edge(xy, edges)
     return Synthesis(xy, lines, bend, contrasts, black, sums, levels, corrected, box, sigma, edge_px)
@@ -133,9 +130,7 @@ def _corrected_levels(view, picture, topology, xy, cell, noise):  # type: ignore
     own = cell_means(view.image, picture, xy, cells, 0.0)
     own[:, :3] += cell
     black = cell_means(view.image, picture, xy, black_cells, 0.0)
-    frame = view.frame
-    levels = smoothed_levels(own, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale)
-    return InkLevels(*levels)
+    return smoothed_levels(own, black, xy, InkCells(cells, black_cells, color), noise, view.frame)
 
 
 @compiled
@@ -155,21 +150,20 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
     """
     image, picture, strokes = view.image, buffers.synthetic_image, buffers.coverage_runs
     sigma, box = drawing.sigma, drawing.box
-    frame = view.frame
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = drawing.levels.cell, drawing.levels.slope
     edge_ids, redrawn_cells = np.flatnonzero(groups_with_any(redrawn, edges)), groups_with_any(redrawn, cells)
     xy, bend, ends = merged_rows(redrawn, state.xy, drawing.xy), state.bend[edge_ids], edges[edge_ids]
     own = gridlines(xy, state.maps, bend, ends, topology.edge_vectors[edge_ids])
     contrasts = update_known_contrasts(own, xy, cells, topology.edge_cells[edge_ids], cell, slope)
-    lines, colors = replaced_rows(drawing.lines, edge_ids, own), (cell, slope, sigma, box, picture, strokes)
-    update_erasing_cells(redrawn_cells, drawing.xy, cells, cell_edges, edges, drawing.lines, *colors)
-    draw_cells(redrawn_cells, 1.0, xy, cells, cell_edges, edges, lines, *colors)
-    black = black_levels_at(drawing.levels.black, chord_midpoints(own), frame.x, frame.y, frame.scale)
-    bending = bending_gridlines(state.roughness, bend, ends)
-    sums = accumulate_residual_sums(
-        image, picture, own, contrasts, black, sigma, box, bending, buffers.residual
-    )
+    lines, appearance = replaced_rows(drawing.lines, edge_ids, own), CellAppearance(cell, slope, sigma)
+    old_geometry = CellGeometry(drawing.xy, cells, cell_edges, edges, drawing.lines)
+    update_erasing_cells(redrawn_cells, old_geometry, appearance, box, picture, strokes)
+    geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
+    draw_cells(redrawn_cells, 1.0, geometry, appearance, box, picture, strokes)
+    black = black_levels_at(drawing.levels.black, chord_midpoints(own), view.frame)
+    drawn = DrawnGridlines(own, contrasts, black, bending_gridlines(state.roughness, bend, ends))
+    sums = accumulate_residual_sums(image, picture, drawn, sigma, box, buffers.residual)
     return Synthesis(
         xy,
         lines,

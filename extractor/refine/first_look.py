@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.image.input import estimate_noise
-from extractor.image.pyramid import PolynomialFrame, PyramidLevel
+from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate
@@ -37,11 +37,7 @@ def _initial_appearance(view, topology, xy, sigma, no_model):  # type: ignore[no
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
     drawn = cell_means(image, no_model, xy, cells, sigma)
     black = cell_means(image, no_model, xy, black_cells, sigma)
-    frame = view.frame
-    levels = smoothed_levels(
-        drawn, black, xy, cells, black_cells, color, noise, frame.x, frame.y, frame.scale
-    )
-    return noise, InkLevels(*levels)
+    return noise, smoothed_levels(drawn, black, xy, InkCells(cells, black_cells, color), noise, view.frame)
 
 
 def update_edge_contrasts(
@@ -58,9 +54,7 @@ def update_edge_contrasts(
 def _update_edge_contrasts(lines, xy, topology, levels, frame):  # type: ignore[no-untyped-def]
     cells, edge_cells, cell, black = topology.cells, topology.edge_cells, levels.cell, levels.black
     contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, levels.slope)
-    projections, clearance = channel_projections(
-        lines, contrasts, xy, cells, edge_cells, cell, black, frame.x, frame.y, frame.scale
-    )
+    projections, clearance = channel_projections(lines, contrasts, xy, cells, edge_cells, cell, black, frame)
     return EdgeContrasts(contrasts, projections, clearance)
 
 

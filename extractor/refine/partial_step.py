@@ -32,6 +32,7 @@ from extractor.refine.measure.gridline_bending import (
 )
 from extractor.refine.measure.gridline_offsets import foot_levels
 from extractor.refine.measure.gridline_weights import (
+    ShiftGradients,
     chord_midpoints,
     gridline_misfits,
     misfit_weights,
@@ -40,7 +41,6 @@ from extractor.refine.measure.gridline_weights import (
 )
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
-    ShiftGradients,
     extrapolate_pattern_around,
     prior_information,
 )
@@ -61,6 +61,7 @@ from extractor.refine.solve.subproblem import (
     subproblem_around,
 )
 from extractor.refine.synthesis.dot_gain import update_without_dot_gain
+from extractor.refine.synthesis.ink_levels import LevelChange
 
 
 class MarkerState(NamedTuple):
@@ -176,13 +177,8 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
     free, roughness = redrawn.copy(), markers.roughness
     add_neighbours(redrawn, edges, free)
     if not image_state.wide_blur:
-        ahead, third, spokes, near = (
-            topology.next_markers,
-            topology.third_differences,
-            topology.spokes,
-            topology.near,
-        )
-        new = measure_roughness(reliable, maps, diagonal, edges, ahead, third, spokes, near, free)
+        rows = MarkerRows(edges, topology.next_markers, topology.third_differences)
+        new = measure_roughness(reliable, maps, diagonal, rows, topology.spokes, topology.near, free)
         roughness = merged_rows(free, new, roughness)
     noise, dot_gain = image_state.noise, image_state.dot_gain
     state = PatternState(
@@ -206,22 +202,18 @@ def _subproblem_reading(drawing, part, edge_cells, weight, frame, image_state): 
     sums, lines = selected_rows(drawing.sums, ids), selected_rows(drawing.lines, ids)
     contrasts, bend = selected_rows(drawing.contrasts, ids), selected_rows(drawing.bend, ids)
     cells, levels, corrected = selected_rows(edge_cells, ids), drawing.levels, drawing.corrected_levels
-    cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
-    middle = chord_midpoints(lines)
-    to_a, to_b, off = shift_gradients(
-        sums, contrasts, cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
-    )
-    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, cells, image_state.dot_gain)
+    change = LevelChange(corrected.cell - levels.cell, corrected.black - levels.black)
+    gradients = shift_gradients(sums, contrasts, cells, change, chord_midpoints(lines), frame)
+    dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, cells, image_state.dot_gain)
     bend_variance = np.zeros(len(ids))
     if np.any(part.roughness) or np.any(bend):
         about = weight[ids], lines, part.ends, variance
-        bend_variance = estimate_bend_variance(sums, to_a, to_b, off, bend, part.roughness, *about)
-    bend_response = update_without_bending(sums, to_a, to_b, off, bend, bend_variance, variance)
-    misfit = gridline_misfits(sums, to_a, to_b, values, rule.min_places)
+        bend_variance = estimate_bend_variance(sums, gradients, bend, part.roughness, *about)
+    bend_response = update_without_bending(sums, gradients, bend, bend_variance, variance)
+    misfit = gridline_misfits(sums, gradients, values, rule.min_places)
     pardon = bending_misfit(bend_variance, contrasts, sigma)
     new_weight = misfit_weights(sums, misfit, image_state.median_misfit, pardon, values, rule.default_weight)
     system = GridlineSystem(sums, new_weight, lines, contrasts, part.ends, part.spokes, sigma, variance)
-    gradients = ShiftGradients(to_a, to_b, off)
     return SubproblemReading(system, gradients, bend, bend_variance, bend_response, dot_gain_offset)
 
 

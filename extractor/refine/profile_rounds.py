@@ -23,7 +23,6 @@ from extractor.refine.outliers import suspect_markers
 from extractor.refine.refinement_step import (
     BendingPrior,
     MisfitRule,
-    ShiftGradients,
     StepSolution,
     solve_step,
     update_for_bending,
@@ -102,14 +101,13 @@ def _profile_step(image, lines, across, state, topology, stations, judged):  # t
     bending = bending_gridlines(state.roughness, state.bend, edges)
     sums = read_profiles(image, lines, across.projections, clearance, sigma, bending, stations)
     gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums)))
-    to_a, to_b = gradients.start, gradients.end
-    dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
-    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
+    dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
+    dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(state.bend, state.roughness, state.weight)
     bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, noise, rule)
     pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
     profile_weight, _, _ = weigh_gridlines(
-        sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
+        sums, gradients, pardon, rule.values, rule.min_places, rule.default_weight
     )
     weight = profile_weight if judged else _lenient_weights(profile_weight, sums, edges, spokes)
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)

@@ -19,6 +19,7 @@ from extractor.refine.acceptance import accepted_markers, update_obstructed_mark
 from extractor.refine.estimate import EdgeContrasts, Estimate, StartPlaces, start_places
 from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import (
+    ShiftGradients,
     gridline_misfits,
     median_of_misfits,
     misfit_weights,
@@ -28,7 +29,6 @@ from extractor.refine.measure.matched_filter import SQUARED_CONTRAST, read_profi
 from extractor.refine.profile_rounds import MISFIT_TOLERANCE, SAMPLE_MISFIT_RULE
 from extractor.refine.refinement_step import (
     BendingPrior,
-    ShiftGradients,
     prior_information,
     update_for_bending,
 )
@@ -152,12 +152,11 @@ def _weighed_profiles(image, state, contrasts, topology, gridline_ids, count):  
     )
     sums = read_profiles(image, lines, weights, clearance, sigma, bending, STATIONS)
     gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(gridline_ids)))
-    to_a, to_b = gradients.start, gradients.end
     cells = selected_rows(topology.edge_cells, gridline_ids)
-    update_without_dot_gain(sums, to_a, to_b, across, cells, state.dot_gain)
+    update_without_dot_gain(sums, gradients, across, cells, state.dot_gain)
     prior = BendingPrior(bend, state.roughness, state.weight[gridline_ids])
     bend_variance, _ = update_for_bending(sums, gradients, prior, lines, ends, state.noise, rule)
-    misfit = gridline_misfits(sums, to_a, to_b, rule.values, rule.min_places)
+    misfit = gridline_misfits(sums, gradients, rule.values, rule.min_places)
     median = median_of_misfits(
         misfit[count:] if len(gridline_ids) - count >= MIN_REFERENCE_GRIDLINES else misfit
     )

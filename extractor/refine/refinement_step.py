@@ -67,20 +67,6 @@ class ExtrapolatedPattern(NamedTuple):
     maps: NDArray[np.float64]
 
 
-class ShiftGradients(NamedTuple):
-    """Gradients of the log-likelihood by shifts of the gridlines' ends, times the variance of the noise.
-
-    Attributes:
-        start, end: (E,) squared gray levels / px, by a shift of the start and of the end along the normal (-uy, ux).
-        level_shift: (E,) squared gray levels, the change of the levels of both sides together times the contrast; 0
-            where levels stay as they are.
-    """
-
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    level_shift: NDArray[np.float64]
-
-
 class BendingPrior(NamedTuple):
     """What was known about the bending of gridlines before a step.
 
@@ -150,14 +136,8 @@ def with_pattern_moved(
 
 def with_roughness(topology: Topology, estimate: Estimate) -> Estimate:
     """The estimate with the roughness of its markers."""
-    about = (
-        topology.edges,
-        topology.next_markers,
-        topology.third_differences,
-        topology.spokes,
-        topology.near,
-        np.ones(len(topology.spokes), np.bool_),
-    )
+    rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
+    about = rows, topology.spokes, topology.near, np.ones(len(topology.spokes), np.bool_)
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
     return estimate._replace(roughness=measure_roughness(*markers, *about))
 
@@ -183,18 +163,17 @@ def update_for_bending(sums, gradients, prior, lines, edges, noise, rule):  # ty
     Returns:
         (E,) px^2 the bend variance, and (E, 6) the bend response, as ``update_without_bending`` gives it.
     """
-    to_a, to_b, off = gradients.start, gradients.end, gradients.level_shift
     bend_variance, variance = np.zeros(len(sums)), 1.0
     if np.any(prior.roughness) or np.any(prior.bend):
         # a misfit that all gridlines have is not bending
         _, _, found = weigh_gridlines(
-            sums, to_a, to_b, np.zeros(len(sums)), rule.values, rule.min_places, rule.default_weight
+            sums, gradients, np.zeros(len(sums)), rule.values, rule.min_places, rule.default_weight
         )
         variance = max(noise, found) ** 2 if np.isfinite(found) else noise**2
         bend_variance = estimate_bend_variance(
-            sums, to_a, to_b, off, prior.bend, prior.roughness, prior.weight, lines, edges, variance
+            sums, gradients, prior.bend, prior.roughness, prior.weight, lines, edges, variance
         )
-    return bend_variance, update_without_bending(sums, to_a, to_b, off, prior.bend, bend_variance, variance)
+    return bend_variance, update_without_bending(sums, gradients, prior.bend, bend_variance, variance)
 
 
 def with_solution(estimate: Estimate, solution: StepSolution, **others: Any) -> Estimate:

@@ -30,7 +30,6 @@ from extractor.refine.partial_step import partial_step
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
     BendingPrior,
-    ShiftGradients,
     StepSolution,
     solve_step,
     update_for_bending,
@@ -287,26 +286,22 @@ def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyp
         topology.edge_cells,
     )
     levels, corrected, rule = drawing.levels, drawing.corrected_levels, PIXEL_MISFIT_RULE
-    cell_change, black_change = corrected.cell - levels.cell, corrected.black - levels.black
-    middle = chord_midpoints(lines)
-    to_a, to_b, off = shift_gradients(
-        sums, contrasts, edge_cells, cell_change, black_change, middle, frame.x, frame.y, frame.scale
-    )
-    dot_gain = measure_dot_gain(sums, to_a, to_b, contrasts, edge_cells, sigma)
-    dot_gain_offset = update_without_dot_gain(sums, to_a, to_b, contrasts, edge_cells, dot_gain)
-    gradients = ShiftGradients(to_a, to_b, off)
+    change = LevelChange(corrected.cell - levels.cell, corrected.black - levels.black)
+    gradients = shift_gradients(sums, contrasts, edge_cells, change, chord_midpoints(lines), frame)
+    dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
+    dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(drawing.bend, state.roughness, state.weight)
     bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, state.noise, rule)
     pardon = bending_misfit(bend_variance, contrasts, sigma)
     weight, median_misfit, found = weigh_gridlines(
-        sums, to_a, to_b, pardon, rule.values, rule.min_places, rule.default_weight
+        sums, gradients, pardon, rule.values, rule.min_places, rule.default_weight
     )
     noise = found if np.isfinite(found) else state.noise
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
     solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
     current = update_known_contrasts(lines, state.xy, cells, edge_cells, corrected.cell, corrected.slope)
     wider = blur_change(sums, dot_gain_offset, weight, contrasts, current, sigma)
-    foot = foot_levels(contrasts, drawing.black, off)
+    foot = foot_levels(contrasts, drawing.black, gradients.level_shift)
     return SynthesisReading(
         weight, median_misfit, bend_variance, foot, dot_gain, dot_gain_offset, wider, noise, solution
     )
