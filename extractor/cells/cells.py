@@ -47,7 +47,7 @@ class Cells:
         return float(_equilateral_edge(self.area_px))
 
     @cached_property
-    def whole(self) -> NDArray[np.bool_]:
+    def is_intact(self) -> NDArray[np.bool_]:
         """(N,) bool, whose centers are to be believed: triangles, if most are, as large as those around them."""
         return np.asarray(_is_intact(self.center_px, self.area_px, self.corner_px))
 

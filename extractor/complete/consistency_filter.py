@@ -71,7 +71,7 @@ def reject_inconsistent_markers(
         places.xy_px,
         places.edge_px,
         places.agreed,
-        places.whole,
+        places.is_intact,
     )
     rings = (
         lattice.ring_weights,

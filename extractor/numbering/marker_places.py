@@ -42,14 +42,14 @@ class InitialMarkers:
         edge_px: (M,) float64, the mean length of the edges at each marker, NaN where there is none.
         cells: (C, 3) int32, marker ids of the numbered cells' corners.
         agreed: (M,) bool, triangles that the pattern has there were found and meet: all, or at least two.
-        whole: (M,) bool, it were all, and at least two.
+        is_intact: (M,) bool, all triangles of the pattern there agree, and at least two do.
     """
 
     xy_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     cells: NDArray[np.int32]
     agreed: NDArray[np.bool_]
-    whole: NDArray[np.bool_]
+    is_intact: NDArray[np.bool_]
 
 
 def merge_corners(
@@ -83,7 +83,7 @@ def merge_corners(
 def corner_agreement(
     there: NDArray[np.int64], meeting: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """``agreed`` and ``whole`` of ``InitialMarkers``, by how many cells agree at each marker and how many meet
+    """``agreed`` and ``is_intact`` of ``InitialMarkers``, by how many cells agree at each marker and how many meet
     there."""
     return (there == meeting) | (there >= 2), (there == meeting) & (there >= 2)
 

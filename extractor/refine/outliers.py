@@ -42,7 +42,7 @@ def correct_outliers(
     ``trusted`` (E,) is how far gridlines look as they should."""
     assert fit.reading is not None
     of_fit = fit.measured, fit.reliable, fit.beyond, fit.maps
-    of_places = places.xy_px, places.edge_px, places.agreed, places.whole
+    of_places = places.xy_px, places.edge_px, places.agreed, places.is_intact
     doubted, some = suspect_markers(trusted, fit.reading.weight, mesh.spokes)
     if not some:
         return fit, places
@@ -58,7 +58,7 @@ def correct_outliers(
     if not led:
         return fit, places
     fit = fit._replace(measured=measured, reliable=guiding)
-    return fit, replace(places, xy_px=xy, agreed=agreed, whole=whole)
+    return fit, replace(places, xy_px=xy, agreed=agreed, is_intact=whole)
 
 
 @compiled

@@ -57,7 +57,7 @@ def fill_recovered_markers(
     assert fit.reading is not None
     look = fit.sigma, fit.noise, fit.dot_gain
     pattern = fit.xy, fit.beyond, fit.maps, fit.roughness, fit.bend, fit.reading.weight, look
-    start = places.xy_px, places.edge_px, places.whole
+    start = places.xy_px, places.edge_px, places.is_intact
     tables = mesh.edges, mesh.spokes, mesh.edge_vectors, mesh.edge_cells
     _fill_recovered_markers(view.image, pattern, tuple(across), start, tables, lost, xy, cov)
 

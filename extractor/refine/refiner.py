@@ -154,7 +154,7 @@ class Refiner:
             xy, cov = self._accepted_markers(fit, places)
             strays, doubted = find_outliers(mesh, fit, xy, use, places.edge_px)
             xy[strays], cov[strays] = np.nan, np.nan
-            update_obstructed_markers(xy, cov, doubted, places.xy_px, places.edge_px, places.whole)
+            update_obstructed_markers(xy, cov, doubted, places.xy_px, places.edge_px, places.is_intact)
             return self._refined_markers(view, fit, xy, cov, ~doubted, places)
         coarser = start.sigma >= 2 * COARSE_BLUR * steps.reduction_blur_px
         blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
@@ -210,7 +210,7 @@ class Refiner:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of a fit; NaN where it is far from the places or not sure."""
         tables = self._mesh.edges, self._mesh.spokes
-        start = places.xy_px, places.edge_px, places.whole
+        start = places.xy_px, places.edge_px, places.is_intact
         xy, cov = accepted_markers(
             fit.measured, *fit.information, fit.bend_variance, *tables, *start, self._every_marker
         )
@@ -267,5 +267,5 @@ def _at_full_scale(xy, cov, loose, spokes, start, edge, agreed, scale):  # type:
 def _at_reduced_scale(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
     """Places of the full image in a reduced one."""
     return InitialMarkers(
-        view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.whole
+        view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.is_intact
     )

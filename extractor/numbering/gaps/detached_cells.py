@@ -44,14 +44,14 @@ def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice) 
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
+    seen = cells.center_px, cells.corner_px, cells.area_px, cells.is_intact
     step = 1 if numbering.mirrored else 2
     cell = _number_detached(seen, cells.ink, numbering.cell, numbering.white_px, lattice.layout_cells, step)
     if numbering.origin is not Origin.WHITE or numbering.white_adjacent:
         return replace(numbering, cell=cell)
     about = numbering.white_px, lattice.white_cell_frame[0], lattice.layout_cells
     return replace(
-        numbering, cell=cell, ambiguous=bool(is_white_cell_contradicted(seen[0], cells.whole, cell, *about))
+        numbering, cell=cell, ambiguous=bool(is_white_cell_contradicted(seen[0], cells.is_intact, cell, *about))
     )
 
 

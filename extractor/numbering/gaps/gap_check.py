@@ -50,7 +50,7 @@ def inconsistent_cells(
         mirrored: the pattern is seen from its back.
         white_px: the middle of the white cell; None where the outline told, and the largest block is right.
     """
-    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
+    seen = cells.center_px, cells.corner_px, cells.area_px, cells.is_intact
     white = np.full(2, np.nan) if white_px is None else white_px
     plan, step = lattice.layout_cells, 1 if mirrored else 2
     beside = corner_neighbours(*seen, cell, image_cell_of_layout_cell(cell, len(plan.ink)), plan, step)
