@@ -62,7 +62,7 @@ def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-de
     The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    edges, room = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
+    edges, buffers = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
     left, reach = np.flatnonzero(good), np.full(good.shape[0], PROFILE_REACH)
     for _ in range(MAX_PASSES):
         for first in range(0, left.shape[0], BATCH_CELLS):
@@ -70,10 +70,10 @@ def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-de
             count = 3 * cells.shape[0]
             _fill_edges(corners, cells, reach, edges)
             _fill_normals(edges, count)
-            _fill_contrast_weights(flat, height, width, edges, count, room)
+            _fill_contrast_weights(flat, height, width, edges, count, buffers)
             _fill_profile_places(height, width, edges, count)
-            _fill_profile_areas(flat, height, width, False, edges, count, room)
-            _fill_profile_areas(flat, height, width, True, edges, count, room)
+            _fill_profile_areas(flat, height, width, False, edges, count, buffers)
+            _fill_profile_areas(flat, height, width, True, edges, count, buffers)
             _fill_edge_lines(edges, count)
             _update_corners(edges, cells, corners, good, reach)
         left = left[reach[left] > 0.0]
@@ -110,13 +110,13 @@ def _fill_normals(edges, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ignore[no-untyped-def]
+def _fill_contrast_weights(flat, height, width, edges, count, buffers):  # type: ignore[no-untyped-def]
     """Compare each cell's ink with the colors beyond its edges."""
-    patches, cells = room.patches, count // 3
+    patches, cells = buffers.patches, count // 3
     for i in range(cells):
         patches[X + i], patches[Y + i] = edges[CENTER_X + i], edges[CENTER_Y + i]
         patches[RADIUS + i] = 0.2 * edges[SIZE + i]
-    fill_patch_means(flat, height, width, cells, room)
+    fill_patch_means(flat, height, width, cells, buffers)
     for k in range(3):
         for i in range(cells):
             edges[VALID + k * cells + i] = patches[INSIDE + i]
@@ -126,7 +126,7 @@ def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ig
         patches[X + i] = edges[CENTER_X + i] + 2 * edges[MEDIAN_X + i]
         patches[Y + i] = edges[CENTER_Y + i] + 2 * edges[MEDIAN_Y + i]
         patches[RADIUS + i] = 0.4 * edges[DEPTH + i]
-    fill_patch_means(flat, height, width, count, room)
+    fill_patch_means(flat, height, width, count, buffers)
     for i in range(count):
         b0, b1 = patches[COLOR + i], patches[COLOR + BATCH_POINTS + i]
         b2 = patches[COLOR + 2 * BATCH_POINTS + i]
@@ -160,9 +160,9 @@ def _fill_profile_places(height, width, edges, count):  # type: ignore[no-untype
 
 
 @compiled
-def _fill_profile_areas(flat, height, width, second, edges, count, room):  # type: ignore[no-untyped-def]
+def _fill_profile_areas(flat, height, width, second, edges, count, buffers):  # type: ignore[no-untyped-def]
     """Write the areas under the first or second profiles across the edges, in steps, and keep the ones before."""
-    places, parts = room.places, room.channel_sums
+    points, parts = buffers.fixed_points, buffers.channel_sums
     for i in range(count):
         fits, reach = edges[VALID + i] > 0.0, edges[REACH + i]
         x = reach * edges[MEDIAN_X + i]
@@ -172,7 +172,7 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
             if second
             else (edges[FIRST_X + i] - x, edges[FIRST_Y + i] - y)
         )
-        places[X + i], places[Y + i] = (
+        points[X + i], points[Y + i] = (
             fixed_point_coordinate(x if fits else 0.0),
             fixed_point_coordinate(y if fits else 0.0),
         )
@@ -182,7 +182,7 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
         edges[AREA_BEFORE + i], edges[AREA + i] = edges[AREA + i], 0.0
     for m in range(2 * HALF_PROFILE + 1):
         weight = 0.5 if m == 0 or m == 2 * HALF_PROFILE else 1.0
-        fill_point_samples(flat, height, width, count, room)
+        fill_point_samples(flat, height, width, count, buffers)
         for i in range(count):
             u0, u1, u2 = (
                 edges[WEIGHT + i],
@@ -193,8 +193,8 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
             f = f * (1.0 / (SUBPIXEL_STEPS * SUBPIXEL_STEPS)) - edges[BACKGROUND + i]
             edges[AREA + i] += weight * min(max(f, MIN_PROFILE_LEVEL), MAX_PROFILE_LEVEL)
         for i in range(count):
-            places[X + i] += fixed_point_length(edges[STEP_X + i])
-            places[Y + i] += fixed_point_length(edges[STEP_Y + i])
+            points[X + i] += fixed_point_length(edges[STEP_X + i])
+            points[Y + i] += fixed_point_length(edges[STEP_Y + i])
 
 
 @compiled

@@ -34,7 +34,7 @@ class SampleBuffers(NamedTuple):
             image, else 0.
     """
 
-    places: NDArray[np.int64]
+    fixed_points: NDArray[np.int64]
     pixel_words: NDArray[np.uint32]
     channel_sums: NDArray[np.float32]
     patches: NDArray[np.float64]
@@ -64,12 +64,12 @@ def allocate_sample_buffers():  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_pixel_indices(height, width, places, shares, count):  # type: ignore[no-untyped-def]
+def _fill_pixel_indices(height, width, points, shares, count):  # type: ignore[no-untyped-def]
     """Write where the four pixels around each fixed place begin in the flat image, and how far beyond it lies."""
     for i in range(count):
-        x, y = places[X + i], places[Y + i]
+        x, y = points[X + i], points[Y + i]
         ix, iy = min(x >> 32, width - 2), min(y >> 32, height - 2)
-        places[PIXEL_INDEX + i] = 3 * (iy * width + ix)
+        points[PIXEL_INDEX + i] = 3 * (iy * width + ix)
         shares[FRACTION_X + i], shares[FRACTION_Y + i] = (
             (x >> 24) - SUBPIXEL_STEPS * ix,
             (y >> 24) - SUBPIXEL_STEPS * iy,
@@ -85,11 +85,11 @@ def _read_word(flat, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_pixel_words(flat, width, places, words, count):  # type: ignore[no-untyped-def]
+def _fill_pixel_words(flat, width, points, words, count):  # type: ignore[no-untyped-def]
     """Read the first and the last four of the six bytes of two pixels, and of the two below."""
     two, below = np.uint64(2), np.uint64(3 * width)
     for i in range(count):
-        k = np.uint64(places[PIXEL_INDEX + i])
+        k = np.uint64(points[PIXEL_INDEX + i])
         words[i], words[BATCH_POINTS + i] = _read_word(flat, k), _read_word(flat, k + two)
         words[2 * BATCH_POINTS + i], words[3 * BATCH_POINTS + i] = (
             _read_word(flat, k + below),
@@ -127,17 +127,17 @@ def _fill_channel_sums(words, parts, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fill_point_samples(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+def fill_point_samples(flat, height, width, count, buffers):  # type: ignore[no-untyped-def]
     """Take the samples at the first ``count`` places of a ``SampleBuffers``, which must lie in the image."""
-    _fill_pixel_indices(height, width, room.places, room.channel_sums, count)
-    _fill_pixel_words(flat, width, room.places, room.pixel_words, count)
-    _fill_channel_sums(room.pixel_words, room.channel_sums, count)
+    _fill_pixel_indices(height, width, buffers.fixed_points, buffers.channel_sums, count)
+    _fill_pixel_words(flat, width, buffers.fixed_points, buffers.pixel_words, count)
+    _fill_channel_sums(buffers.pixel_words, buffers.channel_sums, count)
 
 
 @compiled
-def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyped-def]
+def fill_patch_means(flat, height, width, count, buffers):  # type: ignore[no-untyped-def]
     """``sample_patch`` for the first ``count`` patches of a ``SampleBuffers``."""
-    patches, parts = room.patches, room.channel_sums
+    patches, parts = buffers.patches, buffers.channel_sums
     for i in range(count):
         x, y, r = patches[X + i], patches[Y + i], patches[RADIUS + i]
         inside = (r >= 0.0) & (x >= r) & (y >= r) & (x <= width - 1.0 - r) & (y <= height - 1.0 - r)
@@ -145,8 +145,8 @@ def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyp
         for channel in range(3):
             patches[COLOR + channel * BATCH_POINTS + i] = 0.0
     for k in range(HEXAGON_POINTS.shape[0]):
-        _fill_hexagon_points(height, width, k, patches, room.places, count)
-        fill_point_samples(flat, height, width, count, room)
+        _fill_hexagon_points(height, width, k, patches, buffers.fixed_points, count)
+        fill_point_samples(flat, height, width, count, buffers)
         for channel in range(3):
             for i in range(count):
                 patches[COLOR + channel * BATCH_POINTS + i] += parts[channel * BATCH_POINTS + i]
@@ -156,11 +156,11 @@ def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyp
 
 
 @compiled
-def _fill_hexagon_points(height, width, k, patches, places, count):  # type: ignore[no-untyped-def]
+def _fill_hexagon_points(height, width, k, patches, points, count):  # type: ignore[no-untyped-def]
     """Place a sample in every patch, at its center or a corner of its hexagon; somewhere where it lies outside."""
     u, v = HEXAGON_POINTS[k]
     for i in range(count):
         x, y = patches[X + i] + patches[RADIUS + i] * u, patches[Y + i] + patches[RADIUS + i] * v
         inside = patches[INSIDE + i] > 0.0
-        places[X + i] = fixed_point_coordinate(min(x, width - BORDER_PX) if inside else 0.0)
-        places[Y + i] = fixed_point_coordinate(min(y, height - BORDER_PX) if inside else 0.0)
+        points[X + i] = fixed_point_coordinate(min(x, width - BORDER_PX) if inside else 0.0)
+        points[Y + i] = fixed_point_coordinate(min(y, height - BORDER_PX) if inside else 0.0)

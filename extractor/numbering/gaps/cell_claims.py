@@ -20,7 +20,9 @@ from extractor.numeric.nearest_points import BucketGrid, fill_nearest_points
 JOINT_GAP = 1.7  # cells not farther than this from a numbered one, in cells, are numbered in one round,
 JOINT_GAP_RATIO = 1.25  # and cells not farther than this many times the least gap
 MAX_PLACE_MISFIT = 0.3  # in cells, between a cell's predicted place and the layout's cell
-RIVAL_DISTANCE = 1.5  # in cells, within which two may be fragments of one; the next of the same ink is 1.7 away
+RIVAL_DISTANCE = (
+    1.5  # in cells, within which two may be fragments of one; the next of the same ink is 1.7 away
+)
 
 
 class SupportCells(NamedTuple):
@@ -144,9 +146,7 @@ def update_assignments(cells, layout, support, numbering, assignments):  # type:
     while True:
         for n in range(candidate.shape[0]):
             if not assignments.is_evaluated[n] and assignments.gap[n] <= horizon:
-                _update_cell_assignment(
-                    cells, layout, n, support, numbering.cell, free, assignments, buffers
-                )
+                _update_cell_assignment(cells, layout, n, support, numbering.cell, free, assignments, buffers)
         for n in range(candidate.shape[0]):
             if assignments.place[n] < 0 or assignments.gap[n] > horizon:
                 continue

@@ -33,7 +33,9 @@ MAX_SINGLE_JUMP = 0.9  # of a cell without contacts: its center may be shifted
 MAX_GAP = 5.0  # between the two sides, in cells
 MAX_GAP_RATIO = 1.5  # vectors of a block not longer than this many times its shortest are compared
 COMPARED_CELLS = 3  # consistent cells with which each cell is compared
-WHITE_CELL_NEIGHBOURS = 5  # numbered cells nearest to the white cell that predict its place; least number of them
+WHITE_CELL_NEIGHBOURS = (
+    5  # numbered cells nearest to the white cell that predict its place; least number of them
+)
 MIN_WHITE_CELL_NEIGHBOURS = 3
 MAX_WHITE_CELL_MISFIT = 1.0  # in cells, the median distance from the predictions; a wrong step makes 1.7
 REFERENCE_CANDIDATES = 3  # cells nearest to the white one, of which the largest block is the reference
@@ -237,7 +239,7 @@ def _update_consistent_blocks(cells, block, layout, corner_step, state):  # type
 
 @compiled
 def _fill_gaps(cells, block, waiting, support, grid, gap, least):  # type: ignore[no-untyped-def]
-    """Write the gaps (N,), in cells, from the ``waiting`` cells to the ``support`` in the grid; and the blocks' least."""
+    """Write the gaps (N,), in cells, of the ``waiting`` cells from the ``support`` in the grid, and each block's."""
     index, square = np.empty(1, np.int32), np.empty(1)
     least[:] = np.inf
     for j in waiting:
