@@ -18,7 +18,6 @@ from extractor.layout.lattice_tables import Lattice, cell_at
 from extractor.localmap.cell_prediction import (
     MAX_OUTSIDE_SHARE,
     RING_STARTS,
-    KnownCells,
     build_axial_grid,
     lattice_bases,
     predicted_places,
@@ -26,16 +25,7 @@ from extractor.localmap.cell_prediction import (
     update_excluded_places,
 )
 from extractor.numbering.white_cell import WhiteCellLayout, locate_white_cell
-from extractor.numeric.bilinear_batch import (
-    BATCH_POINTS,
-    COLOR,
-    INSIDE,
-    RADIUS,
-    X,
-    Y,
-    allocate_sample_buffers,
-    fill_patch_means,
-)
+from extractor.numbering.whiteness import measure_inks, measure_whiteness
 from extractor.numeric.compilation import compiled
 
 # Brightness is the sum of the channels, relative to that of the inks around.
@@ -46,12 +36,9 @@ MAX_BLACK_RATIO = 0.95  # between the inks: black is darker than the inks even i
 MIN_BLACK_SHARE = 0.8  # of the places between three cells; the white cell and glare are among these places
 MIN_ENCLOSED_PLACES = 6  # such places; if fewer, places next to one or two cells count, too
 MIN_RELATIVE_BRIGHTNESS = 0.6  # of the brightest; a compressed black cell filled by blur stays below
-# In light of any color, each channel of white is about as strong as in the ink with most of that channel; colored dirt
-# has a weaker channel. Each channel is divided by that ink's.
-MIN_WEAKEST_CHANNEL = 0.5  # the weakest of these ratios
-MIN_CHANNEL_BALANCE = 0.4  # the weakest to the strongest
+MIN_WEAKEST_CHANNEL = 0.5  # least whiteness
 MAX_WHITE_CANDIDATES = 16
-MIN_WEAKEST_CHANNEL_FAR = 0.75  # the weakest, where no walked cell touches the place
+MIN_WEAKEST_CHANNEL_FAR = 0.75  # the same where no walked cell touches the place
 
 
 class LayoutPlacement(NamedTuple):
@@ -71,18 +58,6 @@ class LayoutPlacement(NamedTuple):
     white_px: NDArray[np.float64]
     white: float
     white_adjacent: bool
-
-
-class _InkColors(NamedTuple):
-    """The inks in the image.
-
-    Attributes:
-        colors: (4, 3) float64, median BGR of red, green and blue in rows 1 to 3; 0 for an absent ink.
-        strongest: (3,) float64, the maximum of each channel.
-    """
-
-    colors: NDArray[np.float64]
-    strongest: NDArray[np.float64]
 
 
 class _WhiteCandidates(NamedTuple):
@@ -121,11 +96,10 @@ def placements_by_white_cell(
     # more cells than the layout has do not fit anywhere
     if len(index) == 0 or len(index) - len(lattice.ink) > MAX_OUTSIDE_SHARE * len(index):
         return []
-    radius_px, level, inks = _measure_inks(image, center, cells.area_px, cells.ink, index)
+    known, inks = measure_inks(image, center, cells.area_px, cells.ink, index, basis)
     layout = WhiteCellLayout(
         lattice.layers, lattice.cell_lookup, *lattice.white_cell_frame, lattice.center_mm
     )
-    known = KnownCells(index, basis, radius_px, level)
     found = _search_white_cell(image, center, axial, known, inks, layout)
     fits = np.flatnonzero(found.inside)
     return [
@@ -151,7 +125,7 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
 
     Args:
         image: (H, W, 3) uint8; center: (N, 2) px; axial: (N, 2) int32.
-        known: ``KnownCells``. inks: ``_InkColors``. layout: ``WhiteCellLayout``.
+        known: ``KnownCells``. inks: ``InkColors``. layout: ``WhiteCellLayout``.
     """
     grid, black = build_axial_grid(axial, known.index, known.level), np.empty(3)
     for ring in range(RING_STARTS.shape[0] - 1):
@@ -159,14 +133,14 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
         if ring == 1:
             update_excluded_misfits(grid, axial, known.index, layout.layers)
         places = predicted_places(center, known, grid, ring)
-        brightness, whiteness, color = _measure_whiteness(image, places.means, inks.strongest, is_far)
+        shown = measure_whiteness(image, places.means, inks.strongest, is_far)
         if not is_far:
-            if not _is_dark_between_inks(brightness, places.support_count):
+            if not _is_dark_between_inks(shown.brightness, places.support_count):
                 break
-            _fill_black_color(color, places.support_count, black)
+            _fill_black_color(shown.color, places.support_count, black)
             update_excluded_places(grid, places.axial[places.support_count == 3])
         least = MIN_WEAKEST_CHANNEL_FAR if is_far else MIN_WEAKEST_CHANNEL
-        bright = _select_brightest(brightness, whiteness, least)
+        bright = _select_brightest(shown.brightness, shown.whiteness, least)
         if bright.shape[0] == 0:
             continue
         candidates = places.axial[bright]
@@ -174,7 +148,8 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
             image, center, axial, known.index, candidates, layout, inks.colors, black
         )
         if inside.any():
-            return _WhiteCandidates(ring, cell, inside, middle, brightness[bright], whiteness[bright])
+            brightness, whiteness = shown.brightness[bright], shown.whiteness[bright]
+            return _WhiteCandidates(ring, cell, inside, middle, brightness, whiteness)
         update_excluded_places(grid, candidates)
     nothing = np.empty(0)
     return _WhiteCandidates(
@@ -207,83 +182,6 @@ def _select_brightest(brightness, whiteness, least):  # type: ignore[no-untyped-
     """The bright places of at least this whiteness, the brightest first, at most ``MAX_WHITE_CANDIDATES``."""
     bright = np.flatnonzero((brightness > MIN_WHITE_RATIO) & (whiteness >= least))
     return bright[np.argsort(-brightness[bright], kind="mergesort")][:MAX_WHITE_CANDIDATES]
-
-
-@compiled
-def _measure_inks(image, center, area, ink, known):  # type: ignore[no-untyped-def]
-    """``KnownCells.radius_px`` and ``level`` of the cells ``known`` (K,), and ``_InkColors``."""
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    radius, level = np.empty(known.shape[0]), np.full(known.shape[0], np.nan)
-    colors, count = np.empty((4, 3, known.shape[0])), np.zeros(4, np.int64)
-    buffers = allocate_sample_buffers()
-    patches = buffers.patches
-    for first in range(0, known.shape[0], BATCH_POINTS):
-        here = min(known.shape[0] - first, BATCH_POINTS)
-        for n in range(here):
-            i = known[first + n]
-            radius[first + n] = 0.1 * np.sqrt(area[i])
-            patches[X + n], patches[Y + n], patches[RADIUS + n] = (
-                center[i, 0],
-                center[i, 1],
-                radius[first + n],
-            )
-        fill_patch_means(flat, height, width, here, buffers)
-        for n in range(here):
-            if patches[INSIDE + n] > 0.0:
-                own, total = ink[known[first + n]], 0.0
-                for channel in range(3):
-                    value = patches[COLOR + channel * BATCH_POINTS + n]
-                    colors[own, channel, count[own]] = value
-                    total += value
-                count[own] += 1
-                level[first + n] = total
-    inks, strongest = np.zeros((4, 3)), np.zeros(3)
-    for channel in range(3):
-        for c in range(1, 4):
-            if count[c] > 0:
-                inks[c, channel] = np.median(colors[c, channel, : count[c]])
-                strongest[channel] = max(strongest[channel], inks[c, channel])
-    return radius, level, _InkColors(inks, strongest)
-
-
-@compiled
-def _measure_whiteness(image, means, strongest, is_far):  # type: ignore[no-untyped-def]
-    """(P,) the brightness relative to the inks, (P,) the whiteness, 0 for colored places, and (P, 3) the colors.
-
-    Far from the next cell a prediction may hit a colored cell: there the brightness is the whiteness.
-
-    Args:
-        means: (P, 4) of ``PredictedPlaces``. strongest: (3,) of ``_InkColors``.
-    """
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    count = means.shape[0]
-    ratio, white, color = np.zeros(count), np.zeros(count), np.zeros((count, 3))
-    buffers = allocate_sample_buffers()
-    patches = buffers.patches
-    for first in range(0, count, BATCH_POINTS):
-        here = min(count - first, BATCH_POINTS)
-        for n in range(here):
-            patches[X + n], patches[Y + n] = means[first + n, 0], means[first + n, 1]
-            patches[RADIUS + n] = means[first + n, 2]
-        fill_patch_means(flat, height, width, here, buffers)
-        for n in range(here):
-            level, own = means[first + n, 3], color[first + n]
-            ratio[first + n], white[first + n] = _fill_patch_color(patches, n, level, strongest, is_far, own)
-    return ratio, white, color
-
-
-@compiled
-def _fill_patch_color(patches, n, level, strongest, is_far, color):  # type: ignore[no-untyped-def]
-    """The brightness of patch n relative to the inks around, and its whiteness; writes its ``color`` (3,)."""
-    if not patches[INSIDE + n] > 0.0:
-        return 0.0, 0.0
-    total, weakest, most = 0.0, np.inf, 0.0
-    for channel in range(3):
-        color[channel] = patches[COLOR + channel * BATCH_POINTS + n]
-        share = color[channel] / max(strongest[channel], 1.0)
-        total, weakest, most = total + color[channel], min(weakest, share), max(most, share)
-    white = weakest if weakest > MIN_CHANNEL_BALANCE * most else 0.0
-    return white if is_far else total / max(level, 1.0), white
 
 
 @compiled
