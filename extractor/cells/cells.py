@@ -16,9 +16,7 @@ from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
 NEAREST_CELLS = 8  # cells with which an area is compared
 MIN_AREA_SHARE = 0.2  # of the neighbours' median area; smaller domains are dirt
-MIN_INTACT_SHARE = (
-    0.7  # of the neighbours' upper quartile; smaller cells have lost a part, their centers are shifted
-)
+MIN_INTACT_SHARE = 0.7  # of the neighbours' upper quartile; smaller cells are cut, their centers shifted
 # Radii within which cells are counted, in sides of a bucket. The five by five buckets around a point hold all cells
 # within 2; a disc of 1.1 holds about NEAREST_CELLS.
 COUNT_RADII = (1.99, 1.5, 1.25, 1.05, 0.9, 0.75)

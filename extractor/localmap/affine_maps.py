@@ -7,9 +7,7 @@ import numpy as np
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 
 MIN_SPREAD = 0.2  # least ratio of the neighbours' spread across to along; below it they lie on one line
-MAX_MISFIT = (
-    0.3  # of the distance to a neighbour, between its center and the prediction by the cell's own triangle
-)
+MAX_MISFIT = 0.3  # of the distance to a neighbour, from its center to the prediction by a triangle
 MIN_RIVAL_MISFIT = 0.8  # the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances
 
 

@@ -50,13 +50,13 @@ class KnownCells(NamedTuple):
     """The K cells that predict.
 
     Attributes:
-        index: (K,) int64, the cells of the image.
+        cells: (K,) int64, the cells of the image.
         basis: (K, 2, 2) float64, px per axial step.
         radius_px: (K,) float64, over which the cell's color is sampled.
         level: (K,) float64, the sum of its channels, NaN outside the image.
     """
 
-    index: NDArray[np.int64]
+    cells: NDArray[np.int64]
     basis: NDArray[np.float64]
     radius_px: NDArray[np.float64]
     level: NDArray[np.float64]
@@ -203,7 +203,7 @@ def predicted_places(center, known, grid, ring):  # type: ignore[no-untyped-def]
             for k in range(RING_STARTS[ring], RING_STARTS[ring + 1]):
                 n = grid.cell_lookup[q - DOWN_CELL_STEPS[k, 0], r - DOWN_CELL_STEPS[k, 1]]
                 if n >= 0:
-                    i, dq, dr = known.index[n], CENTER_VECTORS[k, 0], CENTER_VECTORS[k, 1]
+                    i, dq, dr = known.cells[n], CENTER_VECTORS[k, 0], CENTER_VECTORS[k, 1]
                     means[found, 0] += center[i, 0] + known.basis[n, 0, 0] * dq + known.basis[n, 0, 1] * dr
                     means[found, 1] += center[i, 1] + known.basis[n, 1, 0] * dq + known.basis[n, 1, 1] * dr
                     means[found, 2] += known.radius_px[n]

@@ -23,15 +23,9 @@ MAX_AGREED_SPREAD = 0.2  # in the triangle's shortest edge, the same for corners
 MIN_SHARP_SHARE = 0.6  # share of cells with triangles
 BORDER_PX = 3.0
 PREDICTED_WEIGHT = 0.05  # of a predicted corner, relative to a corner of a fitted triangle
-AGREED_DEVIATION = (
-    0.04  # standard deviation, in edges, of corners on which triangles agree, where gridlines bend
-)
-MAX_AMBIGUITY_RATIO = (
-    0.6  # of the least misfit to the next rotation's, below which the corners' identity is clear
-)
-MAX_PREDICTED_DEVIATION = (
-    0.15  # in edges, of a marker predicted by its neighbours, to confirm a corner of a triangle
-)
+AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend
+MAX_AMBIGUITY_RATIO = 0.6  # of the least misfit to the next rotation's; below it the orientation is clear
+MAX_PREDICTED_DEVIATION = 0.15  # in edges, of a marker whose prediction confirms a triangle's corner
 MAX_PREDICTED_DISTANCE = 0.1  # in edges, between that prediction and the corner
 MAX_DISTANCE_RATIO = 0.5  # of that distance to the one between the prediction and the averaged place
 MAX_PLACE_ERROR = 0.1  # in edges, between a marker's place by its gridlines and a correct initial place

@@ -29,9 +29,7 @@ MAX_FIT_CELLS = 16  # numbered cells nearest to the white cell, for its predicti
 MIN_FIT_CELLS = 3
 RIDGE = 0.02  # regularises the map's curvature where all these cells lie on one side
 MAX_PREDICTED_DEVIATION = 0.15  # of the prediction, in edges
-MAX_CENTROID_DISTANCE = (
-    0.3  # in edges, from the prediction to the centroid of the white; the next black cell is at 1
-)
+MAX_CENTROID_DISTANCE = 0.3  # in edges, from prediction to centroid of the white; the next black cell is at 1
 # Limits of whiteness, scaled from 0 for the palest of inks and black to 1 for the middle of the cell.
 MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE = 0.5, 0.25, 0.5
 MIN_INK_COSINE = 0.9  # between a color and an ink, both minus black

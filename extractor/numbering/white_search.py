@@ -29,9 +29,7 @@ from extractor.numbering.whiteness import measure_inks, measure_whiteness
 from extractor.numeric.compilation import compiled
 
 # Brightness is the sum of the channels, relative to that of the inks around.
-MIN_WHITE_RATIO = (
-    0.75  # of white; black stays below 0.5 even in heavy blur, dim white is brighter than any ink
-)
+MIN_WHITE_RATIO = 0.75  # of white; blurred black stays below 0.5, dim white is brighter than any ink
 MAX_BLACK_RATIO = 0.95  # between the inks: black is darker than the inks even in haze, other images are not
 MIN_BLACK_SHARE = 0.8  # of the places between three cells; the white cell and glare are among these places
 MIN_ENCLOSED_PLACES = 6  # such places; if fewer, places next to one or two cells count, too
@@ -127,11 +125,11 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
         image: (H, W, 3) uint8; center: (N, 2) px; axial: (N, 2) int32.
         known: ``KnownCells``. inks: ``InkColors``. layout: ``WhiteCellLayout``.
     """
-    grid, black = build_axial_grid(axial, known.index, known.level), np.empty(3)
+    grid, black = build_axial_grid(axial, known.cells, known.level), np.empty(3)
     for ring in range(RING_STARTS.shape[0] - 1):
         is_far = ring > 0
         if ring == 1:
-            update_excluded_misfits(grid, axial, known.index, layout.layers)
+            update_excluded_misfits(grid, axial, known.cells, layout.layers)
         places = predicted_places(center, known, grid, ring)
         shown = measure_whiteness(image, places.means, inks.strongest, is_far)
         if not is_far:
@@ -145,7 +143,7 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
             continue
         candidates = places.axial[bright]
         cell, inside, middle = _verify_placements(
-            image, center, axial, known.index, candidates, layout, inks.colors, black
+            image, center, axial, known.cells, candidates, layout, inks.colors, black
         )
         if inside.any():
             brightness, whiteness = shown.brightness[bright], shown.whiteness[bright]

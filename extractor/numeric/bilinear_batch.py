@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from extractor.numeric.bilinear import BORDER_PX, HEXAGON_POINTS, SUBPIXEL_STEPS
 from extractor.numeric.compilation import compiled
 
-FIXED_POINT_ONE, HALF_STEP = (
-    float(1 << 32),
-    1 << 23,
-)  # one pixel, and 0.5 / SUBPIXEL_STEPS px, as fixed points
+FIXED_POINT_ONE = float(1 << 32)  # one pixel
+HALF_STEP = 1 << 23  # 0.5 / SUBPIXEL_STEPS px
 BATCH_POINTS = 192  # points sampled together at most
 # Begins of columns: of ``fixed_points``, of ``channel_sums``, and with X and Y of ``patches``.
 X, Y, PIXEL_INDEX = (k * BATCH_POINTS for k in range(3))

@@ -20,20 +20,18 @@ from extractor.numeric.nearest_points import BucketGrid, fill_nearest_points
 JOINT_GAP = 1.7  # cells not farther than this from a numbered one, in cells, are numbered in one round,
 JOINT_GAP_RATIO = 1.25  # and cells not farther than this many times the least gap
 MAX_PLACE_MISFIT = 0.3  # in cells, between a cell's predicted place and the layout's cell
-RIVAL_DISTANCE = (
-    1.5  # in cells, within which two may be fragments of one; the next of the same ink is 1.7 away
-)
+RIVAL_DISTANCE = 1.5  # in cells, between possible fragments of one cell; the next cell of the ink is at 1.7
 
 
 class SupportCells(NamedTuple):
     """The numbered intact cells from which places in the layout are predicted.
 
     Attributes:
-        index: (K,) int64, the cells of the image.
+        cells: (K,) int64, the cells of the image.
         grid: the ``BucketGrid`` of their centers, px.
     """
 
-    index: NDArray[np.int64]
+    cells: NDArray[np.int64]
     grid: BucketGrid
 
 
@@ -121,7 +119,7 @@ def _update_gaps(cells, support, cell, assignments):  # type: ignore[no-untyped-
             assignments.gap[n], assignments.is_evaluated[n] = np.inf, True
             continue
         fill_nearest_points(support.grid, cells.center_px[i, 0], cells.center_px[i, 1], nearest, squares)
-        assignments.gap[n] = np.sqrt(squares[0]) / equilateral_edge(cells.area_px[support.index[nearest[0]]])
+        assignments.gap[n] = np.sqrt(squares[0]) / equilateral_edge(cells.area_px[support.cells[nearest[0]]])
         if not assignments.is_evaluated[n] and not assignments.gap[n] < 2.0 * MAX_SUPPORT_DISTANCE:
             # to be evaluated again after any new number
             assignments.support_radius2[n], assignments.is_evaluated[n] = np.inf, True
@@ -191,7 +189,7 @@ def _update_cell_assignment(cells, layout, n, support, cell, free, assignments, 
     center, nearest, squares = cells.center_px, assignments.nearest, assignments.squared_distance
     i = assignments.candidate[n]
     count = fill_nearest_points(support.grid, center[i, 0], center[i, 1], nearest, squares)
-    predicted = fill_quadratic_map(center, i, support.index, nearest[:count], squares, cell, layout, buffers)
+    predicted = fill_quadratic_map(center, i, support.cells, nearest[:count], squares, cell, layout, buffers)
     place = _nearest_place_of_ink(free, predicted, cells.ink[i], layout)
     assignments.support_radius2[n] = squares[count - 1] if count == SUPPORT_CELLS else np.inf
     assignments.place[n], assignments.is_evaluated[n] = place, True

@@ -20,9 +20,7 @@ from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
 MAX_CORNER_DISTANCE = 0.3  # of the shorter edge, between the corners of two triangles at one marker
 MAX_PREDICTED_DISTANCE = 0.35  # of two neighbours' distance, from a center to the other triangle's prediction
-MAX_MAP_DIFFERENCE = (
-    0.5  # of a map's size, between the maps of two cells; a rotation by 120 degrees makes 1.7
-)
+MAX_MAP_DIFFERENCE = 0.5  # between two cells' maps, of a map's size; a rotation by 120 degrees makes 1.7
 TURN_NOT_EVALUATED = -2
 MAX_NEIGHBOUR_DISTANCE = 1.6  # of an edge, between the centers of neighbours without triangles
 # A cell and its neighbour along ``NEIGHBOUR_STEPS`` share this corner of the cell, and this one of the neighbour.

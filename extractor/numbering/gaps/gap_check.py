@@ -33,10 +33,8 @@ MAX_SINGLE_JUMP = 0.9  # of a cell without contacts: its center may be shifted
 MAX_GAP = 5.0  # between the two sides, in cells
 MAX_GAP_RATIO = 1.5  # vectors of a block not longer than this many times its shortest are compared
 COMPARED_CELLS = 3  # consistent cells with which each cell is compared
-WHITE_CELL_NEIGHBOURS = (
-    5  # numbered cells nearest to the white cell that predict its place; least number of them
-)
-MIN_WHITE_CELL_NEIGHBOURS = 3
+WHITE_CELL_NEIGHBOURS = 5  # numbered cells nearest to the white cell, which predict its place
+MIN_WHITE_CELL_NEIGHBOURS = 3  # least number of them
 MAX_WHITE_CELL_MISFIT = 1.0  # in cells, the median distance from the predictions; a wrong step makes 1.7
 REFERENCE_CANDIDATES = 3  # cells nearest to the white one, of which the largest block is the reference
 
