@@ -21,7 +21,7 @@ from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 MAX_CORNER_DISTANCE = 0.3  # of the shorter edge, between the corners of two triangles at one marker
 MAX_PREDICTED_DISTANCE = 0.35  # of two neighbours' distance, from a center to the other triangle's prediction
 MAX_MAP_DIFFERENCE = 0.5  # between two cells' maps, of a map's size; a rotation by 120 degrees makes 1.7
-TURN_NOT_EVALUATED = -2
+NOT_EVALUATED = -2
 MAX_NEIGHBOUR_DISTANCE = 1.6  # of an edge, between the centers of neighbours without triangles
 # A cell and its neighbour along ``NEIGHBOUR_STEPS`` share this corner of the cell, and this one of the neighbour.
 OWN_CORNER = np.array([1, 2, 2, 0, 0, 1])
@@ -35,7 +35,7 @@ class PartialNumbering(NamedTuple):
         cell: (N,) int32, the layout's cell of each cell of the image, or -1.
         free: (U,) bool, the layout's cells without a cell of the image.
         first_corner: (N,) int64, which corner of a numbered cell's triangle is corner 0; -1 unknown,
-            ``TURN_NOT_EVALUATED`` before the first use.
+            ``NOT_EVALUATED`` before the first use.
         maps: (N, 2, 2) float64, px per mm, by ``first_corner``.
         image_cell: (U,) int32, the cells of the image at the beginning, or -1; they orient triangles.
     """
@@ -49,11 +49,11 @@ class PartialNumbering(NamedTuple):
 
 @compiled
 def begin_numbering(cell, free):  # type: ignore[no-untyped-def]
-    """The ``PartialNumbering`` that starts from ``cell`` (N,), a copy, and ``free`` (U,), which it refers to."""
+    """The ``PartialNumbering`` that starts from copies of ``cell`` (N,) and ``free`` (U,)."""
     return PartialNumbering(
         cell.copy(),
-        free,
-        np.full(cell.shape[0], TURN_NOT_EVALUATED, np.int64),
+        free.copy(),
+        np.full(cell.shape[0], NOT_EVALUATED, np.int64),
         np.empty((cell.shape[0], 2, 2)),
         image_cell_of_layout_cell(cell, free.shape[0]),
     )
@@ -251,7 +251,7 @@ def _has_free_neighbour(layout, u, free):  # type: ignore[no-untyped-def]
 @inlined_no_refcount
 def update_first_corner(cells, i, layout, corner_step, numbering):  # type: ignore[no-untyped-def]
     """The first corner of the numbered cell i, -1 unknown; evaluated and stored with its map at the first use."""
-    if numbering.first_corner[i] == TURN_NOT_EVALUATED:
+    if numbering.first_corner[i] == NOT_EVALUATED:
         numbering.first_corner[i] = fill_map_by_neighbours(
             cells, i, numbering.cell[i], numbering.image_cell, layout, corner_step, numbering.maps[i]
         )

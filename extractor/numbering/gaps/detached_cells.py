@@ -115,7 +115,7 @@ def _free_places_and_candidates(ink, cell, layout_ink):  # type: ignore[no-untyp
 def _number_outward(cells, candidates, cell, free, layout, corner_step):  # type: ignore[no-untyped-def]
     """(N,) int32, ``cell`` with numbers of ``candidates`` (N,) added, round by round outward from the numbered cells.
 
-    ``free`` (U,) are the free cells of the layout before.
+    ``free`` (U,) bool are the free cells of the layout.
     """
     numbering, is_intact = begin_numbering(cell, free), cells.is_intact
     unnumbered = np.flatnonzero(candidates)
