@@ -1,10 +1,10 @@
-"""Stage 6: the cells' centers become a triangular mesh; its triangles are the markers and the black cells.
+"""Stage 6: the cell mesh, a triangular mesh through the cells' centers; its faces are the markers and the black cells.
 
-The centers of the colored cells form a lattice as regular as the pattern's own, and a center stays where it is
-when blur has long eaten the corners. Every marker is a triangle of a red, a green and a blue center, and so is
-every black cell; the two kinds turn in opposite directions. In that lattice, cells of one ink are second
-neighbours: an edge of the mesh that joins two of them runs across the wrong diagonal and is flipped, so that the
-colors find the right neighbours even where shear has made the wrong ones nearer.
+The centers of the colored cells form a lattice as regular as the pattern's own, and blur that rounds the corners moves
+no center. Every marker is a triangle of a red, a green and a blue center, and so is every black cell; the two kinds
+turn in opposite directions. Cells of one ink are second neighbours in that lattice: an edge of the mesh between two of
+them is the wrong diagonal and is flipped. So colors determine the right neighbours even where shear has made wrong ones
+nearer.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.numeric.delaunay import delaunay
 
 MAX_FLIP_ROUNDS = 12
-# A triangle of three neighbouring centers is as large as a cell; one that spans a gap is at least twice that.
+# Area of a face relative to its cells' mean area: about 1 for three neighbours, at least 2 across a gap.
 MIN_AREA_RATIO = 0.4
 MAX_AREA_RATIO = 1.9
-# Neighbouring cells share a corner (eq. 5): L in units of the edge of an equilateral cell of the smaller area.
+# L of eq. 5 (neighbouring cells share a corner), in edges of an equilateral cell of the smaller area.
 MAX_CORNER_GAP = 0.4
 
 
@@ -31,9 +31,9 @@ class CellMesh:
     """Stage 6.
 
     Attributes:
-        faces: (F, 3) int32, the cells of each triangle as red, green, blue; -1 thrice where it is none.
-        neighbours: (F, 3) int32, the face across the edge opposite to that cell, or -1.
-        turn: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 for no face.
+        faces: (F, 3) int32, the red, green and blue cell of each face; -1 thrice for a triangle that is no face.
+        neighbours: (F, 3) int32, the face across the edge opposite to each cell, or -1.
+        orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
     """
 
     faces: NDArray[np.int32]
@@ -43,20 +43,20 @@ class CellMesh:
 
 @inlined_no_refcount
 def _index_in_row(rows, i, value):  # type: ignore[no-untyped-def]
-    """The place of a value among the three of row i."""
+    """The column of a value in row i of ``rows`` (N, 3)."""
     return 0 if rows[i, 0] == value else 1 if rows[i, 1] == value else 2
 
 
 @inlined_no_refcount
 def _doubled_area(xy, a, b, c):  # type: ignore[no-untyped-def]
-    """Twice the signed area of a, b, c; positive clockwise with y down."""
+    """Twice the signed area of the points a, b, c; positive if clockwise, y down."""
     x, y = xy[a, 0], xy[a, 1]
     return (xy[b, 0] - x) * (xy[c, 1] - y) - (xy[b, 1] - y) * (xy[c, 0] - x)
 
 
 @compiled
 def _update_flipped_edges(points, ink, faces, neighbours):  # type: ignore[no-untyped-def]
-    """Flip edges between cells of one ink, in place, where the other diagonal joins two different inks."""
+    """Flip edges between cells of one ink where the other diagonal joins two other inks."""
     for _ in range(MAX_FLIP_ROUNDS):
         flips = 0
         for f in range(faces.shape[0]):
@@ -69,7 +69,7 @@ def _update_flipped_edges(points, ink, faces, neighbours):  # type: ignore[no-un
                 d = faces[g, j]
                 if ink[a] != ink[b] or ink[c] == ink[d] or ink[c] == ink[a] or ink[d] == ink[a]:
                     continue
-                # the four must be convex: both new triangles turn the same way
+                # the quadrilateral must be convex: both new triangles turn the same way
                 if _doubled_area(points, c, a, d) * _doubled_area(points, c, d, b) <= 0.0:
                     continue
                 beyond_bc, beyond_ca = neighbours[f, (k + 1) % 3], neighbours[f, (k + 2) % 3]
@@ -92,7 +92,7 @@ def _update_flipped_edges(points, ink, faces, neighbours):  # type: ignore[no-un
 
 @inlined_no_refcount
 def _has_shared_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
-    """True when two cells have a corner in common, or when one of them has no triangle to tell."""
+    """Whether cells a and b have a common corner; true if one of them has no triangle."""
     if np.isnan(corner[a, 0, 0]) or np.isnan(corner[b, 0, 0]):
         return True
     limit = MAX_CORNER_GAP * MAX_CORNER_GAP * min(area[a], area[b]) * 4.0 / np.sqrt(3.0)
@@ -106,11 +106,11 @@ def _has_shared_corner(corner, area, a, b):  # type: ignore[no-untyped-def]
 
 @compiled
 def _classify_faces(points, ink, area, corner, faces, neighbours):  # type: ignore[no-untyped-def]
-    """Put every face in the order red, green, blue and drop those that are neither a marker nor a black cell."""
+    """The fields of ``CellMesh``: corners as red, green, blue; only triangles that are markers or black cells."""
     count = faces.shape[0]
     ordered = np.full((count, 3), -1, np.int32)
     across = np.full((count, 3), -1, np.int32)
-    turn = np.zeros(count, np.int8)
+    orientation = np.zeros(count, np.int8)
     for f in range(count):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
@@ -126,19 +126,23 @@ def _classify_faces(points, ink, area, corner, faces, neighbours):  # type: igno
         for k in range(3):
             ordered[f, ink[faces[f, k]] - 1] = faces[f, k]
             across[f, ink[faces[f, k]] - 1] = neighbours[f, k]
-        turn[f] = 1 if _doubled_area(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0 else -1
+        is_clockwise = _doubled_area(points, ordered[f, 0], ordered[f, 1], ordered[f, 2]) > 0.0
+        orientation[f] = 1 if is_clockwise else -1
     for f in range(count):
         for k in range(3):
             g = across[f, k]
-            if g >= 0 and turn[g] != -turn[f]:
+            if g >= 0 and orientation[g] != -orientation[f]:
                 across[f, k] = -1
-    return ordered, across, turn
+    return ordered, across, orientation
 
 
 def build_cell_mesh(cells: Cells) -> CellMesh | None:
-    """Stage 6: Delaunay triangles of the centers, corrected by color; None with fewer than three cells."""
+    """Stage 6: Delaunay triangles of the centers, corrected by color.
+
+    Returns None with fewer than three cells, or with all centers on one line.
+    """
     faces, neighbours = delaunay(cells.center_px)
-    if len(faces) == 0:  # all on one line
+    if len(faces) == 0:
         return None
     _update_flipped_edges(cells.center_px, cells.ink, faces, neighbours)
     return CellMesh(

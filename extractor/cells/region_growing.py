@@ -12,8 +12,8 @@ from extractor.image.color import HUES
 from extractor.image.ink_segmentation import Segmentation
 from extractor.numeric.compilation import compiled, vectorized_no_refcount
 
-GROW_THRESHOLD = 0.15  # the article's, for eq. 3 over OpenCV's 8-bit HSV
-BORDER = -1  # the owner of what lies around the image
+GROW_THRESHOLD = 0.15  # of eq. 3 over OpenCV's 8-bit HSV, as in the article
+BORDER = -1  # region number of the frame around the image
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +21,11 @@ class Regions:
     """Stage 4.
 
     Attributes:
-        owner: (H, W) int32, the region that a pixel belongs to, counted from 1; 0 is none.
+        region_map: (H, W) int32, the region of each pixel, counted from 1; 0 for none.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
-        seed: (N, 2) int32, the pixel about which the moments are taken.
-        moments: (N, 10) float64: sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
-        domain_px: (N,) int64, the area of the domain that the seed stood for.
+        seed: (N, 2) int32, x and y of the pixel about which the moments are taken.
+        moments: (N, 10) float64, sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
+        domain_px: (N,) int64, the area of the seed's domain, px^2.
     """
 
     region_map: NDArray[np.int32]
@@ -37,7 +37,7 @@ class Regions:
 
 @vectorized_no_refcount
 def _fill_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[no-untyped-def]
-    """Write the moments of the first pixels about (x0, y0); whole numbers all, so that their order does not matter."""
+    """Write a region's moments about (x0, y0); all sums are integers, so that their order does not matter."""
     m1, m2, m3, m4, m5, m6, m7, m8, m9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(np.uint64(count)):
         x, y = float(x_of[i] - x0), float(y_of[i] - y0)
@@ -57,23 +57,23 @@ def _fill_moments(x_of, y_of, count, x0, y0, moments, region):  # type: ignore[n
 
 @compiled
 def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[no-untyped-def]
-    """Grow every seed in waves of 4-neighbours; a wave is judged against the mean of all waves before it.
+    """Grow every seed in waves of 4-neighbours; a wave is compared with the mean of all waves before it.
 
-    Returns the owners in a frame one pixel wide that nothing grows into, and the moments.
+    Returns the region map with a frame of ``BORDER`` one pixel wide, and the moments.
     """
     height, width = label.shape
-    wide = width + 2
-    owner = np.full((height + 2, wide), BORDER, np.int32)
+    framed_width = width + 2
+    owner = np.full((height + 2, framed_width), BORDER, np.int32)
     owner[1:-1, 1:-1] = 0
     owners, labels, colors = owner.reshape(-1), label.reshape(-1), hsv.reshape(-1)
-    queue = np.empty(limit_px + 2, np.int32)  # of pixels
-    framed = np.empty(limit_px + 2, np.int32)  # the same in the frame
+    queue = np.empty(limit_px + 2, np.int32)  # indices of pixels in the image
+    framed = np.empty(limit_px + 2, np.int32)  # indices of the same pixels in the framed map
     moments = np.zeros((seed_xy.shape[0], MOMENT_TERMS))
     limit2 = threshold * threshold
     half, one, two = HUES // 2, np.uint64(1), np.uint64(2)
     for region in range(seed_xy.shape[0]):
         sx, sy, ink = seed_xy[region, 0], seed_xy[region, 1], seed_ink[region]
-        first, start = sy * width + sx, (sy + 1) * wide + sx + 1
+        first, start = sy * width + sx, (sy + 1) * framed_width + sx + 1
         if owners[start] != 0:
             continue
         queue[0], framed[0] = first, start
@@ -86,7 +86,8 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
             wave_end = end
             for i in range(begin, wave_end):
                 for side in range(4):
-                    step = 1 if side == 0 else -1 if side == 1 else wide if side == 2 else -wide
+                    row_step = framed_width if side == 2 else -framed_width
+                    step = 1 if side == 0 else -1 if side == 1 else row_step
                     to = np.uint64(framed[i] + step)
                     if owners[to] != 0:
                         continue
@@ -96,28 +97,28 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
                         continue
                     at = np.uint64(3) * pixel
                     h, s, v = float(colors[at]), float(colors[at + one]), float(colors[at + two])
-                    # circular: the pixel's hue is unwrapped to the side of the mean on which it lies
+                    # hue is circular: the difference is unwrapped to the nearer side of the mean
                     dh = h - mean_h
                     dh += HUES if dh < -half else -HUES if dh >= half else 0.0
                     ds, dv = s - mean_s, v - mean_v
                     scale = (mean_h + dh) * mean_h + s * mean_s + v * mean_v
-                    near = dh * dh + ds * ds + dv * dv < limit2 * scale
-                    # written over where it is not near: in noise, that branch can not be guessed
+                    is_similar = dh * dh + ds * ds + dv * dv < limit2 * scale
+                    # a rejected pixel is overwritten: in noise, a branch would be unpredictable
                     queue[end], framed[end] = pixel, to
-                    owners[to] = region + 1 if near else 0
-                    end += near
-                    away = h - h0
-                    away += HUES if away < -half else -HUES if away >= half else 0.0
-                    sum_h += away if near else 0.0
-                    sum_s += s if near else 0.0
-                    sum_v += v if near else 0.0
+                    owners[to] = region + 1 if is_similar else 0
+                    end += is_similar
+                    dh0 = h - h0
+                    dh0 += HUES if dh0 < -half else -HUES if dh0 >= half else 0.0
+                    sum_h += dh0 if is_similar else 0.0
+                    sum_s += s if is_similar else 0.0
+                    sum_v += v if is_similar else 0.0
             begin = wave_end
             mean_h = h0 + sum_h / end
             mean_h += HUES if mean_h < 0.0 else -HUES if mean_h >= HUES else 0.0
             mean_s = sum_s / end
             mean_v = sum_v / end
         if end > limit_px:
-            continue  # a leak or a background: no cell is that large
+            continue  # a leak or the background: no cell is that large
         _update_to_coordinates(queue, framed, end, width)
         _fill_moments(queue, framed, end, sx, sy, moments, region)
     return owner, moments
@@ -125,17 +126,16 @@ def _grow(hsv, label, seed_xy, seed_ink, limit_px, threshold):  # type: ignore[n
 
 @vectorized_no_refcount
 def _update_to_coordinates(queue, framed, count, width):  # type: ignore[no-untyped-def]
-    """Write each pixel's x over its number, and its y over the one in the frame: the two differ by the frame's pixels
-    before it."""
+    """Replace each pixel's indices by its x and y; their difference is the number of frame pixels before it."""
     for i in range(np.uint64(count)):
         y = (framed[i] - queue[i] - width - 3) >> 1
         queue[i], framed[i] = queue[i] - y * width, y
 
 
 def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
-    """Stage 4 (AGA): from each seed, add 4-neighbours while eq. 3 stays below 0.15 and update the mean as it grows.
+    """Stage 4 (AGA): add 4-neighbours to each seed while eq. 3 stays below 0.15, with the mean updated after each wave.
 
-    Eq. 3 is taken over OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of hue are circular;
+    Eq. 3 uses OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of hue are circular;
     ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
     """
     limit_px = segmentation.label.size // 6

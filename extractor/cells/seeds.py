@@ -1,9 +1,10 @@
-"""Stage 3: one seed per domain of an ink, and what its domain looks like."""
+"""Stage 3: the pixel domains of the inks, one seed for each, and the domains' moments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +12,40 @@ from numpy.typing import NDArray
 from extractor.image.ink_segmentation import Segmentation
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 
-MIN_DOMAIN_PX = 4
-# In a crowd, a cell has edges of 5 px at least, and of its area no less than a convex shape has for the spread of its
-# pixels (the root of their covariance's determinant): a triangle 10.4 times, an ellipse 12.6 times.
-MIN_CLUTTERED_PX = 12
+MIN_DOMAIN_PX = 4  # px^2
+MIN_CLUTTERED_PX = 12  # px^2, of a domain in a cluttered image: a cell with edges of 5 px
+# Area of a domain in a cluttered image, relative to the root of the determinant of its pixels' covariance: a triangle
+# has 10.4, an ellipse 12.6, ragged shapes have less.
 MIN_SOLIDITY = 8.0
 NO_DOMAIN_LIMIT = 1 << 62
-SAFE_AREA_PX = 20  # a cell with edges of 7 px
-MAX_SMALL_SHARE = 1 / 6  # of the domains
+SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px
+MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX
 MOMENT_TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy about the seed
+
+
+class SeedPoints(NamedTuple):
+    """The seeds of N domains.
+
+    Attributes:
+        xy: (N, 2) int32, the pixel of the domain nearest to its center.
+        center: (N, 2) float64, the domain's geometric center, px.
+        ink: (N,) uint8, 1 red, 2 green, 3 blue.
+    """
+
+    xy: NDArray[np.int32]
+    center: NDArray[np.float64]
+    ink: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Stage 3: one seed per domain, which is looked for when it is first asked for.
+    """Stage 3: one seed per domain, computed at its first use.
 
     Attributes:
-        area_px: (N,) int64, the domain's area.
+        area_px: (N,) int64, the domain's area, px^2.
         runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
-        domain: (R,) int32, the domain that a run belongs to.
-        crowded: there were more domains than any pattern explains, and of those only what a cell could be is left.
+        domain: (R,) int32, the domain of each run.
+        cluttered: there were more domains than any pattern explains; only those that may be cells are kept.
     """
 
     area_px: NDArray[np.int64]
@@ -40,27 +55,28 @@ class Seeds:
 
     @property
     def xy(self) -> NDArray[np.int32]:
-        """(N, 2) the pixel to grow from."""
-        return self._seed_properties[0]
+        """(N, 2) int32, x and y of the seed."""
+        return self.points.xy
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """(N, 2) the domain's geometric center."""
-        return self._seed_properties[1]
+        """(N, 2) float64, the domain's geometric center, px."""
+        return self.points.center
 
     @property
     def ink(self) -> NDArray[np.uint8]:
-        """(N,) 1 red, 2 green, 3 blue."""
-        return self._seed_properties[2]
+        """(N,) uint8, 1 red, 2 green, 3 blue."""
+        return self.points.ink
 
     @cached_property
-    def _seed_properties(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]:
+    def points(self) -> SeedPoints:
+        """The seeds."""
         return _seed_points(self.runs, self.domain, self.area_px)  # type: ignore[no-any-return]
 
 
 @compiled
 def _count_runs(label):  # type: ignore[no-untyped-def]
-    """How many horizontal runs of one ink there are."""
+    """The number of horizontal runs of one ink in ``label`` (H, W)."""
     count = 0
     for y in range(label.shape[0]):
         row = label[y]
@@ -72,7 +88,7 @@ def _count_runs(label):  # type: ignore[no-untyped-def]
 
 @inlined_no_refcount
 def _update_and_find_root(parent, i):  # type: ignore[no-untyped-def]
-    """The first run of the domain that run i belongs to; the path to it is halved on the way."""
+    """The first run of the domain of run i; halves the path to it in ``parent`` (R,)."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -81,13 +97,16 @@ def _update_and_find_root(parent, i):  # type: ignore[no-untyped-def]
 
 @compiled
 def _find_runs(label):  # type: ignore[no-untyped-def]
-    """Horizontal runs of one ink, each joined with the touching runs of its ink in the row above (4-neighbours).
+    """The horizontal runs of one ink, connected with the adjacent runs of their ink in the row above (4-neighbours).
 
-    Returns (R, 4) int32 of y, first x, last x, ink, and (R,) int32 an earlier run of each run's domain, or itself.
+    Returns (R, 4) int32, y, first x, last x and ink; and (R,) int32, an earlier run of the domain of each run, or the
+    run itself.
     """
     height, width = label.shape
     runs = np.empty((_count_runs(label) + 1, 4), np.int32)
-    begin = np.empty(width + 1, np.int32)  # where the stretches of a row begin, those without ink among them
+    begin = np.empty(
+        width + 1, np.int32
+    )  # the begins of a row's stretches of equal label, with or without ink
     count = 0
     for y in range(height):
         row = label[y]
@@ -126,32 +145,34 @@ def _find_runs(label):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _find_domains(runs, parent, crowd):  # type: ignore[no-untyped-def]
-    """The runs of the domains that are large enough, or, where there are more than ``crowd``, that a cell could be;
-    (R,) int32 the domain of each; the domains' areas; and whether there are more."""
+def _find_domains(runs, parent, max_domains):  # type: ignore[no-untyped-def]
+    """Select the domains that are large enough, or, of more than ``max_domains``, those that may be cells.
+
+    Returns their runs, (R,) int32 the domain of each run, the domains' areas, and whether there were more domains.
+    """
     domain, area = np.empty(runs.shape[0], np.int32), np.zeros(runs.shape[0], np.int64)
     count = 0
     for i in range(runs.shape[0]):
         first, d = parent[i] == i, domain[parent[i]]
-        d = count if first else d  # of both, so that no branch is to be guessed
+        d = count if first else d  # without a branch, which would be unpredictable
         domain[i] = d
         count += first
         area[d] += runs[i, 2] - runs[i, 1] + 1
     area = area[:count]
-    crowded = np.count_nonzero(area >= MIN_DOMAIN_PX) > crowd
+    cluttered = np.count_nonzero(area >= MIN_DOMAIN_PX) > max_domains
     runs, domain, area = _select_domains(
-        runs, domain, area, area >= (MIN_CLUTTERED_PX if crowded else MIN_DOMAIN_PX)
+        runs, domain, area, area >= (MIN_CLUTTERED_PX if cluttered else MIN_DOMAIN_PX)
     )
-    if crowded:
+    if cluttered:
         runs, domain, area = _select_domains(
             runs, domain, area, area >= MIN_SOLIDITY * _covariance_root(runs, domain, area)
         )
-    return runs, domain, area, crowded
+    return runs, domain, area, cluttered
 
 
 @compiled
 def _select_domains(runs, domain, area, keep):  # type: ignore[no-untyped-def]
-    """The runs of the domains to keep, these numbered anew, and their areas."""
+    """The runs of the domains to ``keep`` (D,), the renumbered domain of each, and the domains' areas."""
     number, few, own = np.empty(area.shape[0], np.int32), 0, 0
     for d in range(area.shape[0]):
         number[d] = few
@@ -161,7 +182,7 @@ def _select_domains(runs, domain, area, keep):  # type: ignore[no-untyped-def]
     some, of = np.empty_like(runs), np.empty_like(domain)
     for i in range(domain.shape[0]):
         d = domain[i]
-        # written over where it is not kept: no branch is to be guessed
+        # a run not kept is overwritten: a branch would be unpredictable
         some[own, 0], some[own, 1], some[own, 2], some[own, 3] = (
             runs[i, 0],
             runs[i, 1],
@@ -175,7 +196,7 @@ def _select_domains(runs, domain, area, keep):  # type: ignore[no-untyped-def]
 
 @compiled
 def _covariance_root(runs, domain, area):  # type: ignore[no-untyped-def]
-    """(D,) the root of the determinant of the covariance of each domain's pixels, px^2."""
+    """(D,) float64, px^2, the root of the determinant of the covariance of each domain's pixels."""
     sums = np.zeros((area.shape[0], 5))
     for i in range(domain.shape[0]):
         d, y, length = domain[i], runs[i, 0], runs[i, 2] - runs[i, 1] + 1
@@ -197,7 +218,7 @@ def _covariance_root(runs, domain, area):  # type: ignore[no-untyped-def]
 
 @compiled
 def _seed_points(runs, domain, area):  # type: ignore[no-untyped-def]
-    """Per domain: the pixel of it nearest to its geometric center, that center and its ink."""
+    """``SeedPoints`` of the domains."""
     count = area.shape[0]
     ink, center = np.empty(count, np.uint8), np.zeros((count, 2))
     for i in range(runs.shape[0]):
@@ -219,33 +240,36 @@ def _seed_points(runs, domain, area):  # type: ignore[no-untyped-def]
             best[d] = distance
             xy[d, 0] = x
             xy[d, 1] = runs[i, 0]
-    return xy, center, ink
+    return SeedPoints(xy, center, ink)
 
 
-def find_seeds(segmentation: Segmentation, crowd: int = NO_DOMAIN_LIMIT) -> Seeds:
-    """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are clutter.
+def find_seeds(segmentation: Segmentation, max_domains: int = NO_DOMAIN_LIMIT) -> Seeds:
+    """Stage 3: one seed per domain; domains of fewer than ``MIN_DOMAIN_PX`` pixels are ignored.
 
-    The seed is the geometric center, or the domain's pixel nearest to it where the domain is not convex.
+    The seed is the domain's pixel nearest to its geometric center.
 
     Args:
-        crowd: where there are more domains than this, small and ragged ones are clutter, too: an image of noise has
-            many times more than any pattern.
+        segmentation: the ink of every pixel.
+        max_domains: of more domains than this, small and ragged ones are ignored, too: an image of noise has many times
+            more domains than any pattern.
     """
     runs, parent = _find_runs(segmentation.label)
-    runs, domain, area_px, crowded = _find_domains(runs, parent, crowd)
-    return Seeds(area_px, runs, domain, crowded)
+    runs, domain, area_px, cluttered = _find_domains(runs, parent, max_domains)
+    return Seeds(area_px, runs, domain, cluttered)
 
 
 @compiled
 def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
-    """(N, 10) the moments of whole domains, as ``Regions`` has them of what has grown: a run's at once, from its middle
-    and its length; in halves, quarters and eighths of whole numbers, which are exact."""
+    """(N, 10) float64, the moments of domains about their seeds, as ``Regions.moments`` of grown regions.
+
+    Each run is added at once, by its middle and length. All numbers are exact: multiples of 1/8.
+    """
     out = np.zeros((seed_xy.shape[0], MOMENT_TERMS))
     for i in range(runs.shape[0]):
         d = domain[i]
         y, length = float(runs[i, 0] - seed_xy[d, 1]), float(runs[i, 2] - runs[i, 1] + 1)
         middle = 0.5 * float(runs[i, 1] + runs[i, 2]) - float(seed_xy[d, 0])
-        spread = length * (length * length - 1.0) / 12.0  # the sum of the squares about the middle
+        spread = length * (length * length - 1.0) / 12.0  # sum of squares about the middle
         x = length * middle
         xx = x * middle + spread
         out[d, 0] += length
@@ -262,5 +286,5 @@ def domain_moments(runs, domain, seed_xy):  # type: ignore[no-untyped-def]
 
 
 def has_large_domains(seeds: Seeds) -> bool:
-    """Whether at most a few of the domains are too small to be recognised safely."""
+    """Whether only few domains are too small for safe recognition."""
     return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL_SHARE

@@ -1,8 +1,8 @@
-"""Where the edges of triangles lie: those of many triangles at once, each a lane of loops without branches.
+"""Measures the edges of triangles with sub-pixel accuracy, of many triangles together in branch-free loops.
 
-The ink's profile across an edge, 1 inside and 0 outside, is integrated: its area is the edge's position whatever the
-blur, so no blur has to be known. The line through two such positions is the edge. Profiles run along the median, not
-the normal: so they stay clear of the other edges in any triangle.
+The ink's profile across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position for any
+blur, so that the blur need not be known. The edge is the line through two such positions. Profiles run along the
+median, not the normal, so that they avoid the other edges in any triangle.
 """
 
 from __future__ import annotations
@@ -28,24 +28,22 @@ from extractor.numeric.bilinear_batch import (
 )
 from extractor.numeric.compilation import compiled
 
-FIRST_PROFILE = 0.25  # of an edge, where its first profile crosses it; the second does as far from its end
+FIRST_PROFILE = 0.25  # of an edge, from its start to the first profile, and from the second one to its end
 HALF_PROFILE = 4  # samples on each side of an edge
-BORDER_MARGIN_PX = (
-    0.01  # px, that profiles stay away from the last row and column, more than half a step of a sample
-)
-PROFILE_REACH = 0.8  # reach of a profile in units of the way from the cell's center to the middle of the edge
-FINE_REACH_PX = 8.0  # profiles that reach farther are followed by narrower ones,
-MAX_PASSES = 3  # so often at most
-MIN_DEPTH_PX = 0.3  # of an edge, from the cell's center
-MIN_CONTRAST = 12.0  # of an ink against what lies beyond its edge, over the three channels, 8-bit
+BORDER_MARGIN_PX = 0.01  # from profiles to the last row and column; more than half a sub-pixel step
+PROFILE_REACH = 0.8  # half length of a profile, in vectors from the cell's center to the edge's middle
+FINE_REACH_PX = 8.0  # longer profiles are followed by shorter ones,
+MAX_PASSES = 3  # in so many passes at most
+MIN_DEPTH_PX = 0.3  # distance of an edge from the cell's center
+MIN_CONTRAST = 12.0  # norm over the three 8-bit channels, between the ink and the color outside the edge
 MIN_SINE = 0.05  # two edges that meet at less than 3 degrees have no corner
 MAX_CORNER_SHIFT = 1.0  # in units of the corner's distance from the center
-MIN_PROFILE_LEVEL, MAX_PROFILE_LEVEL = -0.2, 1.2  # between which a profile is held
-BATCH_CELLS = BATCH_POINTS // 3  # triangles at once
-# Columns of what is known of an edge: its ends, the center of its cell and how far the first corner is from there; the
-# reach of profiles; the normal, the edge's distance from the center, the way from there to its middle; the color of
-# its ink; what turns a color into a share of ink, and what is taken off; 1 if it can be drawn; where the profiles
-# cross it, how they step, and the areas under them; the line n . p = d.
+MIN_PROFILE_LEVEL, MAX_PROFILE_LEVEL = -0.2, 1.2  # to which a profile is limited
+BATCH_CELLS = BATCH_POINTS // 3  # triangles measured together
+# Columns of the edges' table: the ends; the cell's center and the distance of its first corner from the center; the
+# profiles' reach; the normal, the edge's distance from the center and the vector from the center to its middle; the
+# ink's color; the weights that turn a color into a share of ink, and the background's weighted color; 1 if the edge is
+# valid; the profiles' middles, their step, and the areas under them; the line n . p = d.
 START_X, START_Y, END_X, END_Y, CENTER_X, CENTER_Y, SIZE, REACH = (k * BATCH_POINTS for k in range(8))
 NORMAL_X, NORMAL_Y, DEPTH, MEDIAN_X, MEDIAN_Y, INK = (k * BATCH_POINTS for k in range(8, 14))
 WEIGHT, BACKGROUND, VALID = (k * BATCH_POINTS for k in (16, 19, 20))
@@ -56,13 +54,18 @@ COLUMNS = 32
 
 @compiled
 def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-def]
-    """Move the corners (N, 3, 2) of each ``good`` (N,) triangle to where the lines of its edges meet, in place; what
-    has no such edges is good no more.
+    """Move the corners of triangles to the intersections of their measured edges.
 
-    The first profiles reach across the cell; where it is large, narrower ones follow until they step by a pixel.
+    The first profiles reach across the cell; for large cells shorter ones follow, down to
+    ``FINE_REACH_PX``.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        corners: (N, 3, 2) float64 px, clockwise in the image, updated.
+        good: (N,) bool, the triangles to measure; set to False for those without valid edges.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    edges, room = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
+    edges, buffers = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
     left, reach = np.flatnonzero(good), np.full(good.shape[0], PROFILE_REACH)
     for _ in range(MAX_PASSES):
         for first in range(0, left.shape[0], BATCH_CELLS):
@@ -70,10 +73,10 @@ def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-de
             count = 3 * cells.shape[0]
             _fill_edges(corners, cells, reach, edges)
             _fill_normals(edges, count)
-            _fill_contrast_weights(flat, height, width, edges, count, room)
+            _fill_contrast_weights(flat, height, width, edges, count, buffers)
             _fill_profile_places(height, width, edges, count)
-            _fill_profile_areas(flat, height, width, False, edges, count, room)
-            _fill_profile_areas(flat, height, width, True, edges, count, room)
+            _fill_profile_areas(flat, height, width, False, edges, count, buffers)
+            _fill_profile_areas(flat, height, width, True, edges, count, buffers)
             _fill_edge_lines(edges, count)
             _update_corners(edges, cells, corners, good, reach)
         left = left[reach[left] > 0.0]
@@ -81,7 +84,7 @@ def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-de
 
 @compiled
 def _fill_edges(corners, cells, reach, edges):  # type: ignore[no-untyped-def]
-    """Lay out the edges of cells: the first one of each, then the second, then the third."""
+    """Write the ends, centers, sizes and reaches: the first edge of each cell, then the second, then the third."""
     count = cells.shape[0]
     for n in range(count):
         i = cells[n]
@@ -98,7 +101,7 @@ def _fill_edges(corners, cells, reach, edges):  # type: ignore[no-untyped-def]
 
 @compiled
 def _fill_normals(edges, count):  # type: ignore[no-untyped-def]
-    """Which way the edges lie from the centers."""
+    """Write the outward normals, the distances and the middles of the edges, relative to the centers."""
     for i in range(count):
         x, y, cx, cy = edges[START_X + i], edges[START_Y + i], edges[CENTER_X + i], edges[CENTER_Y + i]
         dx, dy = edges[END_X + i] - x, edges[END_Y + i] - y
@@ -110,13 +113,13 @@ def _fill_normals(edges, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ignore[no-untyped-def]
-    """Compare each cell's ink with the colors beyond its edges."""
-    patches, cells = room.patches, count // 3
+def _fill_contrast_weights(flat, height, width, edges, count, buffers):  # type: ignore[no-untyped-def]
+    """Write the weights that separate each cell's ink from the color outside each edge, and the edges' validity."""
+    patches, cells = buffers.patches, count // 3
     for i in range(cells):
         patches[X + i], patches[Y + i] = edges[CENTER_X + i], edges[CENTER_Y + i]
         patches[RADIUS + i] = 0.2 * edges[SIZE + i]
-    fill_patch_means(flat, height, width, cells, room)
+    fill_patch_means(flat, height, width, cells, buffers)
     for k in range(3):
         for i in range(cells):
             edges[VALID + k * cells + i] = patches[INSIDE + i]
@@ -126,7 +129,7 @@ def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ig
         patches[X + i] = edges[CENTER_X + i] + 2 * edges[MEDIAN_X + i]
         patches[Y + i] = edges[CENTER_Y + i] + 2 * edges[MEDIAN_Y + i]
         patches[RADIUS + i] = 0.4 * edges[DEPTH + i]
-    fill_patch_means(flat, height, width, count, room)
+    fill_patch_means(flat, height, width, count, buffers)
     for i in range(count):
         b0, b1 = patches[COLOR + i], patches[COLOR + BATCH_POINTS + i]
         b2 = patches[COLOR + 2 * BATCH_POINTS + i]
@@ -136,8 +139,8 @@ def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ig
             edges[INK + 2 * BATCH_POINTS + i] - b2,
         )
         contrast = u0 * u0 + u1 * u1 + u2 * u2
-        fits = (contrast >= MIN_CONTRAST**2) & (edges[DEPTH + i] > MIN_DEPTH_PX)
-        edges[VALID + i] *= patches[INSIDE + i] * fits
+        is_valid = (contrast >= MIN_CONTRAST**2) & (edges[DEPTH + i] > MIN_DEPTH_PX)
+        edges[VALID + i] *= patches[INSIDE + i] * is_valid
         contrast = max(contrast, MIN_CONTRAST**2)
         u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
         edges[WEIGHT + i], edges[WEIGHT + BATCH_POINTS + i], edges[WEIGHT + 2 * BATCH_POINTS + i] = u0, u1, u2
@@ -146,7 +149,7 @@ def _fill_contrast_weights(flat, height, width, edges, count, room):  # type: ig
 
 @compiled
 def _fill_profile_places(height, width, edges, count):  # type: ignore[no-untyped-def]
-    """Where the profiles cross the edges; edges are left out where one does not stay in the image."""
+    """Write the profiles' middles; edges with a profile that leaves the image become invalid."""
     right, bottom = width - 1.0 - BORDER_MARGIN_PX, height - 1.0 - BORDER_MARGIN_PX
     for i in range(count):
         x, y = edges[START_X + i], edges[START_Y + i]
@@ -155,16 +158,16 @@ def _fill_profile_places(height, width, edges, count):  # type: ignore[no-untype
         x, y, end_x, end_y = x + dx, y + dy, end_x - dx, end_y - dy
         edges[FIRST_X + i], edges[FIRST_Y + i], edges[SECOND_X + i], edges[SECOND_Y + i] = x, y, end_x, end_y
         wide, high = edges[REACH + i] * abs(edges[MEDIAN_X + i]), edges[REACH + i] * abs(edges[MEDIAN_Y + i])
-        begins = (min(x, end_x) >= wide) & (min(y, end_y) >= high)
-        edges[VALID + i] *= begins & (max(x, end_x) + wide < right) & (max(y, end_y) + high < bottom)
+        is_inside = (min(x, end_x) >= wide) & (min(y, end_y) >= high)
+        edges[VALID + i] *= is_inside & (max(x, end_x) + wide < right) & (max(y, end_y) + high < bottom)
 
 
 @compiled
-def _fill_profile_areas(flat, height, width, second, edges, count, room):  # type: ignore[no-untyped-def]
-    """Write the areas under the first or second profiles across the edges, in steps, and keep the ones before."""
-    places, parts = room.places, room.channel_sums
+def _fill_profile_areas(flat, height, width, second, edges, count, buffers):  # type: ignore[no-untyped-def]
+    """Write the areas under the first or ``second`` profiles, in steps, and keep the ones before in ``AREA_BEFORE``."""
+    points, parts = buffers.fixed_points, buffers.channel_sums
     for i in range(count):
-        fits, reach = edges[VALID + i] > 0.0, edges[REACH + i]
+        is_valid, reach = edges[VALID + i] > 0.0, edges[REACH + i]
         x = reach * edges[MEDIAN_X + i]
         y = reach * edges[MEDIAN_Y + i]
         x, y = (
@@ -172,9 +175,9 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
             if second
             else (edges[FIRST_X + i] - x, edges[FIRST_Y + i] - y)
         )
-        places[X + i], places[Y + i] = (
-            fixed_point_coordinate(x if fits else 0.0),
-            fixed_point_coordinate(y if fits else 0.0),
+        points[X + i], points[Y + i] = (
+            fixed_point_coordinate(x if is_valid else 0.0),
+            fixed_point_coordinate(y if is_valid else 0.0),
         )
     for i in range(count):
         step = edges[REACH + i] / HALF_PROFILE if edges[VALID + i] > 0.0 else 0.0
@@ -182,7 +185,7 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
         edges[AREA_BEFORE + i], edges[AREA + i] = edges[AREA + i], 0.0
     for m in range(2 * HALF_PROFILE + 1):
         weight = 0.5 if m == 0 or m == 2 * HALF_PROFILE else 1.0
-        fill_point_samples(flat, height, width, count, room)
+        fill_point_samples(flat, height, width, count, buffers)
         for i in range(count):
             u0, u1, u2 = (
                 edges[WEIGHT + i],
@@ -193,13 +196,13 @@ def _fill_profile_areas(flat, height, width, second, edges, count, room):  # typ
             f = f * (1.0 / (SUBPIXEL_STEPS * SUBPIXEL_STEPS)) - edges[BACKGROUND + i]
             edges[AREA + i] += weight * min(max(f, MIN_PROFILE_LEVEL), MAX_PROFILE_LEVEL)
         for i in range(count):
-            places[X + i] += fixed_point_length(edges[STEP_X + i])
-            places[Y + i] += fixed_point_length(edges[STEP_Y + i])
+            points[X + i] += fixed_point_length(edges[STEP_X + i])
+            points[Y + i] += fixed_point_length(edges[STEP_Y + i])
 
 
 @compiled
 def _fill_edge_lines(edges, count):  # type: ignore[no-untyped-def]
-    """The lines through the two places of each edge where its ink has fallen halfway to the color beyond."""
+    """Write the lines through the two positions of each edge at which the ink falls to half."""
     for i in range(count):
         depth, reach = edges[DEPTH + i], edges[REACH + i]
         step = reach / HALF_PROFILE
@@ -217,24 +220,25 @@ def _fill_edge_lines(edges, count):  # type: ignore[no-untyped-def]
 
 @compiled
 def _update_corners(edges, cells, corners, good, reach):  # type: ignore[no-untyped-def]
-    """Move the corners of the cells to where their lines meet, and write the ``reach`` (N,) of the next pass, 0 where
-    none follows."""
+    """Move the cells' corners to the lines' intersections, and write the next pass's ``reach`` (N,), 0 for none."""
     count, moved = cells.shape[0], np.empty((3, 2))
     for n in range(count):
         i, size = cells[n], edges[SIZE + n]
-        fits = edges[VALID + n] * edges[VALID + count + n] * edges[VALID + 2 * count + n] > 0.0
-        good[i] = fits and _fill_line_intersections(edges, n, count, MAX_CORNER_SHIFT * size, moved)
+        is_valid = edges[VALID + n] * edges[VALID + count + n] * edges[VALID + 2 * count + n] > 0.0
+        good[i] = is_valid and _fill_line_intersections(edges, n, count, MAX_CORNER_SHIFT * size, moved)
         if good[i]:
             for k in range(3):
                 corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
-        ends = not good[i] or reach[i] * size < 2 * FINE_REACH_PX
-        reach[i] = 0.0 if ends else max(0.25 * reach[i], 2 * FINE_REACH_PX / size)
+        is_done = not good[i] or reach[i] * size < 2 * FINE_REACH_PX
+        reach[i] = 0.0 if is_done else max(0.25 * reach[i], 2 * FINE_REACH_PX / size)
 
 
 @compiled
 def _fill_line_intersections(edges, n, count, limit, moved):  # type: ignore[no-untyped-def]
-    """Write where the lines of a cell's edges meet, corner by corner; False where one does not or lies beyond the limit
-    from where it was."""
+    """Write the intersections ``moved`` (3, 2) of the lines of cell n.
+
+    Returns False if two lines are parallel or a corner moves by ``limit`` px or more.
+    """
     for k in range(3):
         here, before = k * count + n, (k + 2) % 3 * count + n
         ax, ay, a = edges[LINE_X + before], edges[LINE_Y + before], edges[LINE_D + before]

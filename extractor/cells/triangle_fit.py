@@ -1,4 +1,4 @@
-"""Stage 5: a triangle for every region that is one, first from its moments, then from its edges."""
+"""Stage 5: fits triangles to the regions that are triangles, first to their moments, then to their edges."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from extractor.cells.seeds import Seeds, domain_moments
 from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.numeric.compilation import compiled
 
-# In coordinates in which its covariance is the identity, every triangle is equilateral with its corners at the
-# radius sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with the argument 3 times a corner's.
+# In coordinates in which its covariance is the identity, every triangle is equilateral with corners at the radius
+# sqrt(8), and its third complex moment E[z^3] is 8^1.5 / 10 with 3 times the argument of a corner.
 CORNER_RADIUS = np.sqrt(8.0)
 THIRD_MOMENT = 8.0**1.5 / 10.0
 SINE_120 = np.sqrt(0.75)
-MIN_TRIANGULARITY = 0.45  # |E[z^3]| against a triangle's; a disc, an ellipse, a square have 0
-MIN_ROUGH_TRIANGULARITY = 0.1  # of what has too few pixels to tell
+MIN_TRIANGULARITY = 0.45  # |E[z^3]| relative to a triangle's; a disc, an ellipse and a square have 0
+MIN_ROUGH_TRIANGULARITY = 0.1  # the same for domains of few pixels
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
-MIN_AREA_PX = 4.0
-MAX_GROWTH = 3.0  # of a domain's area over its region's
+MIN_AREA_PX = 4.0  # px^2
+MAX_GROWTH = 3.0  # of a domain's area to its region's
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class Triangles:
     """Stage 5.
 
     Attributes:
-        corner_px: (T, 3, 2) float64 in the image frame, clockwise as seen in the image.
+        corner_px: (T, 3, 2) float64 in the image frame, clockwise in the image.
         ink: (T,) uint8, 1 red, 2 green, 3 blue.
-        region: (T,) int32, the region it was fitted to.
+        region: (T,) int32, the region of each triangle.
     """
 
     corner_px: NDArray[np.float64]
@@ -40,15 +40,21 @@ class Triangles:
 
     @property
     def edge_px(self) -> float:
-        """The median edge; 0 without triangles."""
+        """The median length of the edges; 0 without triangles."""
         if len(self.ink) == 0:
             return 0.0
         return float(np.median(np.linalg.norm(self.corner_px - np.roll(self.corner_px, 1, axis=1), axis=2)))
 
 
 @compiled
-def _fit_to_moments(moments, seed, domain_px, min_area, least):  # type: ignore[no-untyped-def]
-    """Triangles with the regions' moments up to the third order, and which regions are triangles at all."""
+def _fit_to_moments(moments, seed, domain_px, min_area, min_triangularity):  # type: ignore[no-untyped-def]
+    """(N, 3, 2) the triangles with the regions' moments up to the third order; (N,) bool, regions that are triangles.
+
+    Args:
+        moments: (N, 10) about ``seed`` (N, 2), as in ``Regions``.
+        domain_px: (N,) px^2, the areas of the seeds' domains.
+        min_area: px^2; min_triangularity: of |E[z^3]|, relative to a triangle's.
+    """
     count = moments.shape[0]
     corners = np.zeros((count, 3, 2))
     good = np.zeros(count, np.bool_)
@@ -79,10 +85,10 @@ def _fit_to_moments(moments, seed, domain_px, min_area, least):  # type: ignore[
         uvv = ia * (ib * ib * xxx + 2 * ib * ic * xxy + ic * ic * xyy)
         vvv = ib**3 * xxx + 3 * ib * ib * ic * xxy + 3 * ib * ic * ic * xyy + ic**3 * yyy
         real, imaginary = uuu - 3 * uvv, 3 * uuv - vvv
-        if np.hypot(real, imaginary) < least * THIRD_MOMENT:
+        if np.hypot(real, imaginary) < min_triangularity * THIRD_MOMENT:
             continue
         angle = np.arctan2(imaginary, real) / 3.0
-        # growing stops where the blurred rim darkens; the domain, cut nearer to the half level, tells the size
+        # growing stops in the blurred rim; the domain ends nearer to the half level and gives the size
         radius = CORNER_RADIUS * np.sqrt(min(max(domain_px[i] / n, 1.0), MAX_GROWTH))
         u, v = radius * np.cos(angle), radius * np.sin(angle)
         for k in range(3):
@@ -94,7 +100,12 @@ def _fit_to_moments(moments, seed, domain_px, min_area, least):  # type: ignore[
 
 
 def triangles_from_moments(seeds: Seeds, scale: int) -> Triangles:
-    """The domains that are triangles by shape, by their moments alone: without growing, without sub-pixel edges."""
+    """The triangular domains, by their moments alone: without region growing and sub-pixel edges.
+
+    Args:
+        seeds: the domains, at 1/``scale`` of the image's scale.
+        scale: full-scale pixels per pixel of the seeds.
+    """
     moments = domain_moments(seeds.runs, seeds.domain, seeds.xy)
     corners, good = _fit_to_moments(moments, seeds.xy, seeds.area_px, MIN_AREA_PX, MIN_ROUGH_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
@@ -102,7 +113,7 @@ def triangles_from_moments(seeds: Seeds, scale: int) -> Triangles:
 
 
 def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:
-    """Stage 5: keep the regions that are triangles by shape and size, and place their edges with sub-pixel accuracy.
+    """Stage 5: select the regions that are triangles, and measure their edges with sub-pixel accuracy.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.

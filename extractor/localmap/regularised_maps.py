@@ -1,7 +1,7 @@
-"""Quadratic maps through the markers of two rings, bending held towards 0: for many markers at once.
+"""Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
 
-They are laid where a ring is not whole: at the pattern's rim, and all around damage. Up to ``LANES`` markers stand side
-by side; a neighbour that is not known has no weight.
+They serve markers whose rings are incomplete: at the pattern's rim and around damage. Up to ``LANES`` markers are
+computed together, one in each lane. An unknown neighbour has no weight.
 """
 
 from __future__ import annotations
@@ -18,27 +18,33 @@ from extractor.numeric.batched_systems import (
 from extractor.numeric.compilation import compiled, inlined
 
 TERMS = 5  # x, y, xx / 2, xy, yy / 2
-# Rows of lanes: of a neighbour the terms, these times its weight, its distances in the image and whether it is known; 1
-# where the neighbours tell the derivatives;
+# Rows of lanes: the terms of one neighbour, the weighted terms, its vector in the image, 1 if it is known; 1 where the
+# neighbours determine the derivatives;
 TERM, IMAGE_STEP, KNOWN, DETERMINED = 0, 10, 12, 13
-# of the normal equations the lower triangle, and the right sides of x and y.
+# the lower triangle of the normal equations, and the right sides of x and y.
 NORMAL, RIGHT_SIDE, ROWS = 14, 29, 39
-MIN_SINE2 = 0.05  # of the angle between the two directions that neighbours tell at least
+MIN_SINE2 = 0.05  # least squared sine of the angle between the neighbours' directions
 
 
 @compiled
-def fill_quadratic_derivatives(xy, markers, near, offset, out):  # type: ignore[no-untyped-def]
-    """Write the five derivatives of x and y at ``markers`` (n,) into ``out`` (M, 2, 5), where their neighbours tell
-    them."""
+def fill_quadratic_derivatives(xy, markers, ring_markers, ring_vectors, out):  # type: ignore[no-untyped-def]
+    """Write the derivatives x, y, xx, xy, yy of the image coordinates where the neighbours determine them.
+
+    Args:
+        xy: (M, 2) px, the markers' places, NaN unknown.
+        markers: (n,) the markers to evaluate.
+        ring_markers: (M, K) int32, their neighbours, or -1. ring_vectors: (M, K, 2) the vectors to them in the layout.
+        out: (M, 2, 5) float64, receives the derivatives of x and y.
+    """
     rows, known = np.empty(ROWS * LANES), np.empty(LANES, np.int64)
     for start in range(0, markers.shape[0], LANES):
-        some = markers[start : start + LANES]
-        lanes = some.shape[0]
+        batch = markers[start : start + LANES]
+        lanes = batch.shape[0]
         rows[:], known[:] = 0.0, 0
-        for k in range(near.shape[1]):
+        for k in range(ring_markers.shape[1]):
             for lane in range(lanes):
-                m = some[lane]
-                known[lane] += _fill_neighbour(xy, m, near[m, k], offset[m, k], rows[lane:])
+                m = batch[lane]
+                known[lane] += _fill_neighbour(xy, m, ring_markers[m, k], ring_vectors[m, k], rows[lane:])
             _accumulate_normal_equations(rows, lanes)
         for lane in range(lanes):
             _update_regularisation(rows[lane:], known[lane])
@@ -48,18 +54,18 @@ def fill_quadratic_derivatives(xy, markers, near, offset, out):  # type: ignore[
         for lane in range(lanes):
             if rows[DETERMINED * LANES + lane] > 0.0:
                 for i in range(TERMS):
-                    out[some[lane], 0, i] = rows[(RIGHT_SIDE + i) * LANES + lane]
-                    out[some[lane], 1, i] = rows[(RIGHT_SIDE + TERMS + i) * LANES + lane]
+                    out[batch[lane], 0, i] = rows[(RIGHT_SIDE + i) * LANES + lane]
+                    out[batch[lane], 1, i] = rows[(RIGHT_SIDE + TERMS + i) * LANES + lane]
 
 
 @inlined
-def _fill_neighbour(xy, m, n, offset, column):  # type: ignore[no-untyped-def]
-    """Fill in a neighbour n of marker m; whether it is known."""
+def _fill_neighbour(xy, m, n, vector, column):  # type: ignore[no-untyped-def]
+    """Write the neighbour n of marker m, at ``vector`` (2,) in the layout, into a lane; returns whether it is known."""
     if n < 0 or not np.isfinite(xy[n, 0]):
         column[TERM * LANES], column[(TERM + 1) * LANES] = 1.0, 1.0
         column[IMAGE_STEP * LANES], column[(IMAGE_STEP + 1) * LANES], column[KNOWN * LANES] = 0.0, 0.0, 0.0
         return False
-    column[TERM * LANES], column[(TERM + 1) * LANES] = offset[0], offset[1]
+    column[TERM * LANES], column[(TERM + 1) * LANES] = vector[0], vector[1]
     column[IMAGE_STEP * LANES], column[(IMAGE_STEP + 1) * LANES] = xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1]
     column[KNOWN * LANES] = 1.0
     return True
@@ -67,7 +73,7 @@ def _fill_neighbour(xy, m, n, offset, column):  # type: ignore[no-untyped-def]
 
 @compiled
 def _accumulate_normal_equations(rows, lanes):  # type: ignore[no-untyped-def]
-    """Add a neighbour of every marker to its normal equations."""
+    """Add one neighbour of every lane to the normal equations."""
     for lane in range(lanes):
         x, y = rows[TERM * LANES + lane], rows[(TERM + 1) * LANES + lane]
         weight = rows[KNOWN * LANES + lane] / (x * x + y * y) ** 2
@@ -85,10 +91,10 @@ def _accumulate_normal_equations(rows, lanes):  # type: ignore[no-untyped-def]
 
 @inlined
 def _update_regularisation(column, known):  # type: ignore[no-untyped-def]
-    """Hold a marker's bending towards 0, and write whether its neighbours tell the derivatives at all."""
+    """Regularise the curvature of a lane, by its number of known neighbours, and write ``DETERMINED``."""
     xx, xy, yy = column[NORMAL * LANES], column[(NORMAL + 1) * LANES], column[(NORMAL + 2) * LANES]
-    told = known >= 2 and xx * yy - xy**2 >= MIN_SINE2 * xx * yy
-    column[DETERMINED * LANES] = 1.0 if told else 0.0
-    held = (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
+    is_determined = known >= 2 and xx * yy - xy**2 >= MIN_SINE2 * xx * yy
+    column[DETERMINED * LANES] = 1.0 if is_determined else 0.0
+    ridge = (0.001 if known >= 8 else 0.02) if known >= 5 else 1e9
     for i in range(2, TERMS):
-        column[(NORMAL + packed_index(i, i)) * LANES] += held
+        column[(NORMAL + packed_index(i, i)) * LANES] += ridge

@@ -1,5 +1,5 @@
-"""Stage 7, the spin-search algorithm: from cells to numbered cells, and a first place for every marker.
+"""Stage 7, the spin-search algorithm: from cells to numbered cells, and an initial place for every marker.
 
-In: cells and their mesh, the layout's lattice. Out: which cell of the layout every cell of the image is, or None; and
-the markers' places that the cells at each marker agree upon.
+In: cells and their mesh, the layout's lattice. Out: the layout's cell of every cell of the image, or None; and the
+markers' places, averaged from the cells at each marker.
 """

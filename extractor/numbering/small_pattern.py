@@ -1,8 +1,8 @@
-"""A small pattern amid much else: numbered by the centers of its cells alone, at a reduced scale, or not at all.
+"""Recognises a small pattern in a large image: numbered at a reduced scale by the centers of its cells alone.
 
-Cells of a few pixels have no shape there, but their centers are good to a fraction of one. If these suffice to number
-the whole pattern, the numbers say where every cell's corners are, and the full image places its edges from there. So
-nothing has to be grown, or fitted, in what lies around or behind.
+Cells of a few pixels have no shape at that scale, but their centers are accurate to a fraction of a pixel. If these
+number the whole pattern, the numbers predict every cell's corners, and the edges are then measured in the full image.
+So no region is grown and no triangle is fitted in the background.
 """
 
 from __future__ import annotations
@@ -19,17 +19,15 @@ from extractor.localmap.affine_maps import image_cell_of_layout_cell, linear_map
 from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.compilation import compiled
 
-MIN_CELL_PX = 12  # of a cell, of which there must be more than the pattern has,
-MIN_DOMAINS_PER_CELL = 1.0
-MIN_AREA_PX, MIN_DOMAIN_SHARE = (
-    8,
-    0.9,
-)  # at least so many domains are larger than specks: noise has many of them
-MIN_FITTED_SHARE = 0.97  # of the pattern's cells have edges where their numbers say
+MIN_CELL_PX = 12  # px^2, area of a domain that may be a cell
+MIN_DOMAINS_PER_CELL = 1.0  # least number of such domains, per cell of the pattern
+MIN_AREA_PX = 8  # px^2, area of a domain that is no speck
+MIN_DOMAIN_SHARE = 0.9  # of the domains are no specks; noise has many specks
+MIN_FITTED_SHARE = 0.97  # of the pattern's cells have edges where predicted
 
 
 def is_small_pattern_possible(seeds: Seeds, cells: int) -> bool:
-    """Whether a pattern of so many cells may be whole and small among these domains."""
+    """Whether a complete small pattern of ``cells`` cells may be among these domains."""
     if np.count_nonzero(seeds.area_px >= MIN_CELL_PX) < MIN_DOMAINS_PER_CELL * cells:
         return False
     return bool(np.count_nonzero(seeds.area_px >= MIN_AREA_PX) >= MIN_DOMAIN_SHARE * len(seeds.area_px))
@@ -38,9 +36,17 @@ def is_small_pattern_possible(seeds: Seeds, cells: int) -> bool:
 def fit_predicted_triangles(
     image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice
 ) -> Triangles | None:
-    """The triangles of the numbered cells, from where their numbers put the corners; their ``region`` is the cell.
+    """The triangles of the numbered cells, measured from the corners that the numbers predict.
 
-    None unless the whole pattern is numbered, and nearly all of its cells have edges there.
+    Args:
+        image: (H, W, 3) uint8 BGR, at full scale.
+        cells: the cells, at full scale.
+        numbering: their numbers.
+        lattice: the layout.
+
+    Returns:
+        Triangles whose ``region`` is the index of the cell; None unless the whole pattern is numbered and nearly all of
+        its cells have edges where predicted.
     """
     if np.count_nonzero(numbering.cell >= 0) < len(lattice.ink):
         return None
@@ -54,20 +60,18 @@ def fit_predicted_triangles(
 
 
 @compiled
-def _predicted_corners(center_px, cell, plan, mirrored):  # type: ignore[no-untyped-def]
-    """(N, 3, 2) px, the corners of the numbered cells, clockwise in the image, by the neighbours' centers; (N,) bool,
-    which have any."""
-    slope = linear_maps(
-        center_px, cell, image_cell_of_layout_cell(cell, plan.ink.shape[0]), plan.center_mm, plan.beside
-    )
+def _predicted_corners(center_px, cell, layout, mirrored):  # type: ignore[no-untyped-def]
+    """(N, 3, 2) px, the numbered cells' corners by the neighbours' centers, clockwise; (N,) bool, which are known."""
+    slope = linear_maps(center_px, cell, image_cell_of_layout_cell(cell, layout.ink.shape[0]), layout)
     corners, good = np.full((cell.shape[0], 3, 2), np.nan), np.zeros(cell.shape[0], np.bool_)
-    step = 1 if mirrored else 2  # clockwise a cell's corners run 0, 2, 1, seen from the back 0, 1, 2
+    # clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
+    corner_step = 1 if mirrored else 2
     for i in range(cell.shape[0]):
         if cell[i] < 0 or np.isnan(slope[i, 0, 0]):
             continue
         good[i] = True
         for k in range(3):
-            x, y = plan.corner_vectors_mm[cell[i], step * k % 3]
+            x, y = layout.corner_vectors_mm[cell[i], corner_step * k % 3]
             for axis in range(2):
                 corners[i, k, axis] = center_px[i, axis] + slope[i, axis, 0] * x + slope[i, axis, 1] * y
     return corners, good

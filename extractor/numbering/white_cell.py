@@ -1,12 +1,15 @@
-"""Whether a bright place is the white cell: it is white all over, nowhere beyond, and lies between its own inks.
+"""Decides whether a bright place is the white cell: white inside, not white outside, and between the right inks.
 
-Where it must be, and how large, the numbered cells say, by a quadratic map of the layout to the image. A scratch across
-a black cell, where two scratches cross, a drop or a reflection do not look so, nor does the white cell a step aside.
+The numbered cells predict place and size by a quadratic map from the layout to the image. A scratch across a black
+cell, a crossing of two scratches, a drop or a reflection fail the test, and so does the white cell one step aside.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.numeric.bilinear import fill_patch_mean
 from extractor.numeric.bilinear_batch import (
@@ -22,22 +25,21 @@ from extractor.numeric.bilinear_batch import INSIDE as INSIDE_IMAGE
 from extractor.numeric.compilation import compiled
 from extractor.numeric.dense_systems import dot3, update_to_cholesky_solution
 
-MAX_FIT_CELLS = 16  # numbered cells, the nearest, that say where it is
+MAX_FIT_CELLS = 16  # numbered cells nearest to the white cell, for its prediction
 MIN_FIT_CELLS = 3
-RIDGE = 0.02  # holds the map's curvature where the witnesses lie on one side
-MAX_PREDICTED_DEVIATION = 0.15  # of the map there, in edges
-MAX_CENTROID_DISTANCE = (
-    0.3  # in edges, of the white's centroid from where the map puts it; the next black cell is at 1
-)
-# The shape, from 0 for the paler one of ink and black to 1 for the middle.
+RIDGE = 0.02  # regularises the map's curvature where all these cells lie on one side
+MAX_PREDICTED_DEVIATION = 0.15  # of the prediction, in edges
+MAX_CENTROID_DISTANCE = 0.3  # in edges, from prediction to centroid of the white; the next black cell is at 1
+# Limits of whiteness, scaled from 0 for the palest of inks and black to 1 for the middle of the cell.
 MIN_INSIDE, MIN_CORNER, MAX_OUTSIDE = 0.5, 0.25, 0.5
-MIN_INK_COSINE = 0.9  # cosine between a color and an ink, both above black
-MIN_INK_STRENGTH = 0.3  # of an ink's strength above black: black, where its cell is missing
+MIN_INK_COSINE = 0.9  # between a color and an ink, both minus black
+MIN_INK_STRENGTH = 0.3  # of an ink's strength above black; weaker colors count as black, a missing cell
 TERMS = 6  # 1, x, y, xx, xy, yy
-# The corners of a down-cell from its middle, in axial steps: below, right above and left above.
+# The corners of a down-cell relative to its center, in axial steps: below, upper right and upper left.
 CORNERS = np.array([[1, -2], [1, 1], [-2, 1]]) / 3
-OPPOSITE_INKS = np.array([2, 3, 1])  # of the cells opposite to them
-# In its corners; inside towards its corners and sides; around it beyond its corners and three places of each side.
+OPPOSITE_INKS = np.array([2, 3, 1])  # of the cells opposite to the corners
+# Points in the corners and towards corners and sides; outside points beyond the corners and beyond three points of each
+# side.
 INSIDE_POINTS = np.concatenate([0.85 * CORNERS, 0.5 * CORNERS, -0.33 * CORNERS])
 SIDE_POINTS = [
     one + share * (two - one) for one, two in CORNERS[[[0, 1], [1, 2], [2, 0]]] for share in (0.25, 0.5, 0.75)
@@ -45,55 +47,78 @@ SIDE_POINTS = [
 OUTSIDE_POINTS = np.concatenate(
     [1.7 * CORNERS, np.array(SIDE_POINTS) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]]
 )
-GRID, GRID_REACH = 4, 0.8  # places over which the centroid is taken
+GRID, GRID_REACH = 4, 0.8  # half width in points and in axial steps of the grid for the centroid
 GRID_STEPS = np.arange(-GRID, GRID + 1)
 CENTROID_POINTS = (
     GRID_REACH / GRID * np.array([[a, b] for a in GRID_STEPS for b in GRID_STEPS if abs(a + b) <= GRID])
 )
 
 
+class WhiteCellLayout(NamedTuple):
+    """The layout as needed for the search of the white cell.
+
+    Attributes:
+        layers: number of layers.
+        cell_lookup: (S, S) int32, as ``Lattice.cell_lookup``.
+        white_mm: (2,) float64, the center of the white cell.
+        axial_mm: (2, 2) float64, mm per axial step there.
+        center_mm: (U, 2) float64, the centers of the colored cells.
+    """
+
+    layers: int
+    cell_lookup: NDArray[np.int32]
+    white_mm: NDArray[np.float64]
+    axial_mm: NDArray[np.float64]
+    center_mm: NDArray[np.float64]
+
+
 @compiled
-def locate_white_cell(image, center_px, cell, white_mm, to_mm, center_mm, inks, black):  # type: ignore[no-untyped-def]
-    """(2,) px the middle of the white cell, where these numbers put it; NaN where it is not.
+def locate_white_cell(image, center_px, cell, layout, inks, black):  # type: ignore[no-untyped-def]
+    """(2,) px, the center of the white cell where the numbers predict it; NaN if it is not there.
 
     Args:
-        cell: (N,) the layout's cell of each cell of the image, or -1.
-        white_mm: (2,) the middle of the white cell. to_mm: (2, 2) mm per axial step there.
-        inks: (4, 3) the colors of red, green and blue from row 1 on. black: (3,) the color between them.
+        image: (H, W, 3) uint8 BGR; center_px: (N, 2).
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        layout: ``WhiteCellLayout``.
+        inks: (4, 3) the colors of red, green and blue in rows 1 to 3. black: (3,) the color between them.
     """
-    where, slope = _fit_layout_map(center_px, cell, white_mm, to_mm, center_mm)
-    if np.isnan(where[0]):
-        return where
-    axial = np.empty((2, 2))
+    predicted, slope = _fit_layout_map(center_px, cell, layout)
+    if np.isnan(predicted[0]):
+        return predicted
+    axial, axial_mm = np.empty((2, 2)), layout.axial_mm
     for row in range(2):
         for column in range(2):
-            axial[row, column] = slope[row, 0] * to_mm[0, column] + slope[row, 1] * to_mm[1, column]
-    return _verified_center(image, where, axial, inks, black)
+            axial[row, column] = slope[row, 0] * axial_mm[0, column] + slope[row, 1] * axial_mm[1, column]
+    return _verified_center(image, predicted, axial, inks, black)
 
 
 @compiled
 def _nearest_numbered_cells(cell, white_mm, center_mm):  # type: ignore[no-untyped-def]
-    """The numbered cells whose places in the layout are the nearest to the white one, and their squared distances."""
-    near, square, found = np.empty(MAX_FIT_CELLS, np.int64), np.empty(MAX_FIT_CELLS), 0
+    """The numbered cells nearest to the white cell in the layout, and their squared distances, mm^2."""
+    nearest, squares, found = np.empty(MAX_FIT_CELLS, np.int64), np.empty(MAX_FIT_CELLS), 0
     for i in range(cell.shape[0]):
         if cell[i] < 0:
             continue
         x, y = center_mm[cell[i], 0] - white_mm[0], center_mm[cell[i], 1] - white_mm[1]
-        apart, k = x * x + y * y, min(found, MAX_FIT_CELLS - 1)
-        if found == MAX_FIT_CELLS and apart >= square[k]:
+        square, k = x * x + y * y, min(found, MAX_FIT_CELLS - 1)
+        if found == MAX_FIT_CELLS and square >= squares[k]:
             continue
-        while k > 0 and square[k - 1] > apart:
-            near[k], square[k] = near[k - 1], square[k - 1]
+        while k > 0 and squares[k - 1] > square:
+            nearest[k], squares[k] = nearest[k - 1], squares[k - 1]
             k -= 1
-        near[k], square[k] = i, apart
+        nearest[k], squares[k] = i, square
         found = min(found + 1, MAX_FIT_CELLS)
-    return near[:found], square[:found]
+    return nearest[:found], squares[:found]
 
 
 @compiled
-def _fit_layout_map(center_px, cell, white_mm, to_mm, center_mm):  # type: ignore[no-untyped-def]
-    """Where the map of the layout to the image through the cells nearest to the white one puts that, (2,) px, NaN where
-    that is doubtful; and (2, 2) px per mm there."""
+def _fit_layout_map(center_px, cell, layout):  # type: ignore[no-untyped-def]
+    """Fit a quadratic map from layout to image through the numbered cells nearest to the white cell.
+
+    Returns (2,) px the white cell's predicted center, NaN where the prediction is uncertain; and (2, 2) px per mm
+    there.
+    """
+    white_mm, axial_mm, center_mm = layout.white_mm, layout.axial_mm, layout.center_mm
     near, squares = _nearest_numbered_cells(cell, white_mm, center_mm)
     nowhere = np.full(2, np.nan), np.full((2, 2), np.nan)
     count = near.shape[0]
@@ -122,47 +147,51 @@ def _fit_layout_map(center_px, cell, white_mm, to_mm, center_mm):  # type: ignor
     update_to_cholesky_solution(normal, right, TERMS)
     if not normal[2, 2] ** 2 > 1e-4 * total:
         return nowhere
-    left = 0.0
+    residual = 0.0
     for k in range(count):
         u, v = center_px[near[k], 0] - about_x, center_px[near[k], 1] - about_y
         for a in range(TERMS):
             u -= rows[k, a] * right[0, a]
             v -= rows[k, a] * right[1, a]
-        left += weight[k] * (u * u + v * v)
+        residual += weight[k] * (u * u + v * v)
     slope = right[:2, 1:3] / scale
     determinant = (slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]) * (
-        to_mm[0, 0] * to_mm[1, 1] - to_mm[0, 1] * to_mm[1, 0]
+        axial_mm[0, 0] * axial_mm[1, 1] - axial_mm[0, 1] * axial_mm[1, 0]
     )
     edge2 = abs(determinant) * 2.0 / np.sqrt(3.0)
-    if not left / (2.0 * total) * (1.0 + right[2, 0] * total / count) < MAX_PREDICTED_DEVIATION**2 * edge2:
+    variance = residual / (2.0 * total) * (1.0 + right[2, 0] * total / count)
+    if not variance < MAX_PREDICTED_DEVIATION**2 * edge2:
         return nowhere
     return np.array([about_x + right[0, 0], about_y + right[1, 0]]), slope
 
 
 @compiled
 def _whiteness(color, strongest):  # type: ignore[no-untyped-def]
-    """The weakest channel of a color, against the strongest of all inks."""
+    """The weakest channel of a color, relative to the inks' maximum of that channel."""
     return min(color[0] / strongest[0], color[1] / strongest[1], color[2] / strongest[2])
 
 
 @compiled
-def _verified_center(image, where, slope, inks, black):  # type: ignore[no-untyped-def]
-    """(2,) px the centroid of the white cell expected here, (2, 2) px per axial step; NaN where there is none."""
+def _verified_center(image, predicted, slope, inks, black):  # type: ignore[no-untyped-def]
+    """(2,) px, the center of the white cell; NaN if it is not at its predicted center.
+
+    ``slope`` is (2, 2), px per axial step.
+    """
     strongest, nowhere = np.ones(3), np.full(2, np.nan)
     for channel in range(3):
         strongest[channel] = max(inks[:, channel].max(), 1.0)
     ground = _whiteness(black, strongest)  # of black, or of the palest ink
     for c in range(1, 4):
         ground = max(ground, _whiteness(inks[c], strongest))
-    # the centroid tells where it is better than the map does, unless something white stands beside it
-    if _is_white_triangle(image, where, slope, ground, strongest) and _is_between_inks(
-        image, where, slope, inks, black
+    if _is_white_triangle(image, predicted, slope, ground, strongest) and _is_between_inks(
+        image, predicted, slope, inks, black
     ):
-        return where.copy()
-    u, v = _white_centroid(image, where, slope, ground, strongest)
+        return predicted.copy()
+    # the centroid is more accurate than the map, unless something white is next to the cell
+    u, v = _white_centroid(image, predicted, slope, ground, strongest)
     if not u * u + u * v + v * v <= MAX_CENTROID_DISTANCE**2:
         return nowhere
-    middle = where + slope @ np.array([u, v])
+    middle = predicted + slope @ np.array([u, v])
     if _is_white_triangle(image, middle, slope, ground, strongest) and _is_between_inks(
         image, middle, slope, inks, black
     ):
@@ -172,19 +201,19 @@ def _verified_center(image, where, slope, inks, black):  # type: ignore[no-untyp
 
 @compiled
 def _image_point(middle, slope, u, v):  # type: ignore[no-untyped-def]
-    """The place in the image this axial way from the middle."""
+    """The point of the image at the axial vector (u, v) from the middle."""
     return middle[0] + slope[0, 0] * u + slope[0, 1] * v, middle[1] + slope[1, 0] * u + slope[1, 1] * v
 
 
 @compiled
 def _sample_radius(slope):  # type: ignore[no-untyped-def]
-    """Over which a color is taken, px."""
+    """The radius of a color sample, px."""
     return 0.1 * np.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
 
 
 @compiled
 def _fill_mean_color(image, middle, slope, u, v, out):  # type: ignore[no-untyped-def]
-    """Write the mean color around this axial way from the middle; False outside the image."""
+    """Write the mean color (3,) at the axial vector (u, v) from the middle; False outside the image."""
     px, py = _image_point(middle, slope, u, v)
     return fill_patch_mean(
         image.reshape(-1), image.shape[0], image.shape[1], px, py, _sample_radius(slope), out
@@ -192,16 +221,16 @@ def _fill_mean_color(image, middle, slope, u, v, out):  # type: ignore[no-untype
 
 
 @compiled
-def _white_centroid(image, where, slope, ground, strongest):  # type: ignore[no-untyped-def]
-    """The axial way to the centroid of what is whiter than the ground; NaN where nothing is."""
-    room, radius = allocate_sample_buffers(), _sample_radius(slope)
-    patches = room.patches
+def _white_centroid(image, predicted, slope, ground, strongest):  # type: ignore[no-untyped-def]
+    """The axial vector to the centroid of the whiteness above ``ground``; NaN where nothing is whiter."""
+    buffers, radius = allocate_sample_buffers(), _sample_radius(slope)
+    patches = buffers.patches
     for n in range(CENTROID_POINTS.shape[0]):
         patches[X + n], patches[Y + n] = _image_point(
-            where, slope, CENTROID_POINTS[n, 0], CENTROID_POINTS[n, 1]
+            predicted, slope, CENTROID_POINTS[n, 0], CENTROID_POINTS[n, 1]
         )
         patches[RADIUS + n] = radius
-    fill_patch_means(image.reshape(-1), image.shape[0], image.shape[1], CENTROID_POINTS.shape[0], room)
+    fill_patch_means(image.reshape(-1), image.shape[0], image.shape[1], CENTROID_POINTS.shape[0], buffers)
     total, q, r, own = 0.0, 0.0, 0.0, np.empty(3)
     for n in range(CENTROID_POINTS.shape[0]):
         if patches[INSIDE_IMAGE + n] > 0.0:
@@ -218,7 +247,7 @@ def _white_centroid(image, where, slope, ground, strongest):  # type: ignore[no-
 
 @compiled
 def _is_white_triangle(image, middle, slope, ground, strongest):  # type: ignore[no-untyped-def]
-    """Whether it is white all over the cell and nowhere around it; outside the image nothing is."""
+    """Whether the cell is white inside and nowhere outside; no point outside the image is white."""
     own = np.empty(3)
     if not _fill_mean_color(image, middle, slope, 0.0, 0.0, own):
         return False
@@ -230,15 +259,15 @@ def _is_white_triangle(image, middle, slope, ground, strongest):  # type: ignore
         if _whiteness(own, strongest) - ground < least * reach:
             return False
     for n in range(OUTSIDE_POINTS.shape[0]):
-        seen = _fill_mean_color(image, middle, slope, OUTSIDE_POINTS[n, 0], OUTSIDE_POINTS[n, 1], own)
-        if seen and _whiteness(own, strongest) - ground > MAX_OUTSIDE * reach:
+        is_inside = _fill_mean_color(image, middle, slope, OUTSIDE_POINTS[n, 0], OUTSIDE_POINTS[n, 1], own)
+        if is_inside and _whiteness(own, strongest) - ground > MAX_OUTSIDE * reach:
             return False
     return True
 
 
 @compiled
 def _is_between_inks(image, middle, slope, inks, black):  # type: ignore[no-untyped-def]
-    """Whether the three cells beside it show their inks, or black where one is missing."""
+    """Whether the three adjacent cells show their inks, or black where a cell is missing."""
     own = np.empty(3)
     for k in range(3):
         if not _fill_mean_color(image, middle, slope, -CORNERS[k, 0], -CORNERS[k, 1], own):

@@ -1,4 +1,4 @@
-"""Numeric tools that know nothing of patterns: compilation, small systems, sampling, triangulation, the Gaussian.
+"""Numeric tools without knowledge of patterns: compilation, small systems, sampling, triangulation, the Gaussian.
 
 In: arrays. Out: arrays.
 """

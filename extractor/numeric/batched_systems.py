@@ -1,9 +1,8 @@
-"""Small symmetric systems of equations, those of many markers side by side: one by one, they wait for every root and
-quotient.
+"""Solves many small symmetric systems of equations together, because one alone waits for every root and quotient.
 
-A row holds one number of each system, in ``LANES`` lanes; the lower triangle of the matrices is ``terms`` rows after
-each other, row (a, b) at ``at + place(a, b)``. The machine takes several lanes at once in loops whose length is known
-only as they run, and that hold no other.
+``rows`` is a flat (R, ``LANES``) array: a row holds the same number of each system, one system per lane. The lower
+triangle of the matrices begins at row ``at``; its entry (a, b) is row ``at + packed_index(a, b)``. The compiler
+vectorises innermost loops over lanes of a length known at run time only.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ LANES = 16
 
 @inlined
 def packed_index(a, b):  # type: ignore[no-untyped-def]
-    """Where a lower triangle has its number (a, b), b not after a."""
+    """The index of the entry (a, b), b <= a, in a packed lower triangle."""
     return a * (a + 1) // 2 + b
 
 
 @inlined
 def add_row_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
-    """Add a product of two rows to a third."""
+    """Add the product of the rows a and b to the row ``to``, in the first lanes."""
     out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
     for k in range(lanes):
         lane = np.uint64(k)
@@ -32,7 +31,7 @@ def add_row_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
 
 @inlined
 def _update_minus_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def]
-    """Take a product of two rows from a third."""
+    """Subtract the product of the rows a and b from the row ``to``, in the first lanes."""
     out, one, two = np.uint64(to * LANES), np.uint64(a * LANES), np.uint64(b * LANES)
     for k in range(lanes):
         lane = np.uint64(k)
@@ -41,7 +40,7 @@ def _update_minus_product(rows, to, a, b, lanes):  # type: ignore[no-untyped-def
 
 @inlined
 def _update_row_quotient(rows, to, by, lanes):  # type: ignore[no-untyped-def]
-    """Divide a row by another."""
+    """Divide the row ``to`` by the row ``by``, in the first lanes."""
     out, one = np.uint64(to * LANES), np.uint64(by * LANES)
     for k in range(lanes):
         lane = np.uint64(k)
@@ -49,10 +48,16 @@ def _update_row_quotient(rows, to, by, lanes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def update_to_cholesky_factors(rows, at, terms, least, sound, lanes):  # type: ignore[no-untyped-def]
-    """Replace the matrices by their Cholesky factors; the row ``is_complete`` becomes 0 where a pivot is not above
-    ``min_places``,
-    and the factor is any then."""
+def update_to_cholesky_factors(rows, at, terms, min_pivot, determined, lanes):  # type: ignore[no-untyped-def]
+    """Replace the matrices by their Cholesky factors.
+
+    Args:
+        rows: flat (R, ``LANES``) float64.
+        at: first row of the matrices; terms: their size.
+        min_pivot: a factor with a pivot not above this is meaningless.
+        determined: the row that is set to 0 in the lanes of such factors.
+        lanes: number of systems.
+    """
     for i in range(terms):
         own = at + packed_index(i, i)
         for j in range(i):
@@ -63,14 +68,14 @@ def update_to_cholesky_factors(rows, at, terms, least, sound, lanes):  # type: i
             _update_row_quotient(rows, at + packed_index(i, j), at + packed_index(j, j), lanes)
             _update_minus_product(rows, own, at + packed_index(i, j), at + packed_index(i, j), lanes)
         for lane in range(lanes):
-            determined = rows[own * LANES + lane] > least
-            rows[sound * LANES + lane] = rows[sound * LANES + lane] if determined else 0.0
-            rows[own * LANES + lane] = np.sqrt(rows[own * LANES + lane] if determined else 1.0)
+            is_large = rows[own * LANES + lane] > min_pivot
+            rows[determined * LANES + lane] = rows[determined * LANES + lane] if is_large else 0.0
+            rows[own * LANES + lane] = np.sqrt(rows[own * LANES + lane] if is_large else 1.0)
 
 
 @compiled
 def update_to_solutions(rows, at, terms, side, lanes):  # type: ignore[no-untyped-def]
-    """Replace the right sides by the solutions."""
+    """Replace right sides, ``terms`` rows from ``side`` on, by the solutions with Cholesky factors at row ``at``."""
     for i in range(terms):
         for k in range(i):
             _update_minus_product(rows, side + i, at + packed_index(i, k), side + k, lanes)

@@ -1,6 +1,7 @@
 """Bilinear samples of an image at sub-pixel points, for use inside compiled loops.
 
-The image is passed flat, with its height and width: unsigned flat indices spare numba the wrap-around of negative ones.
+The image (H, W, 3) uint8 is passed as ``flat`` (3 H W,) with its height and width: numba needs no wrap-around for
+unsigned flat indices. Sub-pixel parts are rounded to 1 / ``SUBPIXEL_STEPS`` px.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ import numpy as np
 
 from extractor.numeric.compilation import compiled
 
-SUBPIXEL_STEPS = 256  # to a pixel
-BORDER_PX = 1.0 + 1e-6  # of the image's size, where the last sample lies
+SUBPIXEL_STEPS = 256  # per pixel
+BORDER_PX = 1.0 + 1e-6  # distance of the last sample from the image's width or height
+# The center and the corners of a hexagon of radius 1.
 HEXAGON_POINTS = np.array(
     [
         [0.0, 0.0],
@@ -26,7 +28,10 @@ HEXAGON_POINTS = np.array(
 
 @compiled
 def weighted_sample(flat, height, width, x, y, red, green, blue):  # type: ignore[no-untyped-def]
-    """The sample at (x, y) of the image's channels, weighted and summed; NaN outside the image."""
+    """The sample at (x, y), the channels multiplied by the weights red, green and blue; NaN outside the image.
+
+    The weights apply to channels 0, 1 and 2, in this order.
+    """
     if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
         return np.nan
     x, y = min(x, width - BORDER_PX), min(y, height - BORDER_PX)
@@ -36,7 +41,7 @@ def weighted_sample(flat, height, width, x, y, red, green, blue):  # type: ignor
     b = np.uint64(a + np.uint64(width * 3))
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     four, five = np.uint64(4), np.uint64(5)
-    both = fx * fy  # whole numbers are faster
+    both = fx * fy  # integers are faster
     right, down, rest = (
         SUBPIXEL_STEPS * fx - both,
         SUBPIXEL_STEPS * fy - both,
@@ -50,7 +55,7 @@ def weighted_sample(flat, height, width, x, y, red, green, blue):  # type: ignor
 
 @compiled
 def fill_patch_mean(flat, height, width, x, y, radius, out):  # type: ignore[no-untyped-def]
-    """Write the mean of seven samples, the center and a hexagon of ``radius`` around it; False outside the image."""
+    """Write the mean (3,) of seven samples, at (x, y) and on a hexagon of ``radius`` px; False outside the image."""
     if not (x >= radius and y >= radius and x <= width - 1.0 - radius and y <= height - 1.0 - radius):
         return False
     s0, s1, s2 = np.int64(0), np.int64(0), np.int64(0)
@@ -74,14 +79,14 @@ def fill_patch_mean(flat, height, width, x, y, radius, out):  # type: ignore[no-
         s0 += rest * flat[a] + right * flat[a + three] + down * flat[b] + both * flat[b + three]
         s1 += rest * flat[a + one] + right * flat[a + four] + down * flat[b + one] + both * flat[b + four]
         s2 += rest * flat[a + two] + right * flat[a + five] + down * flat[b + two] + both * flat[b + five]
-    whole = 1.0 / (7 * SUBPIXEL_STEPS * SUBPIXEL_STEPS)
-    out[0], out[1], out[2] = s0 * whole, s1 * whole, s2 * whole
+    share = 1.0 / (7 * SUBPIXEL_STEPS * SUBPIXEL_STEPS)
+    out[0], out[1], out[2] = s0 * share, s1 * share, s2 * share
     return True
 
 
 @compiled
 def clamp(value, low, high):  # type: ignore[no-untyped-def]
-    """The value held between low and high; NaN stays NaN."""
+    """The value limited to low and high; NaN stays NaN."""
     if value < low:
         return low
     if value > high:

@@ -1,6 +1,6 @@
-"""Bilinear samples of an image at many sub-pixel points at once, in loops without branches: lanes of vectors do them.
+"""Bilinear samples of an image at many sub-pixel points together, in branch-free loops that the compiler vectorises.
 
-The same samples as those of ``sampling``, to the bit.
+The samples equal those of ``bilinear`` to the last bit. Places are fixed-point numbers, 2^-32 px.
 """
 
 from __future__ import annotations
@@ -13,48 +13,49 @@ from numpy.typing import NDArray
 from extractor.numeric.bilinear import BORDER_PX, HEXAGON_POINTS, SUBPIXEL_STEPS
 from extractor.numeric.compilation import compiled
 
-FIXED_POINT_ONE, HALF_STEP = float(1 << 32), 1 << 23  # a pixel, and half of 1 / STEPS of it, in fixed places
-BATCH_POINTS = 192  # sampled at once, at most
+FIXED_POINT_ONE = float(1 << 32)  # one pixel
+HALF_STEP = 1 << 23  # 0.5 / SUBPIXEL_STEPS px
+BATCH_POINTS = 192  # points sampled together at most
+# Begins of columns: of ``fixed_points``, of ``channel_sums``, and with X and Y of ``patches``.
 X, Y, PIXEL_INDEX = (k * BATCH_POINTS for k in range(3))
 BLUE, GREEN, RED, FRACTION_X, FRACTION_Y = (k * BATCH_POINTS for k in range(5))
 RADIUS, COLOR, INSIDE = 2 * BATCH_POINTS, 3 * BATCH_POINTS, 6 * BATCH_POINTS
 
 
 class SampleBuffers(NamedTuple):
-    """What many samples at once are taken in, by columns of ``BATCH_POINTS``, so that loops have no branches.
+    """Memory for P = ``BATCH_POINTS`` samples; every array consists of columns of P.
 
     Attributes:
-        places: (3 P,) int64 ``X``, ``Y``, ``fixed_point_coordinate``, and ``PIXEL_INDEX``, the first byte of four
-            pixels.
-        words: (4 P,) uint32, the bytes of these.
-        parts: (5 P,) float32 ``BLUE``, ``GREEN``, ``RED``, the square of ``SUBPIXEL_STEPS`` times each channel, and
-            how far
-            beyond the first pixel the place lies, ``FRACTION_X`` and ``FRACTION_Y``.
-        patches: (7 P,) float64 ``X``, ``Y``, ``RADIUS``, px, the ``COLOR`` in three columns, and 1 where ``INSIDE`` the
-            image, else 0.
+        fixed_points: (3 P,) int64, the columns ``X`` and ``Y``, by ``fixed_point_coordinate``, and ``PIXEL_INDEX``, the
+            flat index of the first of the four pixels.
+        pixel_words: (4 P,) uint32, bytes of the four pixels.
+        channel_sums: (5 P,) float32, the columns ``BLUE``, ``GREEN`` and ``RED``, each channel times the square of
+            ``SUBPIXEL_STEPS``, and ``FRACTION_X`` and ``FRACTION_Y``, the sub-pixel parts in steps.
+        patches: (7 P,) float64, the columns ``X``, ``Y`` and ``RADIUS``, px, three of ``COLOR``, and ``INSIDE``, 1 in
+            the image, else 0.
     """
 
-    places: NDArray[np.int64]
+    fixed_points: NDArray[np.int64]
     pixel_words: NDArray[np.uint32]
     channel_sums: NDArray[np.float32]
     patches: NDArray[np.float64]
 
 
 @compiled
-def fixed_point_coordinate(place):  # type: ignore[no-untyped-def]
-    """A place as a whole number of 2^-32 px, half a step of a sample added, so that what is cut off rounds it."""
-    return np.int64(place * FIXED_POINT_ONE) + HALF_STEP
+def fixed_point_coordinate(place_px):  # type: ignore[no-untyped-def]
+    """A coordinate as an integer multiple of 2^-32 px, plus half a sub-pixel step, so that truncation rounds it."""
+    return np.int64(place_px * FIXED_POINT_ONE) + HALF_STEP
 
 
 @compiled
-def fixed_point_length(length):  # type: ignore[no-untyped-def]
-    """A length as a whole number of 2^-32 px."""
-    return np.int64(length * FIXED_POINT_ONE)
+def fixed_point_length(length_px):  # type: ignore[no-untyped-def]
+    """A length as an integer multiple of 2^-32 px."""
+    return np.int64(length_px * FIXED_POINT_ONE)
 
 
 @compiled
 def allocate_sample_buffers():  # type: ignore[no-untyped-def]
-    """A ``SampleBuffers``."""
+    """``SampleBuffers`` of zeros."""
     return SampleBuffers(
         np.zeros(3 * BATCH_POINTS, np.int64),
         np.zeros(4 * BATCH_POINTS, np.uint32),
@@ -64,13 +65,13 @@ def allocate_sample_buffers():  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_pixel_indices(height, width, places, shares, count):  # type: ignore[no-untyped-def]
-    """Write where the four pixels around each fixed place begin in the flat image, and how far beyond it lies."""
+def _fill_pixel_indices(height, width, points, fractions, count):  # type: ignore[no-untyped-def]
+    """Write the flat index of the four pixels around each of the first points, and its sub-pixel parts."""
     for i in range(count):
-        x, y = places[X + i], places[Y + i]
+        x, y = points[X + i], points[Y + i]
         ix, iy = min(x >> 32, width - 2), min(y >> 32, height - 2)
-        places[PIXEL_INDEX + i] = 3 * (iy * width + ix)
-        shares[FRACTION_X + i], shares[FRACTION_Y + i] = (
+        points[PIXEL_INDEX + i] = 3 * (iy * width + ix)
+        fractions[FRACTION_X + i], fractions[FRACTION_Y + i] = (
             (x >> 24) - SUBPIXEL_STEPS * ix,
             (y >> 24) - SUBPIXEL_STEPS * iy,
         )
@@ -78,18 +79,18 @@ def _fill_pixel_indices(height, width, places, shares, count):  # type: ignore[n
 
 @compiled
 def _read_word(flat, at):  # type: ignore[no-untyped-def]
-    """Four bytes as one number, which the machine reads at once."""
+    """Four bytes as one number, which compiles to one load."""
     a, b, c, d = flat[at], flat[at + np.uint64(1)], flat[at + np.uint64(2)], flat[at + np.uint64(3)]
     low = np.uint32(a) | np.uint32(b) << np.uint32(8)
     return low | np.uint32(c) << np.uint32(16) | np.uint32(d) << np.uint32(24)
 
 
 @compiled
-def _fill_pixel_words(flat, width, places, words, count):  # type: ignore[no-untyped-def]
-    """Read the first and the last four of the six bytes of two pixels, and of the two below."""
+def _fill_pixel_words(flat, width, points, words, count):  # type: ignore[no-untyped-def]
+    """Read the first and the last four of the six bytes of two adjacent pixels, and of the two below."""
     two, below = np.uint64(2), np.uint64(3 * width)
     for i in range(count):
-        k = np.uint64(places[PIXEL_INDEX + i])
+        k = np.uint64(points[PIXEL_INDEX + i])
         words[i], words[BATCH_POINTS + i] = _read_word(flat, k), _read_word(flat, k + two)
         words[2 * BATCH_POINTS + i], words[3 * BATCH_POINTS + i] = (
             _read_word(flat, k + below),
@@ -99,13 +100,13 @@ def _fill_pixel_words(flat, width, places, words, count):  # type: ignore[no-unt
 
 @compiled
 def _byte(word, number):  # type: ignore[no-untyped-def]
-    """One of the four bytes of a word, 0 the lowest."""
+    """Byte ``number`` of a word, 0 the lowest."""
     return np.float32(np.int32(word >> np.uint32(8 * number)) & np.int32(255))
 
 
 @compiled
 def _fill_channel_sums(words, parts, count):  # type: ignore[no-untyped-def]
-    """Write the sums of the channels; whole numbers below 2^24, which these floats hold exactly."""
+    """Write the channels' weighted sums: integers below 2^24, which float32 represents exactly."""
     steps = np.float32(SUBPIXEL_STEPS)
     for i in range(count):
         a, b, c, d = (
@@ -127,17 +128,17 @@ def _fill_channel_sums(words, parts, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fill_point_samples(flat, height, width, count, room):  # type: ignore[no-untyped-def]
-    """Take the samples at the first ``count`` places of a ``SampleBuffers``, which must lie in the image."""
-    _fill_pixel_indices(height, width, room.places, room.channel_sums, count)
-    _fill_pixel_words(flat, width, room.places, room.pixel_words, count)
-    _fill_channel_sums(room.pixel_words, room.channel_sums, count)
+def fill_point_samples(flat, height, width, count, buffers):  # type: ignore[no-untyped-def]
+    """Sample the image at the first ``count`` fixed points of ``SampleBuffers``, which must lie in the image."""
+    _fill_pixel_indices(height, width, buffers.fixed_points, buffers.channel_sums, count)
+    _fill_pixel_words(flat, width, buffers.fixed_points, buffers.pixel_words, count)
+    _fill_channel_sums(buffers.pixel_words, buffers.channel_sums, count)
 
 
 @compiled
-def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyped-def]
-    """``sample_patch`` for the first ``count`` patches of a ``SampleBuffers``."""
-    patches, parts = room.patches, room.channel_sums
+def fill_patch_means(flat, height, width, count, buffers):  # type: ignore[no-untyped-def]
+    """``fill_patch_mean`` for the first ``count`` patches of ``SampleBuffers``."""
+    patches, parts = buffers.patches, buffers.channel_sums
     for i in range(count):
         x, y, r = patches[X + i], patches[Y + i], patches[RADIUS + i]
         inside = (r >= 0.0) & (x >= r) & (y >= r) & (x <= width - 1.0 - r) & (y <= height - 1.0 - r)
@@ -145,8 +146,8 @@ def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyp
         for channel in range(3):
             patches[COLOR + channel * BATCH_POINTS + i] = 0.0
     for k in range(HEXAGON_POINTS.shape[0]):
-        _fill_hexagon_points(height, width, k, patches, room.places, count)
-        fill_point_samples(flat, height, width, count, room)
+        _fill_hexagon_points(height, width, k, patches, buffers.fixed_points, count)
+        fill_point_samples(flat, height, width, count, buffers)
         for channel in range(3):
             for i in range(count):
                 patches[COLOR + channel * BATCH_POINTS + i] += parts[channel * BATCH_POINTS + i]
@@ -156,11 +157,11 @@ def fill_patch_means(flat, height, width, count, room):  # type: ignore[no-untyp
 
 
 @compiled
-def _fill_hexagon_points(height, width, k, patches, places, count):  # type: ignore[no-untyped-def]
-    """Place a sample in every patch, at its center or a corner of its hexagon; somewhere where it lies outside."""
+def _fill_hexagon_points(height, width, k, patches, points, count):  # type: ignore[no-untyped-def]
+    """Write point k of the hexagon of every patch; (0, 0) for patches outside the image."""
     u, v = HEXAGON_POINTS[k]
     for i in range(count):
         x, y = patches[X + i] + patches[RADIUS + i] * u, patches[Y + i] + patches[RADIUS + i] * v
         inside = patches[INSIDE + i] > 0.0
-        places[X + i] = fixed_point_coordinate(min(x, width - BORDER_PX) if inside else 0.0)
-        places[Y + i] = fixed_point_coordinate(min(y, height - BORDER_PX) if inside else 0.0)
+        points[X + i] = fixed_point_coordinate(min(x, width - BORDER_PX) if inside else 0.0)
+        points[Y + i] = fixed_point_coordinate(min(y, height - BORDER_PX) if inside else 0.0)

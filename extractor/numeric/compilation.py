@@ -1,7 +1,7 @@
-"""Compiles the loops that plain Python is too slow for, once, and caches the machine code on disk.
+"""Compiles functions with numba and caches the machine code on disk.
 
-Every compiled function is ordinary Python on numpy arrays: with ``NUMBA_DISABLE_JIT=1`` (or without numba) the
-same source runs uncompiled, which is the twin that the tests compare against.
+Every compiled function is ordinary Python on numpy arrays: with ``NUMBA_DISABLE_JIT=1``, or without numba, the same
+source runs uncompiled. The tests compare the two.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ log = logging.getLogger("extractor")
 numba: Any
 try:
     numba = import_module("numba")
-except ImportError:  # slow, but right
+except ImportError:  # slow, with the same results
     numba = None
 
 
@@ -30,7 +30,7 @@ def compiled(function: Function) -> Function:
 
 
 def vectorized(function: Function) -> Function:
-    """The same for loops whose sums may be taken in any order, so that several terms are added at once.
+    """As ``compiled``, for loops whose sums may be reordered, so that several terms are added at once.
 
     NaN and infinity keep their meaning.
     """
@@ -38,27 +38,26 @@ def vectorized(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """The same for what a loop calls for every item: a call with some arrays costs as much as a hundred additions."""
+    """As ``compiled``, inlined into the caller: a call with a few arrays costs as much as a hundred additions."""
     return _jit(function, False, forceinline=True)
 
 
 def inlined_no_refcount(function: Function) -> Function:
-    """The same as ``inlined`` for what neither makes nor returns arrays: references to those it is lent are not
-    counted.
+    """As ``inlined``, for functions that neither create nor return arrays: references to arrays are not counted.
 
-    Every row or slice of an array that is taken counts as one until it is dropped, each time by a locked write: where
-    a loop takes some for every item, that is a good part of its time.
+    Each row or slice of an array is otherwise counted until it is dropped, by locked writes: a large part of the time
+    of a loop that takes slices for every item.
     """
     return _jit(function, False, forceinline=True, _nrt=False)
 
 
 def compiled_no_refcount(function: Function) -> Function:
-    """The same for what is too long to be put in place wherever it is called."""
+    """As ``inlined_no_refcount``, for functions too long to be inlined."""
     return _jit(function, False, _nrt=False)
 
 
 def vectorized_no_refcount(function: Function) -> Function:
-    """The same for loops whose sums may be taken in any order."""
+    """As ``inlined_no_refcount``, for loops whose sums may be reordered."""
     return _jit(function, REORDERING_FLAGS, forceinline=True, _nrt=False)
 
 
@@ -71,17 +70,16 @@ def _jit(function: Function, fastmath: bool | set[str], **more: bool) -> Functio
 
 
 def _announce_compilation() -> None:
-    """Say it once when code of this package has to be compiled: the first use takes seconds, later ones do not."""
-
+    """Log one warning when code of this package is compiled."""
     event = import_module("numba.core.event")
 
     class Announcer(event.Listener):  # type: ignore[misc, name-defined]
-        said = False
+        is_announced = False
 
         def on_start(self, happening: Any) -> None:
             dispatcher = happening.data["dispatcher"]
-            if not self.said and dispatcher.py_func.__module__.startswith("extractor."):
-                self.said = True
+            if not self.is_announced and dispatcher.py_func.__module__.startswith("extractor."):
+                self.is_announced = True
                 log.warning(
                     "compiling for this machine; the first use takes about two minutes, later ones are cached"
                 )

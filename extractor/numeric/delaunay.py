@@ -1,8 +1,8 @@
-"""The Delaunay triangles of points in the plane, with their neighbours: a general library takes twice the time of all
-the rest of the numbering.
+"""Delaunay triangulation of points in the plane, with the triangles' neighbours.
 
-Points are inserted one by one in rows of a grid, each walked to from the one before (Lawson 1977): split the triangle
-that holds it, then flip every edge whose other triangle has the new point in its circle.
+A general library takes twice the time of all the rest of the numbering. Points are inserted one by one along the rows
+of a grid (Lawson 1977): a walk from the point before leads to the triangle that contains the new point; the triangle is
+split; then every edge whose other triangle has the new point in its circumcircle is flipped.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
 
-OUTER_RADIUS = 64.0  # of the points' extent, to the corners of the triangle that holds them all
-ROUNDING_TOLERANCE = 1e-15  # in units of the extent: points on a line, or on a circle, to within rounding
-POINTS_PER_BUCKET = 3.0  # to a cell of the grid that orders the insertion
+OUTER_RADIUS = 64.0  # in units of the points' extent, of the triangle that contains all points
+ROUNDING_TOLERANCE = 1e-15  # of determinants, with the extent as unit, for points on a line or on a circle
+POINTS_PER_BUCKET = 3.0  # mean number of points in a cell of the grid that orders the insertion
 
 
 @compiled
 def _insertion_order(points):  # type: ignore[no-untyped-def]
-    """The points' order along rows of a grid, every other row backwards."""
+    """(N,) the points' order along the rows of a grid, every other row backwards."""
     count = points.shape[0]
     low_x, low_y = points[:, 0].min(), points[:, 1].min()
     width, height = points[:, 0].max() - low_x, points[:, 1].max() - low_y
@@ -34,14 +34,14 @@ def _insertion_order(points):  # type: ignore[no-untyped-def]
 
 @compiled
 def _doubled_area(xy, a, b, p):  # type: ignore[no-untyped-def]
-    """Twice the area of a, b, p; positive where p lies on the inner side of a triangle's edge a-b."""
+    """Twice the signed area of a, b, p; positive if p lies on the inner side of a triangle's edge a-b."""
     ax, ay = xy[a, 0], xy[a, 1]
     return (xy[b, 0] - ax) * (xy[p, 1] - ay) - (xy[b, 1] - ay) * (xy[p, 0] - ax)
 
 
 @compiled
 def _in_circle_determinant(xy, a, b, c, p):  # type: ignore[no-untyped-def]
-    """Positive when p lies in the circle through a, b, c (which turn positively)."""
+    """Positive if p lies in the circle through a, b, c, which turn positively."""
     px, py = xy[p, 0], xy[p, 1]
     ax, ay, bx, by, cx, cy = (
         xy[a, 0] - px,
@@ -56,13 +56,13 @@ def _in_circle_determinant(xy, a, b, c, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _locate_triangle(xy, faces, neighbours, start, found, p, slack):  # type: ignore[no-untyped-def]
-    """The triangle of those found that holds p, walked to from another; -1 should rounding lead in circles."""
+def _locate_triangle(xy, faces, neighbours, start, count, p, tolerance):  # type: ignore[no-untyped-def]
+    """The triangle that contains p, by a walk from the triangle ``start``; -1 if rounding makes the walk circular."""
     f = start
-    for _ in range(4 * found):
+    for _ in range(4 * count):
         outside = -1
         for k in range(3):
-            if _doubled_area(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -slack:
+            if _doubled_area(xy, faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], p) < -tolerance:
                 outside = k
                 break
         if outside < 0:
@@ -75,7 +75,7 @@ def _locate_triangle(xy, faces, neighbours, start, found, p, slack):  # type: ig
 
 @compiled
 def _update_neighbour(neighbours, face, old, new):  # type: ignore[no-untyped-def]
-    """Let a face's neighbour ``old`` be ``new``."""
+    """Replace a face's neighbour ``old`` by ``new``; no change for face -1."""
     if face >= 0:
         for k in range(3):
             if neighbours[face, k] == old:
@@ -84,7 +84,7 @@ def _update_neighbour(neighbours, face, old, new):  # type: ignore[no-untyped-de
 
 @compiled
 def _update_split_triangle(faces, neighbours, f, count, p):  # type: ignore[no-untyped-def]
-    """Split face f by the point p, which becomes vertex 0 of f and of the two new faces count and count + 1."""
+    """Split face f at the point p, which becomes corner 0 of f and of the new faces ``count`` and ``count`` + 1."""
     a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
     na, nb, nc = neighbours[f, 0], neighbours[f, 1], neighbours[f, 2]
     g, h = count, count + 1
@@ -99,9 +99,9 @@ def _update_split_triangle(faces, neighbours, f, count, p):  # type: ignore[no-u
 
 
 @compiled
-def _update_by_flips(xy, faces, neighbours, stack, height, slack):  # type: ignore[no-untyped-def]
-    """Flip the edges opposite to the new point, vertex 0 of the faces on the stack, until none is in a circle."""
-    for _ in range(stack.shape[0] - height):  # more flips than that only rounding can ask for
+def _update_by_flips(xy, faces, neighbours, stack, height, tolerance):  # type: ignore[no-untyped-def]
+    """Flip edges opposite to the new point, corner 0 of the ``height`` faces on the stack, until all are Delaunay."""
+    for _ in range(stack.shape[0] - height):  # only rounding could cause more flips
         if height == 0:
             break
         height -= 1
@@ -112,7 +112,7 @@ def _update_by_flips(xy, faces, neighbours, stack, height, slack):  # type: igno
         p, a, b = faces[f, 0], faces[f, 1], faces[f, 2]
         k = 0 if neighbours[g, 0] == f else 1 if neighbours[g, 1] == f else 2
         d = faces[g, k]
-        if not _in_circle_determinant(xy, p, a, b, d) > slack:
+        if not _in_circle_determinant(xy, p, a, b, d) > tolerance:
             continue
         # f = p, a, b and g = d, b, a become f = p, a, d and g = p, d, b
         beyond_ad, beyond_db = neighbours[g, (k + 1) % 3], neighbours[g, (k + 2) % 3]
@@ -129,7 +129,7 @@ def _update_by_flips(xy, faces, neighbours, stack, height, slack):  # type: igno
 
 @compiled
 def _triangulate(points, order):  # type: ignore[no-untyped-def]
-    """All triangles, those with a corner beyond the points among them, and their neighbours."""
+    """All triangles, including those with a corner of the outer triangle, and their neighbours."""
     count = points.shape[0]
     xy = np.empty((count + 3, 2))
     middle = np.array(
@@ -150,10 +150,11 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
         f = _locate_triangle(xy, faces, neighbours, last, found, i, ROUNDING_TOLERANCE)
         if f < 0:
             continue
-        twice = False
+        is_duplicate = False
         for k in range(3):
-            twice = twice or (xy[faces[f, k], 0] == xy[i, 0] and xy[faces[f, k], 1] == xy[i, 1])
-        if twice:
+            c = faces[f, k]
+            is_duplicate = is_duplicate or (xy[c, 0] == xy[i, 0] and xy[c, 1] == xy[i, 1])
+        if is_duplicate:
             continue
         _update_split_triangle(faces, neighbours, f, found, i)
         stack[0], stack[1], stack[2] = f, found, found + 1
@@ -165,14 +166,14 @@ def _triangulate(points, order):  # type: ignore[no-untyped-def]
 
 @compiled
 def _inner_triangles(faces, neighbours, count):  # type: ignore[no-untyped-def]
-    """The triangles whose corners are all points, numbered anew."""
+    """The triangles without a corner of the outer triangle, renumbered, and their neighbours."""
     number = np.full(faces.shape[0], -1, np.int32)
     kept = 0
     for f in range(faces.shape[0]):
         if max(faces[f, 0], faces[f, 1], faces[f, 2]) < count:
             number[f] = kept
             kept += 1
-    inner, beside = np.empty((kept, 3), np.int32), np.full((kept, 3), -1, np.int32)
+    inner, across = np.empty((kept, 3), np.int32), np.full((kept, 3), -1, np.int32)
     for f in range(faces.shape[0]):
         n = number[f]
         if n < 0:
@@ -180,15 +181,18 @@ def _inner_triangles(faces, neighbours, count):  # type: ignore[no-untyped-def]
         for k in range(3):
             inner[n, k] = faces[f, k]
             if neighbours[f, k] >= 0:
-                beside[n, k] = number[neighbours[f, k]]
-    return inner, beside
+                across[n, k] = number[neighbours[f, k]]
+    return inner, across
 
 
 def delaunay(points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Delaunay triangles of points (N, 2), finite: (F, 3) int32 their corners, turning from x to y, and (F, 3) int32
-    the triangle across the edge opposite to each corner, or -1.
+    """The Delaunay triangles of finite points (N, 2) float64.
 
-    Of points at one place the first inserted is used. Along the hull, slivers may be missing.
+    Only the first of coincident points is used. Slivers along the hull may be missing.
+
+    Returns:
+        (F, 3) int32 the triangles' corners, turning from x to y; (F, 3) int32 the triangle across the edge opposite to
+        each corner, or -1.
     """
     if len(points) < 3:
         return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)

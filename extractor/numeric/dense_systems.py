@@ -1,4 +1,4 @@
-"""Small vectors and dense systems inside compiled loops."""
+"""Small vectors and dense systems of equations, for use inside compiled loops."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from extractor.numeric.compilation import compiled
 
 @compiled
 def dot3(a, b):  # type: ignore[no-untyped-def]
-    """The product of two vectors of three."""
+    """The scalar product of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def update_to_cholesky_solution(gram, right, count):  # type: ignore[no-untyped-def]
-    """Replace the rows of ``right`` by the solutions of gram x = row.
+    """Replace the rows of ``right`` by the solutions x of gram x = row.
 
-    ``gram`` is symmetric and positive definite; its first ``count`` rows' lower triangle is read, and overwritten.
+    Args:
+        gram: (n, n), n >= count, symmetric and positive definite; the lower triangle of the first ``count`` rows is
+            read, and replaced by the Cholesky factor.
+        right: (R, n) the right sides.
+        count: number of equations.
     """
     for j in range(count):
         for k in range(j):

@@ -1,13 +1,13 @@
-"""The normal distribution, and how much of a blurred half plane or wedge a pixel sees.
+"""The normal distribution, and the coverage of a pixel by a blurred half plane or wedge.
 
-Lengths are in units of the blur. Where a pixel lies h inside one side of a wedge and k inside the other, its share of
-the wedge is how often two normal deviates, correlated by r, lie below h and k: r is the cosine between the directions
-in which the sides are walked along, one after the other. That is N(h) N(k) where these are at right angles, and
-changes with r as the density of both does (Drezner and Wesolowsky 1990):
+Lengths are in units of the blur. For a pixel at the distance h inside one side of a wedge and k inside the other, the
+coverage is the probability that two normal deviates of correlation r lie below h and k. r is the cosine between the
+directions of the sides, both along the wedge's outline. At right angles the coverage is N(h) N(k); its derivative with
+respect to r is the bivariate density (Drezner and Wesolowsky 1990):
 
     share = N(h) N(k) + integral from 0 to r of exp(-(h^2 + k^2 - 2 h k s) / 2 (1 - s^2)) / 2 pi sqrt(1 - s^2) ds.
 
-With s = 2 u / (1 + u^2) the integrand is smooth enough for a Gaussian rule of three nodes.
+With s = 2 u / (1 + u^2) the integrand is smooth enough for a Gauss-Legendre rule of three nodes.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import numpy as np
 
 from extractor.numeric.compilation import inlined_no_refcount
 
-NORMAL_REACH = 3.3  # a side farther away than this is not seen
+NORMAL_REACH = 3.3  # in units of the blur; a side farther away has no influence
 GAUSS_NODES = np.polynomial.legendre.leggauss(
     3
-)  # good to 6e-5 for wedges of 30 to 150 degrees, 3e-4 for 20 to 160
-CORNER_TERMS = 9  # numbers: for each node the factors of h^2 + k^2 and of h k, and its weight
-EXP_POWER = 16  # of a cubic is the exponential
-MAX_EXPONENT = 12.0  # exp(-12) is nothing
+)  # error 6e-5 for wedges of 30 to 150 degrees, 3e-4 for 20 to 160
+CORNER_TERMS = 9  # of a corner: three factors of h^2 + k^2, three of h k, three weights, one per node
+EXP_POWER = 16  # the exponential is this power of a cubic
+MAX_EXPONENT = 12.0  # exp(-12) counts as 0
 
 
 def _normal_coefficients() -> tuple[np.float32, ...]:
-    """The normal distribution less a half over z, by z^2, as a polynomial good to 3e-6 as far as ``NORMAL_REACH``."""
+    """The polynomial in z^2 for (N(z) - 0.5) / z, with an error of 3e-6 up to ``NORMAL_REACH``."""
     from scipy.special import ndtr
 
     z = NORMAL_REACH * np.sin(np.linspace(1e-3, np.pi / 2, 3000))
@@ -39,9 +39,9 @@ def _normal_coefficients() -> tuple[np.float32, ...]:
 
 
 def _exp_coefficients() -> tuple[np.float32, ...]:
-    """exp(-x) up to a sixteenth of ``MAX_EXPONENT``, as a cubic whose power is good to 1e-5."""
+    """The cubic for exp(-x) up to ``MAX_EXPONENT`` / ``EXP_POWER``, whose power has an error of 1e-5."""
     x = np.linspace(0.0, MAX_EXPONENT / EXP_POWER, 2000)
-    # an error counts as much as the rest of the power makes of it
+    # the power multiplies an error by the other factors
     weight = np.exp(-(EXP_POWER - 1) * x)
     terms = np.vander(x, 4, increasing=True)
     fit = np.linalg.lstsq(terms * weight[:, None], np.exp(-x) * weight, rcond=None)[0]
@@ -56,15 +56,17 @@ HALF = np.float32(0.5)
 
 @inlined_no_refcount
 def normal_cdf(z):  # type: ignore[no-untyped-def]
-    """The normal distribution of a float32 as far as ``NORMAL_REACH`` to both sides."""
+    """The normal distribution of a float32 z, abs(z) <= ``NORMAL_REACH``."""
     zz = z * z
     return HALF + z * (N0 + zz * (N1 + zz * (N2 + zz * (N3 + zz * (N4 + zz * (N5 + zz * (N6 + zz * N7)))))))
 
 
 @inlined_no_refcount
 def fill_corner_terms(r, out):  # type: ignore[no-untyped-def]
-    """Fill in what ``wedge_correlation`` needs of a corner (9,) float32, by the cosine between its sides'
-    directions."""
+    """Write the terms (``CORNER_TERMS``,) float32 of a corner for ``wedge_correlation``.
+
+    ``r`` is the cosine between the directions of its sides.
+    """
     end = r / (1.0 + np.sqrt(max(1.0 - r * r, 0.0)))
     for i in range(3):
         u = 0.5 * end * (1.0 + GAUSS_NODES[0][i])
@@ -76,7 +78,7 @@ def fill_corner_terms(r, out):  # type: ignore[no-untyped-def]
 
 @inlined_no_refcount
 def _exp_minus_16x(x):  # type: ignore[no-untyped-def]
-    """exp(-16 x) of a float32, x not below 0."""
+    """exp(-16 x) of a float32 x >= 0."""
     x = min(x, EXP_END)
     e = E0 + x * (E1 + x * (E2 + x * E3))
     e = e * e
@@ -87,8 +89,12 @@ def _exp_minus_16x(x):  # type: ignore[no-untyped-def]
 
 @inlined_no_refcount
 def wedge_correlation(squares, product, corner):  # type: ignore[no-untyped-def]
-    """A wedge's share beyond the product of its sides' by h^2 + k^2 and h k, and nine numbers of its corner."""
-    a0, a1, a2, b0, b1, b2, w0, w1, w2 = corner
-    share = w0 * _exp_minus_16x(a0 * squares - b0 * product)
-    share += w1 * _exp_minus_16x(a1 * squares - b1 * product)
-    return share + w2 * _exp_minus_16x(a2 * squares - b2 * product)
+    """The coverage by a wedge minus the product N(h) N(k) of its sides, float32.
+
+    Args:
+        squares: h^2 + k^2; product: h k.
+        corner: tuple of the nine terms of ``fill_corner_terms``, in this order.
+    """
+    coverage = corner[6] * _exp_minus_16x(corner[0] * squares - corner[3] * product)
+    coverage += corner[7] * _exp_minus_16x(corner[1] * squares - corner[4] * product)
+    return coverage + corner[8] * _exp_minus_16x(corner[2] * squares - corner[5] * product)

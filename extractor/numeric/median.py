@@ -1,6 +1,6 @@
-"""The median of a few numbers, inside compiled loops.
+"""The median of a few numbers, for use inside compiled loops.
 
-Sorting them takes a branch a comparison that nobody can guess; counting how many are smaller than each takes none.
+Sorting takes an unpredictable branch per comparison; counting the smaller numbers of each takes none.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Cells that stand apart, behind a scratch or amid missing cells: numbered by prediction and color, or left out.
+"""Numbers detached cells, behind a scratch or amid missing cells, by contact or by prediction and color.
 
-In: numbered cells, cells without a number. Out: more numbered cells.
+In: numbered cells, cells without a number. Out: more numbered cells, without inconsistent ones.
 """

@@ -1,4 +1,4 @@
-"""Which of the layout's free places the cells without a number claim, the nearest to the numbered ones first."""
+"""Assigns cells without a number to free cells of the layout, those nearest to the numbered ones first."""
 
 from __future__ import annotations
 
@@ -15,45 +15,61 @@ from extractor.localmap.quadratic_map import (
 )
 from extractor.numbering.gaps.corner_contact import equilateral_edge
 from extractor.numeric.compilation import compiled, inlined_no_refcount
-from extractor.numeric.nearest_points import fill_nearest_points
+from extractor.numeric.nearest_points import BucketGrid, fill_nearest_points
 
-JOINT_GAP = 1.7  # what is not farther from a numbered cell, in cells, is numbered together,
-JOINT_GAP_RATIO = 1.25  # and what is not so much farther than the nearest
-MAX_PLACE_MISFIT = 0.3  # in cells, between where the map puts a cell and the layout's place for it
-RIVAL_DISTANCE = (
-    1.5  # in cells, how near to each other two may be what is left of one; the next of its ink is 1.7 away
-)
+JOINT_GAP = 1.7  # cells not farther than this from a numbered one, in cells, are numbered in one round,
+JOINT_GAP_RATIO = 1.25  # and cells not farther than this many times the least gap
+MAX_PLACE_MISFIT = 0.3  # in cells, between a cell's predicted place and the layout's cell
+RIVAL_DISTANCE = 1.5  # in cells, between possible fragments of one cell; the next cell of the ink is at 1.7
+
+
+class SupportCells(NamedTuple):
+    """The numbered intact cells from which places in the layout are predicted.
+
+    Attributes:
+        cells: (K,) int64, the cells of the image.
+        grid: the ``BucketGrid`` of their centers, px.
+    """
+
+    cells: NDArray[np.int64]
+    grid: BucketGrid
 
 
 class CellAssignments(NamedTuple):
-    """What loose cells (L,) claim of the layout's places (U,).
+    """Assignments of L cells without a number to U cells of the layout; updated in place.
 
     Attributes:
-        place: (L,) int32, the place that a cell would take, or -1.
-        asked: (L,) bool, the cells that were asked for it, and those that need not be.
-        gap: (L,) how far each is from the next numbered one, in cells; infinite if it is one.
-        reach2: (L,) px^2, the squared distance of the farthest witness of those asked: a nearer one changes the claim.
-        takers: (U,) int32, how many cells claim each place.
-        near, square: the witnesses of one cell and their squared distances, a buffer.
+        candidate: (L,) int64, the cells of the image that have no number.
+        place: (L,) int32, the cell of the layout that each would be, or -1.
+        is_evaluated: (L,) bool, ``place`` is known, or need not be.
+        gap: (L,) float64, the distance from the next numbered cell, in cells; infinite for a cell numbered meanwhile.
+        support_radius2: (L,) float64, px^2, the squared distance of the farthest support cell of those evaluated: a
+            nearer new number changes the assignment.
+        candidate_count: (U,) int32, how many cells are assigned to each cell of the layout.
+        nearest: (``SUPPORT_CELLS``,) int32 and squared_distance: (``SUPPORT_CELLS``,) float64, px^2, buffers for the
+            support of one cell.
     """
 
+    candidate: NDArray[np.int64]
     place: NDArray[np.int32]
-    asked: NDArray[np.bool_]
+    is_evaluated: NDArray[np.bool_]
     gap: NDArray[np.float64]
     support_radius2: NDArray[np.float64]
     candidate_count: NDArray[np.int32]
-    near: NDArray[np.int32]
+    nearest: NDArray[np.int32]
     squared_distance: NDArray[np.float64]
 
 
 @compiled
-def empty_assignments(cells, places):  # type: ignore[no-untyped-def]
-    """``CellAssignments`` before anything is asked."""
+def empty_assignments(candidate, places):  # type: ignore[no-untyped-def]
+    """``CellAssignments`` of the cells ``candidate`` (L,) to ``places`` cells of the layout, before any evaluation."""
+    count = candidate.shape[0]
     return CellAssignments(
-        np.full(cells, -1, np.int32),
-        np.zeros(cells, np.bool_),
-        np.empty(cells),
-        np.empty(cells),
+        candidate,
+        np.full(count, -1, np.int32),
+        np.zeros(count, np.bool_),
+        np.empty(count),
+        np.empty(count),
         np.zeros(places, np.int32),
         np.empty(SUPPORT_CELLS, np.int32),
         np.empty(SUPPORT_CELLS),
@@ -61,122 +77,137 @@ def empty_assignments(cells, places):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def update_outdated_assignments(center, loose, fresh, cell, free, claims):  # type: ignore[no-untyped-def]
-    """Forget the claims to places that are not free any more, and those that the fresh cells may change."""
-    claims.candidate_count[:] = 0
-    for n in range(loose.shape[0]):
-        i, place = loose[n], claims.place[n]
-        if cell[i] >= 0 or (place >= 0 and not free[place]):
-            claims.place[n] = -1
-        if cell[i] < 0 and claims.asked[n] and _is_any_within(center, i, fresh, claims.support_radius2[n]):
-            claims.place[n], claims.asked[n] = -1, False
-        if claims.place[n] >= 0:
-            claims.candidate_count[claims.place[n]] += 1
+def update_outdated_assignments(cells, new_cells, numbering, assignments):  # type: ignore[no-untyped-def]
+    """Withdraw assignments to occupied cells of the layout, and those that newly numbered cells may change.
+
+    Args:
+        cells: ``CellArrays``.
+        new_cells: the cells of the image numbered since the last update.
+        numbering: ``PartialNumbering``.
+        assignments: ``CellAssignments``, updated.
+    """
+    assignments.candidate_count[:] = 0
+    for n in range(assignments.candidate.shape[0]):
+        i, place = assignments.candidate[n], assignments.place[n]
+        is_numbered = numbering.cell[i] >= 0
+        if is_numbered or (place >= 0 and not numbering.free[place]):
+            assignments.place[n] = -1
+        was_evaluated, radius2 = assignments.is_evaluated[n], assignments.support_radius2[n]
+        if not is_numbered and was_evaluated and _is_any_within(cells.center_px, i, new_cells, radius2):
+            assignments.place[n], assignments.is_evaluated[n] = -1, False
+        if assignments.place[n] >= 0:
+            assignments.candidate_count[assignments.place[n]] += 1
 
 
 @inlined_no_refcount
-def _is_any_within(center, i, fresh, reach2):  # type: ignore[no-untyped-def]
-    """Whether one of the fresh cells lies within reach of cell i."""
-    for j in fresh:
+def _is_any_within(center, i, others, radius2):  # type: ignore[no-untyped-def]
+    """Whether one of the other cells lies nearer to cell i than the root of ``radius2``, px^2."""
+    for j in others:
         x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
-        if x * x + y * y < reach2:
+        if x * x + y * y < radius2:
             return True
     return False
 
 
 @compiled
-def _update_gaps(center, area, loose, known, xy, grid, cell, claims):  # type: ignore[no-untyped-def]
-    """Write how far from the numbered cells the loose ones are; who is too far, whatever the map, need not be asked."""
-    for n in range(loose.shape[0]):
-        i = loose[n]
+def _update_gaps(cells, support, cell, assignments):  # type: ignore[no-untyped-def]
+    """Write the gaps; cells too far from the numbered ones for any map need no evaluation."""
+    nearest, squares = assignments.nearest[:1], assignments.squared_distance[:1]
+    for n in range(assignments.candidate.shape[0]):
+        i = assignments.candidate[n]
         if cell[i] >= 0:
-            claims.gap[n], claims.asked[n] = np.inf, True
+            assignments.gap[n], assignments.is_evaluated[n] = np.inf, True
             continue
-        fill_nearest_points(
-            xy, grid, center[i, 0], center[i, 1], claims.near[:1], claims.squared_distance[:1]
-        )
-        claims.gap[n] = np.sqrt(claims.squared_distance[0]) / equilateral_edge(area[known[claims.near[0]]])
-        if not claims.asked[n] and not claims.gap[n] < 2.0 * MAX_SUPPORT_DISTANCE:
-            claims.support_radius2[n], claims.asked[n] = (
-                np.inf,
-                True,
-            )  # asked anew when anything has been numbered
+        fill_nearest_points(support.grid, cells.center_px[i, 0], cells.center_px[i, 1], nearest, squares)
+        assignments.gap[n] = np.sqrt(squares[0]) / equilateral_edge(cells.area_px[support.cells[nearest[0]]])
+        if not assignments.is_evaluated[n] and not assignments.gap[n] < 2.0 * MAX_SUPPORT_DISTANCE:
+            # to be evaluated again after any new number
+            assignments.support_radius2[n], assignments.is_evaluated[n] = np.inf, True
 
 
 @compiled
-def update_assignments(center, area, ink, loose, known, xy, grid, cell, free, plan, claims):  # type: ignore[no-untyped-def]
-    """Let the loose cells that are the nearest to numbered ones claim places, and those beside them that might claim
-    the same, until it is plain who is numbered; up to which gap these are.
+def update_assignments(cells, layout, support, numbering, assignments):  # type: ignore[no-untyped-def]
+    """Assign the cells nearest to numbered ones, and their possible rivals, until it is clear which are numbered next.
 
-    ``xy`` are the centers of the known cells, and ``grid`` their buckets.
+    Args:
+        cells: ``CellArrays``. layout: ``LayoutCells``.
+        support: ``SupportCells``.
+        numbering: ``PartialNumbering``.
+        assignments: ``CellAssignments``, updated.
+
+    Returns:
+        The gap, in cells, up to which unique assignments become numbers in this round.
     """
-    _update_gaps(center, area, loose, known, xy, grid, cell, claims)
-    places, room = np.flatnonzero(free), allocate_map_buffers()
-    horizon = JOINT_GAP
+    _update_gaps(cells, support, numbering.cell, assignments)
+    free, buffers = np.flatnonzero(numbering.free), allocate_map_buffers()
+    candidate, horizon = assignments.candidate, JOINT_GAP
     while True:
-        for n in range(loose.shape[0]):
-            if not claims.asked[n] and claims.gap[n] <= horizon:
-                _update_cell_assignment(
-                    center, ink, loose, n, known, xy, grid, cell, places, plan, claims, room
-                )
-        for n in range(loose.shape[0]):
-            if claims.place[n] < 0 or claims.gap[n] > horizon:
+        for n in range(candidate.shape[0]):
+            if not assignments.is_evaluated[n] and assignments.gap[n] <= horizon:
+                _update_cell_assignment(cells, layout, n, support, numbering.cell, free, assignments, buffers)
+        for n in range(candidate.shape[0]):
+            if assignments.place[n] < 0 or assignments.gap[n] > horizon:
                 continue
-            for m in range(loose.shape[0]):
-                if not claims.asked[m] and _is_possible_rival(center, area, ink, loose[n], loose[m]):
+            for m in range(candidate.shape[0]):
+                if not assignments.is_evaluated[m] and _is_possible_rival(cells, candidate[n], candidate[m]):
                     _update_cell_assignment(
-                        center, ink, loose, m, known, xy, grid, cell, places, plan, claims, room
+                        cells, layout, m, support, numbering.cell, free, assignments, buffers
                     )
-        limit, beyond = _joint_gap_limit(claims)
-        if limit <= horizon or beyond == np.inf:
+        limit, next_gap = _joint_gap_limit(assignments)
+        if limit <= horizon or next_gap == np.inf:
             return limit
-        horizon = min(limit, JOINT_GAP_RATIO * beyond)
+        horizon = min(limit, JOINT_GAP_RATIO * next_gap)
 
 
 @inlined_no_refcount
-def _is_possible_rival(center, area, ink, i, j):  # type: ignore[no-untyped-def]
-    """Whether two cells of one ink are so near to each other that both might be taken for one of the layout."""
-    if ink[i] != ink[j]:
+def _is_possible_rival(cells, i, j):  # type: ignore[no-untyped-def]
+    """Whether two cells of one ink are so close that both may be assigned to one cell of the layout."""
+    if cells.ink[i] != cells.ink[j]:
         return False
-    x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
-    return x * x + y * y < (RIVAL_DISTANCE * equilateral_edge(max(area[i], area[j]))) ** 2
+    x = cells.center_px[j, 0] - cells.center_px[i, 0]
+    y = cells.center_px[j, 1] - cells.center_px[i, 1]
+    edge = equilateral_edge(max(cells.area_px[i], cells.area_px[j]))
+    return x * x + y * y < (RIVAL_DISTANCE * edge) ** 2
 
 
 @compiled
-def _joint_gap_limit(claims):  # type: ignore[no-untyped-def]
-    """Up to which gap cells are numbered together, infinite where none alone claims a place; and the least gap of those
-    that were not asked."""
-    least, beyond = np.inf, np.inf
-    for n in range(claims.place.shape[0]):
-        if not claims.asked[n]:
-            beyond = min(beyond, claims.gap[n])
-        elif claims.place[n] >= 0 and claims.candidate_count[claims.place[n]] == 1:
-            least = min(least, claims.gap[n])
-    return max(JOINT_GAP, JOINT_GAP_RATIO * least), beyond
+def _joint_gap_limit(assignments):  # type: ignore[no-untyped-def]
+    """The gap up to which cells are numbered together, infinite without a unique assignment; and the least gap of the
+    cells not evaluated."""
+    least, next_gap = np.inf, np.inf
+    for n in range(assignments.place.shape[0]):
+        if not assignments.is_evaluated[n]:
+            next_gap = min(next_gap, assignments.gap[n])
+        elif assignments.place[n] >= 0 and assignments.candidate_count[assignments.place[n]] == 1:
+            least = min(least, assignments.gap[n])
+    return max(JOINT_GAP, JOINT_GAP_RATIO * least), next_gap
 
 
 @inlined_no_refcount
-def _update_cell_assignment(center, ink, loose, n, known, xy, grid, cell, places, plan, claims, room):  # type: ignore[no-untyped-def]
-    """Write which place a loose cell claims."""
-    i, near, square = loose[n], claims.near, claims.squared_distance
-    count = fill_nearest_points(xy, grid, center[i, 0], center[i, 1], near, square)
-    x, y, size = fill_quadratic_map(center, i, known, near[:count], square, cell, plan, room)
-    place = _nearest_place_of_ink(places, x, y, MAX_PLACE_MISFIT * size, ink[i], plan)
-    claims.support_radius2[n] = square[count - 1] if count == SUPPORT_CELLS else np.inf
-    claims.place[n], claims.asked[n] = place, True
+def _update_cell_assignment(cells, layout, n, support, cell, free, assignments, buffers):  # type: ignore[no-untyped-def]
+    """Assign candidate n to one of the cells of the layout ``free`` (F,), or to none."""
+    center, nearest, squares = cells.center_px, assignments.nearest, assignments.squared_distance
+    i = assignments.candidate[n]
+    count = fill_nearest_points(support.grid, center[i, 0], center[i, 1], nearest, squares)
+    predicted = fill_quadratic_map(center, i, support.cells, nearest[:count], squares, cell, layout, buffers)
+    place = _nearest_place_of_ink(free, predicted, cells.ink[i], layout)
+    assignments.support_radius2[n] = squares[count - 1] if count == SUPPORT_CELLS else np.inf
+    assignments.place[n], assignments.is_evaluated[n] = place, True
     if place >= 0:
-        claims.candidate_count[place] += 1
+        assignments.candidate_count[place] += 1
 
 
 @inlined_no_refcount
-def _nearest_place_of_ink(places, x, y, limit, ink, plan):  # type: ignore[no-untyped-def]
-    """Which of the layout's places holds this ink within the limit of (x, y), or -1."""
+def _nearest_place_of_ink(free, predicted, ink, layout):  # type: ignore[no-untyped-def]
+    """The free cell of the layout with this ink that is nearest to the predicted place, or -1 beyond the limit."""
+    limit = MAX_PLACE_MISFIT * predicted.cell_size_mm
     best, least = -1, limit * limit
-    if np.isnan(x):
+    if np.isnan(predicted.x_mm):
         return best
-    for u in places:
-        if plan.ink[u] == ink:
-            apart = (plan.center_mm[u, 0] - x) ** 2 + (plan.center_mm[u, 1] - y) ** 2
-            if apart < least:
-                best, least = u, apart
+    for u in free:
+        if layout.ink[u] == ink:
+            dx, dy = layout.center_mm[u, 0] - predicted.x_mm, layout.center_mm[u, 1] - predicted.y_mm
+            square = dx**2 + dy**2
+            if square < least:
+                best, least = u, square
     return best

@@ -1,4 +1,4 @@
-"""Cells that stand apart (behind a scratch, amid missing ones) are numbered by prediction and color, or left out."""
+"""Numbers detached cells, behind a scratch or amid missing cells, by contact or by prediction and color."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.affine_maps import image_cell_of_layout_cell
 from extractor.localmap.quadratic_map import SUPPORT_CELLS
 from extractor.numbering.gaps.cell_claims import (
+    SupportCells,
     empty_assignments,
     update_assignments,
     update_outdated_assignments,
 )
 from extractor.numbering.gaps.corner_contact import (
-    TURN_NOT_EVALUATED,
+    begin_numbering,
     corner_neighbours,
-    fill_map_by_neighbours,
     fill_map_by_similarity,
     update_corner_neighbours,
+    update_first_corner,
     update_numbers_by_contact,
 )
 from extractor.numbering.gaps.gap_check import consistent_cells, is_white_cell_contradicted
@@ -30,154 +30,141 @@ from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 from extractor.result import Origin
 
 MAX_ROUNDS = 40
-MIN_NUMBERED_CELLS = 8
+MIN_NUMBERED_CELLS = 8  # intact ones, for any prediction
 
 
 def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
-    """Number what is not connected with the reference by any face of the mesh.
+    """Number the cells that no face of the mesh connects with the reference cell.
 
-    Cells that share a corner with a numbered one are its neighbours. For the others, the numbered cells around must map
-    the cell near a free place of the layout that holds its ink, with little doubt, and no other cell may claim it; the
-    nearest come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 leaves no choice. What does not fit
-    across the gap, or across damaged cells by which the mesh hung together, loses its number. Where the white cell
-    touches nothing that it numbered, the cells around it must agree in the end, else all is ambiguous.
+    Cells that share a corner with a numbered cell are its neighbours. Other cells are predicted from the numbered cells
+    around them: the prediction must be certain and near a free cell of the layout with the same ink, and no other cell
+    may be assigned there. The nearest cells come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 is
+    unambiguous. Cells inconsistent across the gap, or across damaged cells that connected the mesh, lose their number.
+    If the white cell touches no cell that was numbered by it, the cells around it must agree in the end; otherwise the
+    numbering is ambiguous.
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
-    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
-    step = 1 if numbering.mirrored else 2
-    cell = _number_detached(seen, cells.ink, numbering.cell, numbering.white_px, lattice.layout_cells, step)
+    corner_step, white_px = 1 if numbering.mirrored else 2, numbering.white_px
+    cell = _number_detached(cells.arrays, numbering.cell, white_px, lattice.layout_cells, corner_step)
     if numbering.origin is not Origin.WHITE or numbering.white_adjacent:
         return replace(numbering, cell=cell)
-    about = numbering.white_px, lattice.white_cell_frame[0], lattice.layout_cells
-    return replace(
-        numbering, cell=cell, ambiguous=bool(is_white_cell_contradicted(seen[0], cells.whole, cell, *about))
+    white_mm = lattice.white_cell_frame[0]
+    is_ambiguous = is_white_cell_contradicted(
+        cells.center_px, cells.is_intact, cell, white_px, white_mm, lattice.layout_cells
     )
+    return replace(numbering, cell=cell, ambiguous=bool(is_ambiguous))
 
 
 @compiled
-def _number_detached(seen, ink, cell, white, plan, step):  # type: ignore[no-untyped-def]
-    """The numbers of the cells with those that could be attached, without those that hang in nothing."""
-    center, corner, area, whole = seen
-    beside = corner_neighbours(
-        center, corner, area, whole, cell, image_cell_of_layout_cell(cell, plan.ink.shape[0]), plan, step
-    )
-    held = consistent_cells(center, corner, area, whole, cell, white, beside, plan, step)
-    cell, gone = _update_rejecting_inconsistent(cell, held, beside)
-    free, candidates = _free_places_and_candidates(ink, cell, plan.ink)
+def _number_detached(cells, cell, white_px, layout, corner_step):  # type: ignore[no-untyped-def]
+    """(N,) int32, ``cell`` with the numbers of detached cells added and inconsistent numbers removed."""
+    neighbours = corner_neighbours(cells, cell, layout, corner_step)
+    consistent = consistent_cells(cells, cell, white_px, neighbours, layout, corner_step)
+    cell, removed = _remove_inconsistent(cell, consistent)
+    _update_removed_neighbours(removed, neighbours)
+    free, candidates = _free_places_and_candidates(cells.ink, cell, layout.ink)
     if not candidates.any():
         return cell
-    more = _update_numbering_outward(center, corner, area, whole, ink, candidates, cell, free, plan, step)
-    fresh = more != cell
-    if gone == 0 and not fresh.any():
+    extended = _number_outward(cells, candidates, cell, free, layout, corner_step)
+    is_new = extended != cell
+    if removed.shape[0] == 0 and not is_new.any():
         return cell
-    update_corner_neighbours(
-        fresh,
-        center,
-        corner,
-        area,
-        whole,
-        more,
-        image_cell_of_layout_cell(more, plan.ink.shape[0]),
-        plan,
-        step,
-        beside,
-    )
-    return _update_rejecting_inconsistent(
-        more, consistent_cells(center, corner, area, whole, more, white, beside, plan, step), beside
-    )[0]
+    update_corner_neighbours(is_new, cells, extended, layout, corner_step, neighbours)
+    consistent = consistent_cells(cells, extended, white_px, neighbours, layout, corner_step)
+    return _remove_inconsistent(extended, consistent)[0]
 
 
 @compiled
-def _update_rejecting_inconsistent(cell, held, beside):  # type: ignore[no-untyped-def]
-    """The numbers of the cells without those that are not ``held``, which no cell is ``beside`` any more (in place);
-    and how many these are."""
-    out, gone = cell.copy(), np.flatnonzero((cell >= 0) & ~held)
-    for i in gone:
+def _remove_inconsistent(cell, consistent):  # type: ignore[no-untyped-def]
+    """(N,) int32, the numbers of the consistent cells only, and the cells that lost theirs."""
+    out, removed = cell.copy(), np.flatnonzero((cell >= 0) & ~consistent)
+    for i in removed:
         out[i] = -1
-        for k in range(6):
-            if beside[i, k] >= 0:
-                beside[beside[i, k], (k + 3) % 6] = -1
-                beside[i, k] = -1
-    return out, gone.shape[0]
+    return out, removed
 
 
 @compiled
-def _free_places_and_candidates(ink, cell, ink_of):  # type: ignore[no-untyped-def]
-    """(U,) bool the free places of the layout, and (N,) bool the cells without a number whose ink some of them hold."""
-    free = np.ones(ink_of.shape[0], np.bool_)
+def _update_removed_neighbours(removed, neighbours):  # type: ignore[no-untyped-def]
+    """Erase the removed cells from the ``corner_neighbours`` (N, 6)."""
+    for i in removed:
+        for k in range(6):
+            if neighbours[i, k] >= 0:
+                neighbours[neighbours[i, k], (k + 3) % 6] = -1
+                neighbours[i, k] = -1
+
+
+@compiled
+def _free_places_and_candidates(ink, cell, layout_ink):  # type: ignore[no-untyped-def]
+    """(U,) bool the free cells of the layout, and (N,) bool the cells without a number that have the ink of one."""
+    free = np.ones(layout_ink.shape[0], np.bool_)
     for i in range(cell.shape[0]):
         if cell[i] >= 0:
             free[cell[i]] = False
-    wanted = np.zeros(256, np.bool_)
-    for u in range(ink_of.shape[0]):
+    is_free_ink = np.zeros(256, np.bool_)
+    for u in range(layout_ink.shape[0]):
         if free[u]:
-            wanted[ink_of[u]] = True
+            is_free_ink[layout_ink[u]] = True
     candidates = np.zeros(cell.shape[0], np.bool_)
     for i in range(cell.shape[0]):
-        candidates[i] = cell[i] < 0 and wanted[ink[i]]
+        candidates[i] = cell[i] < 0 and is_free_ink[ink[i]]
     return free, candidates
 
 
 @compiled
-def _update_numbering_outward(center, corner, area, whole, ink, candidates, cell, free, plan, step):  # type: ignore[no-untyped-def]
-    """The numbers of the cells with those of the candidates, round by round outward from the numbered ones; what is
-    ``free`` is so no more."""
-    cell = cell.copy()
-    loose = np.flatnonzero(candidates)
-    shaped = np.flatnonzero(candidates & whole & np.isfinite(corner[:, 0, 0]))
-    fresh = np.flatnonzero((cell >= 0) & whole)
-    turn, maps = np.full(cell.shape[0], TURN_NOT_EVALUATED, np.int64), np.empty((cell.shape[0], 2, 2))
-    seen = image_cell_of_layout_cell(cell, plan.ink.shape[0])
-    claims = empty_assignments(loose.shape[0], free.shape[0])
+def _number_outward(cells, candidates, cell, free, layout, corner_step):  # type: ignore[no-untyped-def]
+    """(N,) int32, ``cell`` with numbers of ``candidates`` (N,) added, round by round outward from the numbered cells.
+
+    ``free`` (U,) bool are the free cells of the layout.
+    """
+    numbering, is_intact = begin_numbering(cell, free), cells.is_intact
+    unnumbered = np.flatnonzero(candidates)
+    triangles = np.flatnonzero(candidates & is_intact & np.isfinite(cells.corner_px[:, 0, 0]))
+    new_cells = np.flatnonzero((cell >= 0) & is_intact)
+    assignments = empty_assignments(unnumbered, free.shape[0])
     index, square = np.empty(SUPPORT_CELLS, np.int32), np.empty(SUPPORT_CELLS)
     for _ in range(MAX_ROUNDS):
-        touched = update_numbers_by_contact(
-            center, corner, area, ink, shaped, cell, free, turn, maps, seen, fresh, plan, step
-        )
-        fresh = np.concatenate((fresh, touched))
-        known = np.flatnonzero((cell >= 0) & whole)
-        if known.shape[0] < MIN_NUMBERED_CELLS or np.all(cell[loose] >= 0):
+        touched = update_numbers_by_contact(cells, layout, corner_step, triangles, new_cells, numbering)
+        new_cells = np.concatenate((new_cells, touched))
+        known = np.flatnonzero((numbering.cell >= 0) & is_intact)
+        if known.shape[0] < MIN_NUMBERED_CELLS or np.all(numbering.cell[unnumbered] >= 0):
             break
-        xy = center[known]
-        grid = bucket_grid(xy)
-        update_outdated_assignments(center, loose, fresh, cell, free, claims)
-        limit = update_assignments(center, area, ink, loose, known, xy, grid, cell, free, plan, claims)
-        fresh = _update_unique_assignments(loose, claims, limit, cell, free)
-        if fresh.shape[0] == 0:
+        support = SupportCells(known, bucket_grid(cells.center_px[known]))
+        update_outdated_assignments(cells, new_cells, numbering, assignments)
+        limit = update_assignments(cells, layout, support, numbering, assignments)
+        new_cells = _update_unique_assignments(assignments, limit, numbering)
+        if new_cells.shape[0] == 0:
             break
-        fresh = fresh[whole[fresh]]
-        for i in fresh:
-            count = fill_nearest_points(xy, grid, center[i, 0], center[i, 1], index, square)
-            turn[i] = _update_turn_by_nearest(
-                center, corner, i, known, index[:count], cell, turn, maps, seen, plan, step
-            )
-    return cell
+        new_cells = new_cells[is_intact[new_cells]]
+        for i in new_cells:
+            x, y = cells.center_px[i, 0], cells.center_px[i, 1]
+            nearest = known[index[: fill_nearest_points(support.grid, x, y, index, square)]]
+            _update_first_corner_by_nearest(cells, i, nearest, layout, corner_step, numbering)
+    return numbering.cell
 
 
 @compiled
-def _update_unique_assignments(loose, claims, limit, cell, free):  # type: ignore[no-untyped-def]
-    """Number the loose cells that alone claim a place, up to this gap, in place; the cells that were."""
-    fresh, count = np.empty(loose.shape[0], np.int64), 0
-    for n in range(loose.shape[0]):
-        place = claims.place[n]
-        if place >= 0 and claims.candidate_count[place] == 1 and claims.gap[n] <= limit:
-            cell[loose[n]] = place
-            free[place] = False
-            fresh[count] = loose[n]
+def _update_unique_assignments(assignments, limit, numbering):  # type: ignore[no-untyped-def]
+    """Number the cells with a unique assignment and a gap up to the limit; returns these cells."""
+    candidate = assignments.candidate
+    new_cells, count = np.empty(candidate.shape[0], np.int64), 0
+    for n in range(candidate.shape[0]):
+        place = assignments.place[n]
+        if place >= 0 and assignments.candidate_count[place] == 1 and assignments.gap[n] <= limit:
+            numbering.cell[candidate[n]] = place
+            numbering.free[place] = False
+            new_cells[count] = candidate[n]
             count += 1
-    return fresh[:count]
+    return new_cells[:count]
 
 
 @compiled
-def _update_turn_by_nearest(center, corner, i, known, near, cell, turn, maps, seen, plan, step):  # type: ignore[no-untyped-def]
-    """From which corner cell i is counted, by the nearest of the known cells that is counted from any; -1 unknown."""
-    for k in near:
-        j = known[k]
-        if turn[j] == TURN_NOT_EVALUATED:
-            turn[j] = fill_map_by_neighbours(center, corner, j, cell[j], seen, plan, step, maps[j])
-        if turn[j] >= 0:
-            return fill_map_by_similarity(
-                center, corner, i, plan.corner_vectors_mm, cell[i], step, maps[j], maps[i]
+def _update_first_corner_by_nearest(cells, i, nearest, layout, corner_step, numbering):  # type: ignore[no-untyped-def]
+    """Orient the triangle of cell i like the nearest of the numbered cells that has an orientation; -1 without one."""
+    numbering.first_corner[i] = -1
+    for j in nearest:
+        if update_first_corner(cells, j, layout, corner_step, numbering) >= 0:
+            numbering.first_corner[i] = fill_map_by_similarity(
+                cells, i, layout, numbering.cell[i], corner_step, numbering.maps[j], numbering.maps[i]
             )
-    return -1
+            break

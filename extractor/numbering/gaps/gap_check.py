@@ -1,12 +1,15 @@
-"""Whether what was numbered apart stands where the pattern goes on.
+"""Checks whether detached numbered cells lie where the pattern continues.
 
-Cells of one ink are 1.7 cells apart. A part of the pattern beyond a scratch, numbered one such step aside, looks right
-in itself and is wrong as a whole. So the numbered cells are taken as blocks that hang together by shared corners, and
-from the block at the white cell on, the nearest first, each is judged by the ways to what holds already: they must be
-as long as the pattern's slopes on both sides say. What does not hold, or hangs in nothing, loses its number.
+Cells of one ink are 1.7 cells apart. A part of the pattern beyond a scratch, numbered one such step aside, is
+consistent in itself and wrong as a whole. So the numbered cells are divided into blocks connected by shared corners.
+Beginning with the block at the white cell, the nearest blocks first, each block is compared with the consistent cells:
+the vectors between their centers must have the lengths that the pattern's slopes on both sides predict. Cells
+inconsistent so, or connected with nothing, lose their number. A slope is the local linear map from layout to image.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,17 +26,33 @@ from extractor.numbering.mesh_parts import connected_components
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
 
-# in cells, the median between a block's ways by the numbers and by the slopes; a wrong step makes 1.7
-MAX_MEDIAN_JUMP = 0.6
-MAX_JUMP_SHARE = 0.25  # of a block's ways that may be longer
-MAX_SINGLE_JUMP = 0.9  # the same for a cell that is not whole, whose center may lie aside
-MAX_GAP = 5.0  # how far apart the two sides may be, in cells
-MAX_GAP_RATIO = 1.5  # a block's ways that tell are at most so much longer than its shortest
-COMPARED_CELLS = 3  # cells on the near side that each beyond is compared with
-WHITE_CELL_NEIGHBOURS = 5  # cells nearest to the white one that say where it must be, of which so many are
-MIN_WHITE_CELL_NEIGHBOURS = 3
-MAX_WHITE_CELL_MISFIT = 1.0  # in cells, the median between that and where it is; a wrong step makes 1.7
-REFERENCE_CANDIDATES = 3  # cells nearest to the white one, of which the largest block holds the reference
+# A jump is the difference, in cells, between a vector by the numbers and by the slopes; a wrong step makes 1.7.
+MAX_MEDIAN_JUMP = 0.6  # the median jump of a block
+MAX_JUMP_SHARE = 0.25  # share of a block's jumps that may be larger
+MAX_SINGLE_JUMP = 0.9  # of a cell without contacts: its center may be shifted
+MAX_GAP = 5.0  # between the two sides, in cells
+MAX_GAP_RATIO = 1.5  # vectors of a block not longer than this many times its shortest are compared
+COMPARED_CELLS = 3  # consistent cells with which each cell is compared
+WHITE_CELL_NEIGHBOURS = 5  # numbered cells nearest to the white cell, which predict its place
+MIN_WHITE_CELL_NEIGHBOURS = 3  # least number of them
+MAX_WHITE_CELL_MISFIT = 1.0  # in cells, the median distance from the predictions; a wrong step makes 1.7
+REFERENCE_CANDIDATES = 3  # cells nearest to the white one, of which the largest block is the reference
+
+
+class _Consistency(NamedTuple):
+    """Which of N numbered cells are consistent; updated in place.
+
+    Attributes:
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        is_consistent: (N,) bool.
+        slope: (N, 2, 2) float64, px per mm, the local linear maps.
+        has_slope: (N,) bool.
+    """
+
+    cell: NDArray[np.int32]
+    is_consistent: NDArray[np.bool_]
+    slope: NDArray[np.float64]
+    has_slope: NDArray[np.bool_]
 
 
 def inconsistent_cells(
@@ -43,92 +62,107 @@ def inconsistent_cells(
     mirrored: bool,
     white_px: NDArray[np.float64] | None,
 ) -> NDArray[np.bool_]:
-    """(N,) bool, the numbered cells that do not stand where the pattern goes on from the reference's block.
+    """(N,) bool, the numbered cells that do not lie where the pattern continues from the reference block.
 
     Args:
-        cell: (N,) the layout's cell of each cell of the image, or -1.
+        cells: the cells of the image.
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        lattice: the layout.
         mirrored: the pattern is seen from its back.
-        white_px: the middle of the white cell; None where the outline told, and the largest block is right.
+        white_px: (2,) the center of the white cell; None if the outline gave the origin: then the largest block is the
+            reference.
     """
-    seen = cells.center_px, cells.corner_px, cells.area_px, cells.whole
     white = np.full(2, np.nan) if white_px is None else white_px
-    plan, step = lattice.layout_cells, 1 if mirrored else 2
-    beside = corner_neighbours(*seen, cell, image_cell_of_layout_cell(cell, len(plan.ink)), plan, step)
-    held = consistent_cells(*seen, cell, white, beside, plan, step)
-    return np.asarray((cell >= 0) & ~held)
+    arrays, layout, corner_step = cells.arrays, lattice.layout_cells, 1 if mirrored else 2
+    neighbours = corner_neighbours(arrays, cell, layout, corner_step)
+    consistent = consistent_cells(arrays, cell, white, neighbours, layout, corner_step)
+    return np.asarray((cell >= 0) & ~consistent)
 
 
 @compiled
-def consistent_cells(center, corner, area, whole, cell, white, beside, plan, step):  # type: ignore[no-untyped-def]
-    """(N,) bool, the numbered cells that hold on to the reference's block; ``white`` is NaN where the outline told, and
-    ``beside`` the cells that touch, as ``corner_neighbours`` gives it."""
-    block = connected_components(beside, whole & (cell >= 0))
+def consistent_cells(cells, cell, white_px, neighbours, layout, corner_step):  # type: ignore[no-untyped-def]
+    """(N,) bool, the numbered cells consistent with the reference block.
+
+    Args:
+        cells: ``CellArrays``. layout: ``LayoutCells``.
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        white_px: (2,) the center of the white cell; NaN if the outline gave the origin.
+        neighbours: (N, 6) int32, by ``corner_neighbours``.
+        corner_step: as in ``corner_contact``.
+    """
+    block = connected_components(neighbours, cells.is_intact & (cell >= 0))
     sizes = np.zeros(block.max() + 1 if block.shape[0] > 0 else 0, np.int64)
     for i in range(block.shape[0]):
         if block[i] >= 0:
             sizes[block[i]] += 1
     if sizes.shape[0] == 0:
         return np.zeros(cell.shape[0], np.bool_)
-    first = sizes.argmax() if np.isnan(white[0]) else _reference_block(center, block, sizes, white)
-    return _consistent_with_block(center, corner, area, cell, block, first, beside, plan, step)
+    reference = (
+        sizes.argmax() if np.isnan(white_px[0]) else _reference_block(cells.center_px, block, sizes, white_px)
+    )
+    return _consistent_with_block(cells, cell, block, reference, neighbours, layout, corner_step)
 
 
 @compiled
-def is_white_cell_contradicted(center, whole, cell, white, white_mm, plan):  # type: ignore[no-untyped-def]
-    """Whether the numbered cells nearest to the white one put that elsewhere in the image, by the layout's slopes
-    there; not where no such cell is within reach.
+def is_white_cell_contradicted(center, is_intact, cell, white_px, white_mm, layout):  # type: ignore[no-untyped-def]
+    """Whether the numbered cells nearest to the white cell predict it elsewhere, by the local slopes.
 
-    A part of the pattern that does not touch the white cell may be numbered by it one step aside; what lies around the
-    white cell was numbered by that part then, and tells.
+    A part of the pattern that does not touch the white cell may be numbered one step aside. The cells around the white
+    cell were then numbered by that part, and contradict it. False where no such cell is within reach.
+
+    Args:
+        center: (N, 2) px; is_intact: (N,) bool, as in ``Cells``.
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        white_px, white_mm: (2,) the white cell's center in the image and in the layout.
+        layout: ``LayoutCells``.
     """
-    known = np.flatnonzero((cell >= 0) & whole)
+    known = np.flatnonzero((cell >= 0) & is_intact)
     if known.shape[0] < MIN_WHITE_CELL_NEIGHBOURS:
         return False
-    seen, xy = image_cell_of_layout_cell(cell, plan.ink.shape[0]), center[known]
-    slope = linear_maps(center, cell, seen, plan.center_mm, plan.beside)
+    slope = linear_maps(center, cell, image_cell_of_layout_cell(cell, layout.ink.shape[0]), layout)
     index, square = np.empty(WHITE_CELL_NEIGHBOURS, np.int32), np.empty(WHITE_CELL_NEIGHBOURS)
-    aside, told = np.empty(WHITE_CELL_NEIGHBOURS), 0
-    for k in range(fill_nearest_points(xy, bucket_grid(xy), white[0], white[1], index, square)):
+    misfit, count = np.empty(WHITE_CELL_NEIGHBOURS), 0
+    for k in range(fill_nearest_points(bucket_grid(center[known]), white_px[0], white_px[1], index, square)):
         i = known[index[k]]
         a, b, c, d = slope[i, 0, 0], slope[i, 0, 1], slope[i, 1, 0], slope[i, 1, 1]
-        size = plan.size_mm[cell[i]] * np.sqrt(abs(a * d - b * c))
+        size = layout.size_mm[cell[i]] * np.sqrt(abs(a * d - b * c))
         if square[k] < (MAX_GAP * size) ** 2:
-            x, y = white_mm[0] - plan.center_mm[cell[i], 0], white_mm[1] - plan.center_mm[cell[i], 1]
-            dx, dy = center[i, 0] + a * x + b * y - white[0], center[i, 1] + c * x + d * y - white[1]
-            aside[told] = np.sqrt(dx * dx + dy * dy) / size
-            told += 1
-    return told >= MIN_WHITE_CELL_NEIGHBOURS and np.median(aside[:told]) > MAX_WHITE_CELL_MISFIT
+            x, y = white_mm[0] - layout.center_mm[cell[i], 0], white_mm[1] - layout.center_mm[cell[i], 1]
+            dx, dy = center[i, 0] + a * x + b * y - white_px[0], center[i, 1] + c * x + d * y - white_px[1]
+            misfit[count] = np.sqrt(dx * dx + dy * dy) / size
+            count += 1
+    return count >= MIN_WHITE_CELL_NEIGHBOURS and np.median(misfit[:count]) > MAX_WHITE_CELL_MISFIT
 
 
 @compiled
-def _reference_block(center, block, sizes, white):  # type: ignore[no-untyped-def]
+def _reference_block(center, block, sizes, white_px):  # type: ignore[no-untyped-def]
     """The largest block of those of the cells nearest to the white one."""
-    square, near, found = np.empty(REFERENCE_CANDIDATES), np.empty(REFERENCE_CANDIDATES, np.int64), 0
+    squares, blocks, found = np.empty(REFERENCE_CANDIDATES), np.empty(REFERENCE_CANDIDATES, np.int64), 0
     for i in range(block.shape[0]):
         if block[i] < 0:
             continue
-        apart = (center[i, 0] - white[0]) ** 2 + (center[i, 1] - white[1]) ** 2
+        square = (center[i, 0] - white_px[0]) ** 2 + (center[i, 1] - white_px[1]) ** 2
         at = min(found, REFERENCE_CANDIDATES - 1)
-        if found == REFERENCE_CANDIDATES and apart >= square[at]:
+        if found == REFERENCE_CANDIDATES and square >= squares[at]:
             continue
-        while at > 0 and square[at - 1] > apart:
-            square[at], near[at] = square[at - 1], near[at - 1]
+        while at > 0 and squares[at - 1] > square:
+            squares[at], blocks[at] = squares[at - 1], blocks[at - 1]
             at -= 1
-        square[at], near[at] = apart, block[i]
+        squares[at], blocks[at] = square, block[i]
         found = min(found + 1, REFERENCE_CANDIDATES)
-    best = near[0]
+    best = blocks[0]
     for k in range(1, found):
-        best = near[k] if sizes[near[k]] > sizes[best] else best
+        best = blocks[k] if sizes[blocks[k]] > sizes[best] else best
     return best
 
 
 @inlined_no_refcount
-def _fill_slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-untyped-def]
-    """Write the image step per layout step around cell i by the cells that touch it; False where they are in a row."""
+def _fill_slope(i, center, cell, neighbours, center_mm, out):  # type: ignore[no-untyped-def]
+    """Write the slope (2, 2), px per mm, at cell i by the cells in contact; False where these lie on one line."""
     xx, xy, yy, count = 0.0, 0.0, 0.0, 0
     ax, ay, bx, by = 0.0, 0.0, 0.0, 0.0
     for k in range(6):
-        j = beside[i, k]
+        j = neighbours[i, k]
         if j < 0:
             continue
         x = center_mm[cell[j], 0] - center_mm[cell[i], 0]
@@ -145,117 +179,117 @@ def _fill_slope(i, center, cell, beside, center_mm, out):  # type: ignore[no-unt
 
 
 @compiled
-def _consistent_with_block(center, corner, area, cell, block, first, beside, plan, step):  # type: ignore[no-untyped-def]
-    """(N,) bool, the cells of the first block and of those that hold on to it, and the single ones between."""
+def _consistent_with_block(cells, cell, block, reference, neighbours, layout, corner_step):  # type: ignore[no-untyped-def]
+    """(N,) bool, the cells of the reference block, of the blocks consistent with it, and the single cells between."""
     count, blocks = cell.shape[0], block.max() + 1
-    held, alone = block == first, np.flatnonzero((cell >= 0) & (block < 0))
-    if blocks == 1 and alone.shape[0] == 0:
-        return held
-    slope, sloped = np.full((count, 2, 2), np.nan), np.zeros(count, np.bool_)
+    consistent, singles = block == reference, np.flatnonzero((cell >= 0) & (block < 0))
+    if blocks == 1 and singles.shape[0] == 0:
+        return consistent
+    state = _Consistency(cell, consistent, np.full((count, 2, 2), np.nan), np.zeros(count, np.bool_))
     for i in range(count):
         if block[i] >= 0:
-            sloped[i] = _fill_slope(i, center, cell, beside, plan.center_mm, slope[i])
+            state.has_slope[i] = _fill_slope(
+                i, cells.center_px, cell, neighbours, layout.center_mm, state.slope[i]
+            )
     if blocks > 1:
-        _update_consistent_blocks(center, corner, area, cell, block, held, slope, sloped, plan, step)
-    if alone.shape[0] > 0:
-        _update_consistent_singles(center, corner, area, cell, alone, held, slope, sloped, plan, step)
-    return held
+        _update_consistent_blocks(cells, block, layout, corner_step, state)
+    if singles.shape[0] > 0:
+        _update_consistent_singles(cells, singles, layout, corner_step, state)
+    return consistent
 
 
 @compiled
-def _update_consistent_blocks(center, corner, area, cell, block, held, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
-    """Let the blocks that hold on be held, in place, the nearest first."""
-    count, blocks = cell.shape[0], block.max() + 1
+def _update_consistent_blocks(cells, block, layout, corner_step, state):  # type: ignore[no-untyped-def]
+    """Accept the consistent blocks, the nearest first; ``block`` (N,) int32, or -1."""
+    center, blocks = cells.center_px, block.max() + 1
     index, square = np.empty(COMPARED_CELLS, np.int32), np.empty(COMPARED_CELLS)
-    one, apart = np.empty(1, np.int32), np.empty(1)
-    jump, gap = np.empty(count), np.empty(count)
+    jump, gap = np.empty(block.shape[0]), np.empty(block.shape[0])
     least, refused = np.empty(blocks), np.zeros(blocks, np.bool_)
     while True:
-        waiting = np.flatnonzero((block >= 0) & ~held & ~refused[block])
-        here = np.flatnonzero(held & sloped)
-        if waiting.shape[0] == 0 or here.shape[0] < COMPARED_CELLS:
+        waiting = np.flatnonzero((block >= 0) & ~state.is_consistent & ~refused[block])
+        support = np.flatnonzero(state.is_consistent & state.has_slope)
+        if waiting.shape[0] == 0 or support.shape[0] < COMPARED_CELLS:
             break
-        xy = center[here]
-        grid = bucket_grid(xy)
-        least[:] = np.inf
-        for j in waiting:
-            fill_nearest_points(xy, grid, center[j, 0], center[j, 1], one, apart)
-            gap[j] = np.sqrt(apart[0]) / equilateral_edge(area[here[one[0]]])
-            least[block[j]] = min(least[block[j]], gap[j])
+        grid = bucket_grid(center[support])
+        _fill_gaps(cells, block, waiting, support, grid, gap, least)
         nearest_of_all = least.min()
         if not nearest_of_all < MAX_GAP:
             break
         for b in range(blocks):
             if least[b] > MAX_GAP_RATIO * nearest_of_all:
                 continue
-            telling, wide = 0, 0
+            count, large = 0, 0
             for j in waiting:
                 if block[j] != b or gap[j] > MAX_GAP_RATIO * least[b]:
                     continue
-                fill_nearest_points(xy, grid, center[j, 0], center[j, 1], index, square)
-                own = _update_slope_and_measure_jump(
-                    j, here, index, center, corner, cell, slope, sloped, plan, step
-                )
+                fill_nearest_points(grid, center[j, 0], center[j, 1], index, square)
+                own = _update_slope_and_measure_jump(j, support, index, cells, layout, corner_step, state)
                 if np.isfinite(own):
-                    jump[telling] = own
-                    wide += own > MAX_MEDIAN_JUMP
-                    telling += 1
-            if (
-                telling > 0
-                and np.median(jump[:telling]) < MAX_MEDIAN_JUMP
-                and wide <= MAX_JUMP_SHARE * telling
-            ):
-                held |= block == b
+                    jump[count] = own
+                    large += own > MAX_MEDIAN_JUMP
+                    count += 1
+            is_similar = count > 0 and np.median(jump[:count]) < MAX_MEDIAN_JUMP
+            if is_similar and large <= MAX_JUMP_SHARE * count:
+                state.is_consistent[block == b] = True
             else:
                 refused[b] = True
 
 
 @compiled
-def _update_consistent_singles(center, corner, area, cell, alone, held, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
-    """Let the single cells that hold on be held, in place."""
-    here = np.flatnonzero(held & sloped)
-    if here.shape[0] < COMPARED_CELLS:
+def _fill_gaps(cells, block, waiting, support, grid, gap, least):  # type: ignore[no-untyped-def]
+    """Write the gaps (N,), in cells, of the ``waiting`` cells from the ``support`` in the grid, and each block's."""
+    index, square = np.empty(1, np.int32), np.empty(1)
+    least[:] = np.inf
+    for j in waiting:
+        fill_nearest_points(grid, cells.center_px[j, 0], cells.center_px[j, 1], index, square)
+        gap[j] = np.sqrt(square[0]) / equilateral_edge(cells.area_px[support[index[0]]])
+        least[block[j]] = min(least[block[j]], gap[j])
+
+
+@compiled
+def _update_consistent_singles(cells, singles, layout, corner_step, state):  # type: ignore[no-untyped-def]
+    """Accept the consistent ones of the cells without contacts."""
+    support = np.flatnonzero(state.is_consistent & state.has_slope)
+    if support.shape[0] < COMPARED_CELLS:
         return
     index, square = np.empty(COMPARED_CELLS, np.int32), np.empty(COMPARED_CELLS)
-    xy = center[here]
-    grid = bucket_grid(xy)
-    for j in alone:
-        fill_nearest_points(xy, grid, center[j, 0], center[j, 1], index, square)
-        own = _update_slope_and_measure_jump(j, here, index, center, corner, cell, slope, sloped, plan, step)
-        held[j] = own < MAX_SINGLE_JUMP and np.sqrt(square[0]) < MAX_GAP * equilateral_edge(
-            area[here[index[0]]]
-        )
+    grid = bucket_grid(cells.center_px[support])
+    for j in singles:
+        fill_nearest_points(grid, cells.center_px[j, 0], cells.center_px[j, 1], index, square)
+        jump = _update_slope_and_measure_jump(j, support, index, cells, layout, corner_step, state)
+        edge = equilateral_edge(cells.area_px[support[index[0]]])
+        state.is_consistent[j] = jump < MAX_SINGLE_JUMP and np.sqrt(square[0]) < MAX_GAP * edge
 
 
 @inlined_no_refcount
-def _update_slope_and_measure_jump(j, here, near, center, corner, cell, slope, sloped, plan, step):  # type: ignore[no-untyped-def]
-    """How far, in cells, cell j is from where its number puts it, by the slopes there and at those ``here`` near it;
-    the median over these. A cell without a slope has that of its triangle, or else of the others, and keeps it."""
-    if not sloped[j]:
-        like = slope[here[near[0]]]
-        if (
-            fill_map_by_similarity(center, corner, j, plan.corner_vectors_mm, cell[j], step, like, slope[j])
-            < 0
-        ):
+def _update_slope_and_measure_jump(j, support, nearest, cells, layout, corner_step, state):  # type: ignore[no-untyped-def]
+    """The median jump, in cells, of cell j against the ``nearest`` of the ``support`` cells.
+
+    A cell without a slope is given the one of its triangle, else that of the nearest cell, and keeps it.
+    """
+    center, cell, slope = cells.center_px, state.cell, state.slope
+    if not state.has_slope[j]:
+        like = slope[support[nearest[0]]]
+        if fill_map_by_similarity(cells, j, layout, cell[j], corner_step, like, slope[j]) < 0:
             slope[j, 0, 0], slope[j, 0, 1] = like[0, 0], like[0, 1]
             slope[j, 1, 0], slope[j, 1, 1] = like[1, 0], like[1, 1]
-        sloped[j] = True
+        state.has_slope[j] = True
     one, two, three = 0.0, 0.0, 0.0
     for k in range(COMPARED_CELLS):
-        i = here[near[k]]
+        i = support[nearest[k]]
         a, b = 0.5 * (slope[i, 0, 0] + slope[j, 0, 0]), 0.5 * (slope[i, 0, 1] + slope[j, 0, 1])
         c, d = 0.5 * (slope[i, 1, 0] + slope[j, 1, 0]), 0.5 * (slope[i, 1, 1] + slope[j, 1, 1])
         determinant = a * d - b * c
         x, y = center[j, 0] - center[i, 0], center[j, 1] - center[i, 1]
-        dx = (d * x - b * y) / determinant - plan.center_mm[cell[j], 0] + plan.center_mm[cell[i], 0]
-        dy = (a * y - c * x) / determinant - plan.center_mm[cell[j], 1] + plan.center_mm[cell[i], 1]
-        one, two, three = two, three, np.hypot(dx, dy) / plan.size_mm[cell[j]]
+        dx = (d * x - b * y) / determinant - layout.center_mm[cell[j], 0] + layout.center_mm[cell[i], 0]
+        dy = (a * y - c * x) / determinant - layout.center_mm[cell[j], 1] + layout.center_mm[cell[i], 1]
+        one, two, three = two, three, np.hypot(dx, dy) / layout.size_mm[cell[j]]
     return _median_of_three(one, two, three)
 
 
 @inlined_no_refcount
 def _median_of_three(a, b, c):  # type: ignore[no-untyped-def]
-    """The median of three numbers (``COMPARED_CELLS``); NaN if any is none."""
+    """The median of ``COMPARED_CELLS`` numbers; NaN if any is NaN."""
     if np.isnan(a) or np.isnan(b) or np.isnan(c):
         return np.nan
     return max(min(a, b), min(max(a, b), c))
