@@ -1,4 +1,4 @@
-"""The errors that the extractor raises on purpose. A poor image is data, never an error: ``types.Reason``."""
+"""The errors that the extractor raises on purpose. A poor image is not an error: see ``result.Reason``."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class ImageError(ExtractorError, ValueError):
 
 
 class RigError(ExtractorError, ValueError):
-    """A rig file or a view that cannot be believed; names file, field, value and expectation."""
+    """A rig file or a view that contradicts itself; names file, field, value and expectation."""
 
 
 class PoseError(ExtractorError, ValueError):
-    """Views that cannot be placed, or whose places do not allow to measure in space; says which and why."""
+    """Views whose poses cannot be estimated, or do not allow to measure in space; says which and why."""

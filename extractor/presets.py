@@ -11,24 +11,26 @@ PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
 
 class Schedule(NamedTuple):
-    """What a preset does.
+    """The schedule of refinement steps of a preset.
 
     Attributes:
-        profiles: rows of pixels across each gridline at most, in the first round, and in the second, if no synthesis
-            follows.
-        finest: blur (px, sigma) that the image may be reduced to: what is blurred needs no fine pixels.
-        sharp: blur, as a share of the edges, below which an image needs no synthesis,
-        reduced: unless it could be reduced by so much, which makes synthesis cheap.
-        effort: what synthesis may cost, in units of a step from everything with edges of 10 px; two steps are
-            allowed in any case.
-        enough: no more steps once no marker moves by more than so many of its standard deviations
-        near: and by more than this share of the blur, or less where gridlines are short,
-        few: but for this share of the markers;
-        patience: or once no fewer move after so many more: what moves them is nothing that a drawing could explain.
-        many: with the markers that move, those beside them are drawn anew, unless these are more than twice this share,
-            but fewer than that move; once they are more than this in dirt, only
-        most: so many that move the farthest, and there are
-        in_dirt: no more steps around markers than these.
+        max_profile_rows: rows of pixels across each gridline at most, in the first round of profiles, and in the
+            second one if no synthesis follows.
+        reduction_blur_px: blur (sigma, px) down to which the image may be reduced; blurred images need no fine pixels.
+        sharp_blur_share: blur as a share of the edges, below which an image needs no synthesis,
+        cheap_reduction: unless the image could be reduced by this factor, which makes synthesis cheap.
+        max_synthesis_effort: cost that synthesis may have, in units of one full step with edges of 10 px; two steps
+            are always allowed.
+        converged_deviations: steps end when no marker moves by more than this number of its standard deviations
+        converged_blur_share: and by more than this share of the blur, or less where gridlines are short,
+        max_moving_share: except for this share of the markers;
+        patience: or when after this number of further steps no fewer markers move: their moves are then nothing that
+            synthesis could explain.
+        max_partial_share: a partial step redraws the moving markers and their neighbours; it leaves out the neighbours
+            where both are more than twice this share of all markers, of which no more than this share moves.
+        max_partial_share_in_dirt: where dirt moves the markers, and both are more than ``max_partial_share``, a partial
+            step redraws only this share, the markers that move the farthest.
+        max_steps_in_dirt: number of steps after which no partial step is done for markers in dirt.
     """
 
     max_profile_rows: tuple[int, int]

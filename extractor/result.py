@@ -1,4 +1,4 @@
-"""What extraction returns, and what it says when it finds little or nothing."""
+"""The result of extraction, and the reasons for finding little or nothing."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.frozen_record import FrozenRecord
+
 
 class Status(IntEnum):
     """How a marker's position was found."""
@@ -17,7 +19,7 @@ class Status(IntEnum):
     LOST = 0
     MEASURED = 1
     REPAIRED = 2  # mild omission, eq. 6
-    FITTED = 3  # heavy omission, quadratic fit within its layer
+    FITTED = 3  # heavy omission, quadratic fit within the marker's layer
 
 
 class VirtualStatus(IntEnum):
@@ -29,25 +31,25 @@ class VirtualStatus(IntEnum):
 
 
 class Origin(StrEnum):
-    """What told where the numbering begins."""
+    """The evidence that fixed where the numbering begins."""
 
     WHITE = "white"  # the white cell
-    OUTLINE = "outline"  # it is hidden, and the pattern's rim leaves one way only
-    PREVIOUS = "previous"  # it is hidden, and the frame before leaves one way only
+    OUTLINE = "outline"  # the pattern's rim, as the white cell is hidden
+    PREVIOUS = "previous"  # the frame before, as the white cell is hidden
 
 
 class Reason(StrEnum):
     """Why nothing, or little, was found in an image."""
 
     NO_COLOR = "no_color"  # the image is grayscale, or one of the three inks is absent
-    NO_PATTERN = "no_pattern"  # no triangles that meet as those of a pattern do
-    REFERENCE_LOST = "reference_lost"  # a pattern, but its white cell is not to be seen
+    NO_PATTERN = "no_pattern"  # no triangles that meet as in a pattern
+    REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
 
 
 @dataclass(frozen=True, eq=False)
-class Markers:
-    """The markers of one image, by id.
+class Markers(FrozenRecord):
+    """The M markers of one image by id, and m virtual markers on each of E edges. Can be pickled and copied.
 
     Attributes:
         xy_px: (M, 2) float64 in the image frame ((0, 0) is the centre of the top-left pixel), NaN where lost.
@@ -55,13 +57,13 @@ class Markers:
         status: (M,) uint8, a ``Status`` each.
         virtual_xy_px: (E, m, 2) float64, in the order of the layout's edges, from the smaller id; NaN where lost.
         virtual_cov_px2: (E, m, 2, 2) float64, NaN where lost.
-        virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (along it, every virtual
-            marker is interpolated), or interpolated only.
-        mirrored: the pattern is seen from its back; None when nothing was found.
+        virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (every virtual marker is
+            interpolated along it), or interpolated only.
+        mirrored: whether the image shows the pattern's back; None when nothing was found.
         reason: why nothing or little was found; None when all went well.
-        timings_ms: stage name -> milliseconds.
-        stages: stage name -> that stage's result, for debugging and drawing.
-        origin: what told where the numbering begins; None when nothing was found.
+        timings_ms: stage name -> milliseconds, read-only.
+        stages: stage name -> that stage's result, for debugging and drawing, read-only.
+        origin: the evidence that fixed the numbering; None when nothing was found.
     """
 
     xy_px: NDArray[np.float64]
@@ -75,3 +77,6 @@ class Markers:
     timings_ms: Mapping[str, float]
     stages: Mapping[str, Any] = field(default_factory=dict, repr=False)
     origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        self._freeze_mappings("timings_ms", "stages")

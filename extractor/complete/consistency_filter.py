@@ -81,7 +81,7 @@ def reject_inconsistent_markers(
         lattice.first_ring,
     )
     edge_px, sound = _update_rejecting_inconsistent(
-        xy, cov, seen, rings, lattice.marker_mm, lattice.present, lattice.rim, size
+        xy, cov, seen, rings, lattice.marker_mm, lattice.present, lattice.is_rim, size
     )
     return ConsistentMarkers(xy, cov, edge_px, sound)
 

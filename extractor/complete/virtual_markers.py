@@ -45,9 +45,9 @@ def locate_virtual_markers(
         return VirtualMarkers(
             points[..., :2], np.empty((len(points), 0, 2, 2)), np.empty((len(points), 0), np.uint8)
         )
-    maps = local_maps(repaired.xy_px, mesh.near, mesh.ring_vectors, mesh.derivative_stencil)
+    maps = local_maps(repaired.xy_px, mesh.ring_markers, mesh.ring_vectors, mesh.derivative_stencil)
     known = repaired.status != Status.LOST
-    tables = mesh.edges, mesh.near, mesh.ring_vectors
+    tables = mesh.edges, mesh.ring_markers, mesh.ring_vectors
     return VirtualMarkers(*_locate_on_edges(repaired.xy_px, repaired.cov_px2, known, maps, *tables, points))
 
 

@@ -1,4 +1,4 @@
-"""What comes in: an image of any common kind becomes 8-bit BGR; what is not an image is refused."""
+"""Input images: conversion of any common kind to 8-bit BGR, checks, and an estimate of the noise."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from extractor.errors import ImageError
 from extractor.numeric.compilation import compiled
 
-MIN_SIDE_PX = 16
-NOISE_SAMPLES = 600  # that the noise is estimated from; with fewer cells, several are taken in each
+MIN_SIDE_PX = 16  # of an image
+NOISE_SAMPLES = 600  # pixels for the estimate of the noise; with fewer cells, several pixels in each
+# (x, y) of the pixels that are sampled around a cell's middle, in this order
 NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
 def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
     """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
 
-    16-bit images are scaled to 8 bits (value / 257, rounded), the alpha of BGRA is dropped, and a grayscale image
-    ((H, W) or (H, W, 1)) has no color to read.
+    16-bit images are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A grayscale image ((H, W)
+    or (H, W, 1)) has no color.
 
     Raises:
         ImageError: not an array, a float or signed type, another shape, or a side below 16 px.
@@ -51,20 +52,27 @@ def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
 
 @compiled
 def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
-    """Standard deviation of a channel's noise in grey levels (Immerkaer 1996, with a median against what is no noise).
+    """Standard deviation of a channel's noise in gray levels (Immerkaer 1996, with a median for robustness).
 
-    The Laplacian-like mask [1 -2 1; -2 4 -2; 1 -2 1] ignores gradients; its response to noise is 6 sigma. It is laid on
-    the middles of the ``cells`` (K, 3) with corners among ``xy`` (M, 2) px, in all channels, where nothing is clipped.
-    NaN where no cell is seen.
+    The Laplacian-like mask [1 -2 1; -2 4 -2; 1 -2 1] ignores gradients; its response to noise is 6 sigma. It is applied
+    to all channels in the middles of cells, where no pixel is clipped.
+
+    Args:
+        image: (H, W, 3) uint8.
+        xy: (M, 2) markers, px.
+        cells: (K, 3) marker ids of the cells' corners.
+
+    Returns:
+        NaN where no cell lies within the image.
     """
     counts, total = np.zeros(8 * 255 + 1, np.int64), 0
-    around = min(max(NOISE_SAMPLES // max(cells.shape[0], 1), 1), len(NEIGHBOUR_PIXELS))
+    samples = min(max(NOISE_SAMPLES // max(cells.shape[0], 1), 1), len(NEIGHBOUR_PIXELS))
     for i in range(cells.shape[0]):
         a, b, c = cells[i]
         cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3
         if not (cx > 2.5 and cy > 2.5 and cx < image.shape[1] - 3.5 and cy < image.shape[0] - 3.5):
             continue
-        for k in range(around):
+        for k in range(samples):
             x, y = int(cx + 0.5) + NEIGHBOUR_PIXELS[k][0], int(cy + 0.5) + NEIGHBOUR_PIXELS[k][1]
             for channel in range(3):
                 response, low, high = np.int64(0), np.int64(255), np.int64(0)
@@ -86,6 +94,6 @@ def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
     while below + counts[bin_of] < 0.5 * total:
         below += counts[bin_of]
         bin_of += 1
-    # responses are integers: each stands for half a step on both sides
+    # responses are integers: each represents the interval of half a step on both sides
     median = bin_of - 0.5 + (0.5 * total - below) / counts[bin_of]
     return max(median, 0.0) / (6 * 0.6745)

@@ -1,4 +1,4 @@
-"""An image at a reduced scale: what is blurred, or large, needs no fine pixels."""
+"""An image at reduced scales: blurred or large images need no fine pixels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from extractor.numeric.compilation import compiled, inlined
 
 
 class PolynomialFrame(NamedTuple):
-    """The image coordinates of polynomials: (x - x) / scale, (y - y) / scale."""
+    """The coordinates of polynomials over an image: (px - x) / scale, (py - y) / scale, for a pixel (px, py)."""
 
     x: float
     y: float
@@ -19,23 +19,27 @@ class PolynomialFrame(NamedTuple):
 
 
 class PyramidLevel(NamedTuple):
-    """An image at 1/``scale`` of its size, and the coordinates of its polynomials."""
+    """An image (H, W, 3) uint8 at 1/``scale`` of the full size, and the coordinates of polynomials over this image."""
 
     image: NDArray[np.uint8]
     scale: int
     frame: PolynomialFrame
 
-    def reduced(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of the full image in this one."""
+    def to_level(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (..., 2) of the full image in this level, px."""
         return (xy_px + 0.5) / self.scale - 0.5
 
     def to_full_scale(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of this image in the full one."""
+        """Points (..., 2) of this level in the full image, px."""
         return (xy_px + 0.5) * self.scale - 0.5
 
 
 class Pyramid:
-    """One image at every scale that is asked for, each made once."""
+    """One image at several scales; each level is computed on its first use.
+
+    Args:
+        image: (H, W, 3) uint8.
+    """
 
     def __init__(self, image: NDArray[np.uint8]) -> None:
         self._image = image
@@ -46,7 +50,7 @@ class Pyramid:
         """Width and height at full scale, px."""
         return self._image.shape[1], self._image.shape[0]
 
-    def at(self, scale: int) -> PyramidLevel:
+    def level(self, scale: int) -> PyramidLevel:
         """The image reduced by averaging ``scale`` x ``scale`` pixels."""
         if scale not in self._levels:
             self._levels[scale] = _pyramid_level(self._image, scale)
@@ -64,11 +68,11 @@ def _pyramid_level(image: NDArray[np.uint8], scale: int) -> PyramidLevel:
 
 @compiled
 def _block_means(image, scale):  # type: ignore[no-untyped-def]
-    """The means of ``scale`` x ``scale`` pixels, halves rounded up; what is left over at the rims is cut off."""
+    """(H // scale, W // scale, 3) uint8: the means of ``scale`` x ``scale`` pixels, halves rounded up."""
     height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
     out = np.empty((height, width, 3), np.uint8)
     flat, means = image.reshape(-1), out.reshape(-1)
-    column = np.empty(row, np.uint16)  # a sum of up to 256 rows
+    column = np.empty(row, np.uint16)  # holds a sum of up to 256 rows
     total = np.empty(3 * width, np.uint32)
     half, share = np.float32(0.5), np.float32(1.0 / scale**2)
     for y in range(height):
@@ -78,44 +82,42 @@ def _block_means(image, scale):  # type: ignore[no-untyped-def]
             for i in range(row):
                 column[i] += np.uint16(line[i])
         _fill_block_sums(column, scale, width, total)
-        own = means[3 * y * width : 3 * (y + 1) * width]
+        line = means[3 * y * width : 3 * (y + 1) * width]
         for i in range(3 * width):
-            own[i] = np.uint8(np.float32(total[i]) * share + half)
+            line[i] = np.uint8(np.float32(total[i]) * share + half)
     return out
 
 
 @inlined
 def _fill_block_sums(column, scale, width, total):  # type: ignore[no-untyped-def]
-    """Write the sums of ``scale`` pixels side by side, all channels of a pixel at once."""
+    """Write the sums of ``scale`` adjacent pixels of a row into ``total`` (3 * width,), all channels at once."""
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    at = np.uint64(0)
+    i = np.uint64(0)
     for x in range(np.uint64(width)):
-        red, green, blue = np.uint32(0), np.uint32(0), np.uint32(0)
+        blue, green, red = np.uint32(0), np.uint32(0), np.uint32(0)
         for _ in range(scale):
-            red += np.uint32(column[at])
-            green += np.uint32(column[at + one])
-            blue += np.uint32(column[at + two])
-            at += three
-        total[three * x], total[three * x + one], total[three * x + two] = red, green, blue
+            blue += np.uint32(column[i])
+            green += np.uint32(column[i + one])
+            red += np.uint32(column[i + two])
+            i += three
+        total[three * x], total[three * x + one], total[three * x + two] = blue, green, red
 
 
 @compiled
 def _halved(image):  # type: ignore[no-untyped-def]
-    """The means of 2 x 2 pixels, halves rounded up: what OpenCV makes of them, at half of its time."""
+    """The means of 2 x 2 pixels, halves rounded up: equal to OpenCV's result, in half of the time."""
     height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
     out = np.empty((height, width, 3), np.uint8)
     flat, means = image.reshape(-1), out.reshape(-1)
-    both = np.empty(6 * width, np.uint16)
+    row_sum = np.empty(6 * width, np.uint16)
     one, three, six = np.uint16(1), np.uint64(3), np.uint64(6)
     for y in range(height):
         above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
         for i in range(6 * width):
-            both[i] = np.uint16(above[i]) + np.uint16(below[i])
+            row_sum[i] = np.uint16(above[i]) + np.uint16(below[i])
         line = means[3 * y * width : 3 * (y + 1) * width]
         for x in range(np.uint64(width)):
             for channel in range(three):
-                left = both[six * x + channel]
-                line[three * x + channel] = (left + both[six * x + channel + three] + one + one) >> np.uint16(
-                    2
-                )
+                left, right = row_sum[six * x + channel], row_sum[six * x + channel + three]
+                line[three * x + channel] = (left + right + one + one) >> np.uint16(2)
     return out

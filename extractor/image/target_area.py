@@ -1,4 +1,4 @@
-"""Stage 1: the target area, which a flood from outside does not reach."""
+"""Stage 1: the target area, the tiles that a flood fill from the image's border does not reach."""
 
 from __future__ import annotations
 
@@ -11,59 +11,59 @@ from extractor.image.color import MIN_CHROMA, Colors
 from extractor.numeric.compilation import compiled
 
 TARGET_TILE_PX = 8  # pixels per side of a tile of the target area
-MIN_CHROMA_QUANTILE, MIN_CHROMA_SHARE = (
-    0.95,
-    0.15,
-)  # tiles with less than this share of the chroma of that rank have no color
+MIN_CHROMA_QUANTILE = 0.95  # rank of the tile chroma that counts as strong
+MIN_CHROMA_SHARE = 0.15  # of the strong chroma; tiles with less have no color
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Stage 1. ``mask`` (h, w) bool: pixels that may belong to the pattern, at 1/``tile_px`` of the image's scale."""
+    """The result of stage 1.
+
+    Attributes:
+        mask: (h, w) uint8, 1 for tiles that may belong to the pattern.
+        tile_px: side of a tile, px.
+    """
 
     mask: NDArray[np.uint8]
     tile_px: int
 
 
 def find_target(colors: Colors) -> Target:
-    """Stage 1: flood the image from outside; what the flood cannot reach may be pattern.
+    """Stage 1: fill the tiles without color from the image's border; the remaining tiles may be pattern.
 
-    Tiles without color are water; closing seals the gaps between cells first, so that the flood stops at the
-    pattern's rim while its black cells stay dry.
+    A morphological closing of the colored tiles comes first. It closes the gaps between cells, so that the flood fill
+    stops at the pattern's rim and does not reach the black cells.
     """
     return Target(mask=_target_mask(_tile_chroma(colors.chroma, TARGET_TILE_PX)), tile_px=TARGET_TILE_PX)
 
 
 @compiled
-def _tile_chroma(chroma, shrink):  # type: ignore[no-untyped-def]
-    """The largest chroma in every tile of ``tile_px`` pixels."""
+def _tile_chroma(chroma, tile_px):  # type: ignore[no-untyped-def]
+    """(rows, columns) uint8, the largest chroma in every tile of ``tile_px`` x ``tile_px`` pixels."""
     height, width = chroma.shape
-    rows, columns = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
-    largest, strongest, flat = (
-        np.zeros((rows, columns), np.uint8),
-        np.empty(width, np.uint8),
-        chroma.reshape(-1),
-    )
+    rows, columns = (height + tile_px - 1) // tile_px, (width + tile_px - 1) // tile_px
+    largest, strongest = np.zeros((rows, columns), np.uint8), np.empty(width, np.uint8)
+    flat = chroma.reshape(-1)
     for row in range(rows):
         strongest[:] = 0
-        for y in range(row * shrink, min((row + 1) * shrink, height)):
+        for y in range(row * tile_px, min((row + 1) * tile_px, height)):
             begin = np.uint64(y * width)
             for x in range(np.uint64(width)):
                 strongest[x] = max(strongest[x], flat[begin + x])
         for column in range(columns):
-            most = np.uint8(0)
-            for x in range(column * shrink, min((column + 1) * shrink, width)):
-                most = max(most, strongest[x])
-            largest[row, column] = most
+            tile_max = np.uint8(0)
+            for x in range(column * tile_px, min((column + 1) * tile_px, width)):
+                tile_max = max(tile_max, strongest[x])
+            largest[row, column] = tile_max
     return largest
 
 
 @compiled
 def _target_mask(chroma):  # type: ignore[no-untyped-def]
-    """(rows, columns) uint8, which tiles the flood does not reach."""
+    """(rows, columns) uint8, 1 for tiles that the flood fill does not reach."""
     counts = np.zeros(256, np.int64)
-    for much in chroma.ravel():
-        counts[much] += 1
+    for level in chroma.ravel():
+        counts[level] += 1
     rank, below, strong = int(MIN_CHROMA_QUANTILE * (chroma.size - 1)), counts[0], 0
     while below <= rank:
         strong += 1
@@ -75,7 +75,7 @@ def _target_mask(chroma):  # type: ignore[no-untyped-def]
 
 @compiled
 def _dilated(mask, value):  # type: ignore[no-untyped-def]
-    """The mask with ``value`` in the eight tiles around each that has it, too."""
+    """The mask with ``value`` also in the eight tiles around each tile that has the value."""
     rows, columns = mask.shape
     out = mask.copy()
     for row in range(rows):
@@ -86,10 +86,10 @@ def _dilated(mask, value):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _flooded(dry):  # type: ignore[no-untyped-def]
-    """The tiles that are not dry and hang together with the image's border by their sides."""
-    rows, columns = dry.shape
-    wet = np.zeros((rows, columns), np.uint8)
+def _flooded(barrier):  # type: ignore[no-untyped-def]
+    """(rows, columns) uint8, 1 for tiles outside the barrier that are 4-connected to the image's border."""
+    rows, columns = barrier.shape
+    filled = np.zeros((rows, columns), np.uint8)
     stack, height = np.empty((4 * rows * columns + 2 * (rows + columns), 2), np.int32), 0
     for row in range(rows):
         for column in range(columns):
@@ -101,10 +101,10 @@ def _flooded(dry):  # type: ignore[no-untyped-def]
         row, column = stack[height]
         if row < 0 or column < 0 or row == rows or column == columns:
             continue
-        if dry[row, column] or wet[row, column]:
+        if barrier[row, column] or filled[row, column]:
             continue
-        wet[row, column] = 1
+        filled[row, column] = 1
         for dy, dx in ((0, 1), (1, 0), (0, -1), (-1, 0)):
             stack[height, 0], stack[height, 1] = row + dy, column + dx
             height += 1
-    return wet
+    return filled

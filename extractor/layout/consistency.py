@@ -1,4 +1,4 @@
-"""A layout's fields against each other: numbering, cells, colors, edges, reference cell. All vectorised."""
+"""Checks of a layout's fields against each other: numbering, cells, colors, edges, reference cell."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ BLACK, WHITE = 3, 4
 
 
 def check_consistency(reference: Reference) -> None:
-    """Raises ``LayoutError`` at the first contradiction."""
+    """Check that no field contradicts another.
+
+    Raises:
+        LayoutError: the first contradiction.
+    """
     triangular = reference.cell_corners.shape[1] == 3
     if triangular:
         _check_layers(reference)
@@ -34,14 +38,14 @@ def check_consistency(reference: Reference) -> None:
 
 
 def polygon_area(xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) signed areas of (N, K, 2) polygons, positive when counter-clockwise with y up."""
+    """(N,) float64 signed areas of (N, K, 2) polygons, positive when counter-clockwise with y up."""
     x, y = xy[..., 0], xy[..., 1]
     doubled = x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1)
     return np.asarray(0.5 * doubled.sum(axis=-1), dtype=np.float64)
 
 
 def _check_layers(reference: Reference) -> None:
-    """Layer k holds 6k markers (layer 0 one), so marker i of layer k has the id 3k(k-1) + 1 + i."""
+    """Check the layers: layer k holds 6k markers (layer 0 one), so marker i of layer k has the id 3k(k-1) + 1 + i."""
     count = len(reference.layer)
     layers = round((np.sqrt(12 * count - 3) - 3) / 6)
     if 3 * layers * (layers + 1) + 1 != count:
@@ -53,7 +57,7 @@ def _check_layers(reference: Reference) -> None:
 
 
 def _check_rows(reference: Reference) -> None:
-    """In a square pattern ids run row by row; every row is equally long."""
+    """Check the rows of a square pattern: ids run row by row, and all rows have the same length."""
     count = len(reference.layer)
     columns = int(reference.index.max()) + 1
     if count % columns:
@@ -65,50 +69,56 @@ def _check_numbering(reference: Reference, layer: NDArray[np.int_], index: NDArr
     for field, found, expected in (("layer", reference.layer, layer), ("index", reference.index, index)):
         wrong = np.flatnonzero(found != expected)
         if len(wrong):
-            at = int(wrong[0])
-            fail(f"markers.{field}[{at}]", str(found[at]), f"{expected[at]}: marker {at}'s by the numbering")
+            first = int(wrong[0])
+            fail(
+                f"markers.{field}[{first}]",
+                str(found[first]),
+                f"{expected[first]}: marker {first}'s by the numbering",
+            )
 
 
 def _check_cells(reference: Reference) -> None:
-    """Counter-clockwise and given once: every corner turns left, which a repeated corner does not."""
+    """Check that cells are counter-clockwise and listed once: every corner turns left, a repeated corner does not."""
     corners = reference.cell_corners
     xy = reference.xy_mm[corners]
-    before, after = xy - np.roll(xy, 1, axis=1), np.roll(xy, -1, axis=1) - xy
-    turn = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    incoming, outgoing = xy - np.roll(xy, 1, axis=1), np.roll(xy, -1, axis=1) - xy
+    turn = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
     wrong = np.flatnonzero((turn <= 0).any(axis=1))
     if len(wrong):
-        at = int(wrong[0])
-        fail(f"cells.corners[{at}]", str(corners[at].tolist()), "different markers, counter-clockwise")
-    ordered = np.sort(corners, axis=1)[:, :3].astype(np.int64)  # three corners tell a cell in either pattern
+        first = int(wrong[0])
+        fail(f"cells.corners[{first}]", str(corners[first].tolist()), "different markers, counter-clockwise")
+    ordered = np.sort(corners, axis=1)[:, :3].astype(np.int64)  # three corners identify a cell in any pattern
     keys = (ordered[:, 0] * len(reference.layer) + ordered[:, 1]) * len(reference.layer) + ordered[:, 2]
     order = np.argsort(keys, kind="stable")
-    twins = np.flatnonzero(np.diff(keys[order]) == 0)
-    if len(twins):
-        at = int(order[twins[0] + 1])
-        fail(f"cells.corners[{at}]", str(corners[at].tolist()), "a cell that is not in the list already")
+    repeated = np.flatnonzero(np.diff(keys[order]) == 0)
+    if len(repeated):
+        first = int(order[repeated[0] + 1])
+        fail(
+            f"cells.corners[{first}]", str(corners[first].tolist()), "a cell that is not in the list already"
+        )
 
 
 def _check_edges(reference: Reference) -> None:
-    """Each from its smaller to its larger id, ascending, and every side of a cell among them."""
+    """Check that edges go from the smaller to the larger id, ascend, and contain every side of a cell."""
     edges = reference.edges.astype(np.int64)
     count = len(reference.layer)
     wrong = np.flatnonzero(edges[:, 0] >= edges[:, 1])
     if len(wrong):
-        at = int(wrong[0])
-        fail(f"edges[{at}]", str(edges[at].tolist()), "the smaller id first")
+        first = int(wrong[0])
+        fail(f"edges[{first}]", str(edges[first].tolist()), "the smaller id first")
     keys = edges[:, 0] * count + edges[:, 1]
     wrong = np.flatnonzero(np.diff(keys) <= 0)
     if len(wrong):
-        at = int(wrong[0]) + 1
-        fail(f"edges[{at}]", str(edges[at].tolist()), "edges in ascending order, each once")
+        first = int(wrong[0]) + 1
+        fail(f"edges[{first}]", str(edges[first].tolist()), "edges in ascending order, each once")
     corners = reference.cell_corners.astype(np.int64)
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     sides = ends[:, 0] * count + ends[:, 1]
-    place = np.minimum(np.searchsorted(keys, sides), len(keys) - 1)
-    missing = np.flatnonzero(keys[place] != sides)
+    rank = np.minimum(np.searchsorted(keys, sides), len(keys) - 1)
+    missing = np.flatnonzero(keys[rank] != sides)
     if len(missing):
-        at = int(missing[0])
-        fail("edges", f"without {ends[at].tolist()}", f"every side of cell {at // corners.shape[1]}")
+        first = int(missing[0])
+        fail("edges", f"without {ends[first].tolist()}", f"every side of cell {first // corners.shape[1]}")
 
 
 def _check_reference_cell(reference: Reference, triangular: bool) -> None:
@@ -125,18 +135,18 @@ def _check_reference_cell(reference: Reference, triangular: bool) -> None:
 
 
 def _check_colors(reference: Reference) -> None:
-    """A marker touches at most one red, one green and one blue cell, clockwise in this order."""
+    """Check that a marker touches at most one red, one green and one blue cell, clockwise in this order."""
     count = len(reference.layer)
     cell_of = np.full((count, 3), -1)
     for color, name in enumerate(("red", "green", "blue")):
         cells = np.flatnonzero(reference.cell_color == color)
-        touched = reference.cell_corners[cells]
-        crowded = np.flatnonzero(np.bincount(touched.ravel(), minlength=count) > 1)
-        if len(crowded):
-            fail("cells.color", f"{name} twice around marker {crowded[0]}", "at most one cell of a color")
-        cell_of[touched, color] = cells[:, None]
+        corners = reference.cell_corners[cells]
+        repeated = np.flatnonzero(np.bincount(corners.ravel(), minlength=count) > 1)
+        if len(repeated):
+            fail("cells.color", f"{name} twice around marker {repeated[0]}", "at most one cell of a color")
+        cell_of[corners, color] = cells[:, None]
     inner = np.flatnonzero((cell_of >= 0).all(axis=1))
-    centres = reference.xy_mm[reference.cell_corners].mean(axis=1)[cell_of[inner]]
-    wrong = inner[polygon_area(centres) >= 0]
+    centers = reference.xy_mm[reference.cell_corners].mean(axis=1)[cell_of[inner]]
+    wrong = inner[polygon_area(centers) >= 0]
     if len(wrong):
         fail("cells.color", f"counter-clockwise around marker {wrong[0]}", "red, green, blue clockwise")

@@ -1,4 +1,4 @@
-"""Typed reading of a JSON document: each function returns the value asked for or raises ``LayoutError``."""
+"""Typed fields of a JSON document: each function returns a checked value or raises ``LayoutError``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from extractor.errors import LayoutError
 
-# One kilometre: far above any sensor, far below where squares of lengths lose their digits.
-MAX_MM = 1e6
+MAX_MM = 1e6  # one kilometre: larger than any sensor, and squares of lengths still keep their digits
 MAX_INT = 2**31 - 1
 
 
 def fail(field: str, value: str, expected: str) -> NoReturn:
+    """Raise a ``LayoutError`` that names a field, its value and what is expected."""
     raise LayoutError(f"{field} is {value}; expected {expected}")
 
 
@@ -38,7 +38,11 @@ def shown(value: object) -> str:
 
 
 def document(text: str) -> dict[str, Any]:
-    """The JSON object in ``text``; NaN, Infinity and names given twice are refused."""
+    """The JSON object in ``text``.
+
+    Raises:
+        LayoutError: not JSON, not an object, or with NaN, Infinity or a repeated name.
+    """
     try:
         value = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_duplicates)
     except json.JSONDecodeError as error:
@@ -64,34 +68,37 @@ def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) < len(pairs):
         names = [name for name, _ in pairs]
-        twin = next(name for name in names if names.count(name) > 1)
-        raise LayoutError(f"the field {shown(twin)} is given more than once; expected once")
+        repeated = next(name for name in names if names.count(name) > 1)
+        raise LayoutError(f"the field {shown(repeated)} is given more than once; expected once")
     return fields
 
 
-def known_fields(holder: dict[str, Any], names: Sequence[str], prefix: str = "") -> None:
-    """Every name is there and no other."""
+def known_fields(container: dict[str, Any], names: Sequence[str], prefix: str = "") -> None:
+    """Check that an object has all fields of these names and no other field."""
     for name in names:
-        if name not in holder:
+        if name not in container:
             fail(prefix + name, "missing", f"one of the fields {', '.join(names)}")
-    for name in holder:
+    for name in container:
         if name not in names:
             fail(prefix + shown(name), "unknown", f"only the fields {', '.join(names)}")
 
 
 def mapping(value: object, field: str) -> dict[str, Any]:
+    """An object."""
     if not isinstance(value, dict):
         fail(field, shown(value), "an object")
     return value
 
 
 def text_field(value: object, field: str) -> str:
+    """A printable text that is not empty."""
     if not isinstance(value, str) or not value.isprintable() or not value:
         fail(field, shown(value), "a printable text")
     return value
 
 
 def integer(value: object, field: str, low: int, high: int) -> int:
+    """An integer from ``low`` to ``high``."""
     if type(value) is not int or not low <= value <= high:
         fail(field, shown(value), f"an integer from {low} to {high}")
     return value
@@ -111,7 +118,7 @@ def integers(value: object, field: str, high: int, length: int | None = None) ->
 
 
 def integer_rows(value: object, field: str, high: int, widths: tuple[int, ...]) -> NDArray[np.int32]:
-    """(N, W) int32 from 0 to ``high``; every row as wide as the first, whose width is one of ``widths``."""
+    """(N, W) int32 from 0 to ``high``; all rows have one width W, which is one of ``widths``."""
     flat, width = _flat_rows(value, field, widths)
     return _integers(flat, field, high, width).reshape(-1, width)
 
@@ -128,14 +135,14 @@ def points_mm(value: object, field: str) -> NDArray[np.float64]:
 
 
 def choices(value: object, field: str, length: int, names: Sequence[str]) -> NDArray[np.uint8]:
-    """(N,) uint8, each text's place in ``names``."""
+    """(N,) uint8, the index of each text in ``names``."""
     column = _list_value(value, field, length)
     codes = {name: code for code, name in enumerate(names)}
-    found = [codes.get(item, -1) if type(item) is str else -1 for item in column]
-    if -1 in found:
-        at = found.index(-1)
-        fail(f"{field}[{at}]", shown(column[at]), f"one of {', '.join(names)}")
-    return np.array(found, dtype=np.uint8)
+    indices = [codes.get(item, -1) if type(item) is str else -1 for item in column]
+    if -1 in indices:
+        first = indices.index(-1)
+        fail(f"{field}[{first}]", shown(column[first]), f"one of {', '.join(names)}")
+    return np.array(indices, dtype=np.uint8)
 
 
 def _list_value(value: object, field: str, length: int | None) -> list[Any]:
@@ -150,25 +157,29 @@ def _list_value(value: object, field: str, length: int | None) -> list[Any]:
 
 def _flat_rows(value: object, field: str, widths: tuple[int, ...]) -> tuple[list[Any], int]:
     rows = _list_value(value, field, None)
-    first = len(rows[0]) if type(rows[0]) is list else -1
-    width = first if first in widths else widths[0]
+    first_width = len(rows[0]) if type(rows[0]) is list else -1
+    width = first_width if first_width in widths else widths[0]
     if set(map(type, rows)) != {list} or set(map(len, rows)) != {width}:
-        at = next(i for i, row in enumerate(rows) if type(row) is not list or len(row) != width)
-        fail(f"{field}[{at}]", shown(rows[at]), f"a list of {width}")
+        wrong = next(i for i, row in enumerate(rows) if type(row) is not list or len(row) != width)
+        fail(f"{field}[{wrong}]", shown(rows[wrong]), f"a list of {width}")
     return list(chain.from_iterable(rows)), width
 
 
 def _integers(flat: list[Any], field: str, high: int, width: int) -> NDArray[np.int32]:
     if set(map(type, flat)) != {int} or min(flat) < 0 or max(flat) > high:
-        at = next(i for i, item in enumerate(flat) if type(item) is not int or not 0 <= item <= high)
-        fail(_field_path(field, at, width), shown(flat[at]), f"an integer from 0 to {high}")
+        wrong = next(i for i, item in enumerate(flat) if type(item) is not int or not 0 <= item <= high)
+        fail(_field_path(field, wrong, width), shown(flat[wrong]), f"an integer from 0 to {high}")
     return np.array(flat, dtype=np.int32)
 
 
 def _lengths_mm(flat: list[Any], field: str, width: int) -> NDArray[np.float64]:
     if not set(map(type, flat)) <= {int, float} or not all(-MAX_MM <= item <= MAX_MM for item in flat):
-        at = next(i for i, item in enumerate(flat) if not _is_length(item))
-        fail(_field_path(field, at, width), shown(flat[at]), f"a number from {-MAX_MM:g} to {MAX_MM:g} mm")
+        wrong = next(i for i, item in enumerate(flat) if not _is_length(item))
+        fail(
+            _field_path(field, wrong, width),
+            shown(flat[wrong]),
+            f"a number from {-MAX_MM:g} to {MAX_MM:g} mm",
+        )
     return np.array(flat, dtype=np.float64)
 
 
@@ -176,5 +187,6 @@ def _is_length(item: object) -> bool:
     return type(item) in (int, float) and -MAX_MM <= item <= MAX_MM  # type: ignore[operator]
 
 
-def _field_path(field: str, at: int, width: int) -> str:
-    return f"{field}[{at}]" if width == 1 else f"{field}[{at // width}][{at % width}]"
+def _field_path(field: str, index: int, width: int) -> str:
+    """The name of one entry of a flattened list of rows."""
+    return f"{field}[{index}]" if width == 1 else f"{field}[{index // width}][{index % width}]"

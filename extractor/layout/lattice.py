@@ -1,4 +1,4 @@
-"""The numbering of the triangular lattice, on this side of layout.json: axial (q, r) <-> layer, index <-> id.
+"""The numbering of the triangular lattice as the reader defines it: axial (q, r) <-> layer, index <-> id.
 
 Marker i of layer k has the id 3k(k-1) + 1 + i; index 0 lies at the axial (-k, k) and the index runs clockwise.
 """
@@ -12,7 +12,7 @@ from extractor.numeric.compilation import compiled
 
 NEIGHBOUR_STEPS = np.array(
     [[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]], np.int32
-)  # steps to the neighbours
+)  # (6, 2) axial steps from a marker to its neighbours
 
 
 @compiled
@@ -41,22 +41,22 @@ def marker_id(q, r):  # type: ignore[no-untyped-def]
 
 
 def axial_coordinates(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(M, 2) int32 axial coordinates of the markers with these layers and indices."""
+    """(M, 2) int32 axial coordinates (q, r) of the markers with these layers (M,) and indices (M,)."""
     k = np.maximum(layer, 1)
-    side, along = np.divmod(index, k)
-    corner_q = np.array([-1, 0, 1, 1, 0, -1])[side] * layer
-    corner_r = np.array([1, 1, 0, -1, -1, 0])[side] * layer
-    step_q = np.array([1, 1, 0, -1, -1, 0])[side] * along
-    step_r = np.array([0, -1, -1, 0, 1, 1])[side] * along
+    sextant, steps = np.divmod(index, k)
+    corner_q = np.array([-1, 0, 1, 1, 0, -1])[sextant] * layer
+    corner_r = np.array([1, 1, 0, -1, -1, 0])[sextant] * layer
+    step_q = np.array([1, 1, 0, -1, -1, 0])[sextant] * steps
+    step_r = np.array([0, -1, -1, 0, 1, 1])[sextant] * steps
     return np.stack([corner_q + step_q, corner_r + step_r], axis=1).astype(np.int32)
 
 
 @compiled
 def rotated_cell(q, r, turn):  # type: ignore[no-untyped-def]
-    """The axial place of a cell turned by 0, 120 or 240 degrees; inks are carried onto themselves when shifted so that
-    their (q - r) mod 3 agrees.
+    """The axial place of a cell after a rotation of the lattice by ``turn`` (0, 1, 2) times 120 degrees.
 
-    It is the turn that brings the three cells around the down-cell (turn, 0) to those around (0, 0).
+    The rotation maps the three cells around the down-cell (turn, 0) to the cells around (0, 0). Inks are mapped onto
+    themselves when the lattice is also shifted so that (q - r) mod 3 agrees.
     """
     q -= turn
     if turn == 1:
@@ -67,9 +67,9 @@ def rotated_cell(q, r, turn):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rotated_cells(at, turn):  # type: ignore[no-untyped-def]
-    """(N, 2) int32, the axial coordinates of cells turned so."""
-    out = np.empty(at.shape, np.int32)
-    for i in range(at.shape[0]):
-        out[i] = rotated_cell(at[i, 0], at[i, 1], turn)
+def rotated_cells(axial, turn):  # type: ignore[no-untyped-def]
+    """(N, 2) int32, the axial coordinates of cells (N, 2) after ``rotated_cell``."""
+    out = np.empty(axial.shape, np.int32)
+    for i in range(axial.shape[0]):
+        out[i] = rotated_cell(axial[i, 0], axial[i, 1], turn)
     return out

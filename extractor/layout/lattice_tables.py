@@ -1,4 +1,4 @@
-"""What the stages need of a layout, in tables, made once."""
+"""Tables of a triangular layout for numbering and repair: cells by lattice place, neighbours of markers and cells."""
 
 from __future__ import annotations
 
@@ -23,38 +23,65 @@ UNKNOWN_AXIAL = -(1 << 20)  # the axial coordinate of a cell that has none
 
 
 class LayoutCells(NamedTuple):
-    """The layout's colored cells.
+    """The layout's U colored cells, in the form that compiled functions take.
 
     Attributes:
-        center_mm: (U, 2) float64. ink: (U,) uint8, 1 red, 2 green, 3 blue. size_mm: (U,) float64, the mean side.
-        arms_mm: (U, 3, 2) float64, from the center to the corners.
-        beside: (U, 6) int32, the cells that share a corner with each, in the order of ``NEIGHBOUR_STEPS``; -1 for none.
+        center_mm: (U, 2) float64, layout frame.
+        ink: (U,) uint8, 1 red, 2 green, 3 blue.
+        size_mm: (U,) float64, the mean side.
+        corner_vectors_mm: (U, 3, 2) float64, from the center to the corners.
+        cell_neighbours: (U, 6) int32, the cells that share a corner with each cell, in the order of
+            ``NEIGHBOUR_STEPS``; -1 for none.
     """
 
     center_mm: NDArray[np.float64]
     ink: NDArray[np.uint8]
     size_mm: NDArray[np.float64]
     corner_vectors_mm: NDArray[np.float64]
-    beside: NDArray[np.int32]
+    cell_neighbours: NDArray[np.int32]
+
+
+class RingTables(NamedTuple):
+    """The neighbours of the layout's M markers, in the form that compiled functions take; -1 for no neighbour.
+
+    Attributes:
+        marker_mm: (M, 2) float64, layout frame.
+        neighbours, ring_weights: (M, 18) int32 and float64, see ``Lattice``.
+        inward_neighbours, inward_weights: (M, 18) int32 and float64, see ``Lattice``.
+        first_ring: (M, 6) int32, the six markers around each marker.
+        present: (M,) bool, the markers that touch a colored or white cell.
+        is_rim: (M,) bool, the markers that have fewer than six present neighbours.
+        layers: number of layers.
+    """
+
+    marker_mm: NDArray[np.float64]
+    neighbours: NDArray[np.int32]
+    ring_weights: NDArray[np.float64]
+    inward_neighbours: NDArray[np.int32]
+    inward_weights: NDArray[np.float64]
+    first_ring: NDArray[np.int32]
+    present: NDArray[np.bool_]
+    is_rim: NDArray[np.bool_]
+    layers: int
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """What numbering needs of the layout.
+    """The lattice of a triangular layout with M markers and U colored cells.
 
     Attributes:
-        layers: the layout's layers.
-        marker_mm: (M, 2) float64.
-        holder: (S, S) int32, the colored cell at the axial (q, r), which ``cell_at`` looks up; -1 for none.
+        layers: number of layers.
+        marker_mm: (M, 2) float64, layout frame.
+        cell_lookup: (S, S) int32, the colored cell at the axial (q, r), read by ``cell_at``; -1 for none.
         corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
         ink: (U,) uint8, 1 red, 2 green, 3 blue.
         axial: (U, 2) int32, the cells' (q, r).
         layer: (M,) int32, the markers' layers.
-        neighbours: (M, 18) int32, the markers in the two rings around each, -1 beyond the pattern.
-        inner: (M, 18) int32, for markers of the outermost layer the nearest ones of the others, else -1.
-        ring_weights, inner_weights: (M, 18) float64, weights of ``neighbours`` and of ``inward_neighbours`` that
-            give a marker's
-            place; 0 where they are too few.
+        neighbours: (M, 18) int32, the markers in the two rings around each marker, -1 outside the pattern.
+        inward_neighbours: (M, 18) int32, for markers of the outermost layer the nearest markers of the other layers,
+            else -1.
+        ring_weights, inward_weights: (M, 18) float64, weights of ``neighbours`` and of ``inward_neighbours`` that
+            give a marker's place; 0 where the neighbours are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
@@ -73,62 +100,79 @@ class Lattice:
 
     @cached_property
     def center_mm(self) -> NDArray[np.float64]:
-        """(U, 2) the centers of the colored cells."""
+        """(U, 2) float64, the centers of the colored cells."""
         return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
 
     @cached_property
     def size_mm(self) -> NDArray[np.float64]:
-        """(U,) the mean side of the colored cells."""
+        """(U,) float64, the mean side of the colored cells."""
         corners = self.marker_mm[self.corner_ids]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(sides.mean(axis=1))
 
     @cached_property
-    def beside(self) -> NDArray[np.int32]:
-        """(U, 6) int32 the colored cells that share a corner with each, in the order of ``NEIGHBOUR_STEPS``; -1 for
-        none."""
-        at = self.axial[:, None] + NEIGHBOUR_STEPS
-        return cells_at(at.reshape(-1, 2), self).reshape(-1, 6)
+    def cell_neighbours(self) -> NDArray[np.int32]:
+        """(U, 6) int32, the colored cells that share a corner with each cell, in the order of ``NEIGHBOUR_STEPS``; -1
+        for none."""
+        places = self.axial[:, None] + NEIGHBOUR_STEPS
+        return cells_at(places.reshape(-1, 2), self).reshape(-1, 6)
 
     @cached_property
     def cells_per_marker(self) -> NDArray[np.int64]:
-        """(M,) how many colored cells meet at each marker."""
+        """(M,) int64, how many colored cells meet at each marker."""
         return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
 
     @cached_property
     def layout_cells(self) -> LayoutCells:
-        """The colored cells as compiled loops see them."""
-        return LayoutCells(self.center_mm, self.ink, self.size_mm, self.corner_vectors_mm, self.beside)
+        """The colored cells as a record for compiled functions."""
+        return LayoutCells(
+            self.center_mm, self.ink, self.size_mm, self.corner_vectors_mm, self.cell_neighbours
+        )
+
+    @cached_property
+    def ring_tables(self) -> RingTables:
+        """The markers' neighbours as a record for compiled functions."""
+        return RingTables(
+            marker_mm=self.marker_mm,
+            neighbours=self.neighbours,
+            ring_weights=self.ring_weights,
+            inward_neighbours=self.inward_neighbours,
+            inward_weights=self.inward_weights,
+            first_ring=self.first_ring,
+            present=self.present,
+            is_rim=self.is_rim,
+            layers=self.layers,
+        )
 
     @cached_property
     def white_cell_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(2,) mm the middle of the white cell, and (2, 2) mm per axial step in it."""
+        """(2,) the center of the white cell, mm, and (2, 2) the layout vectors of one axial step in q and r, mm."""
         below, left, right = self.marker_mm[:3]
         return (below + left + right) / 3, np.stack([right - left, right - below], axis=1)
 
     @cached_property
     def first_ring(self) -> NDArray[np.int32]:
-        """(M, 6) the markers around each, -1 beyond the pattern."""
+        """(M, 6) int32, the six markers around each marker, -1 outside the pattern."""
         return np.ascontiguousarray(self.neighbours[:, FIRST_RING])
 
     @cached_property
-    def rim(self) -> NDArray[np.bool_]:
-        """(M,) the markers that have not all six around them."""
+    def is_rim(self) -> NDArray[np.bool_]:
+        """(M,) bool, the markers that have fewer than six present neighbours."""
         return np.asarray(~((self.first_ring >= 0) & self.present[self.first_ring]).all(axis=1))
 
     @cached_property
     def corner_vectors_mm(self) -> NDArray[np.float64]:
-        """(U, 3, 2) from the centers of the colored cells to their corners."""
+        """(U, 3, 2) float64, from the centers of the colored cells to their corners."""
         return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])
 
 
 def lattice_of(reference: Reference) -> Lattice:
-    """The tables of a triangular layout."""
+    """The lattice of a triangular layout."""
     coordinates = axial_coordinates(reference.layer, reference.index)
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
     neighbours = neighbour_table(coordinates, int(reference.layer.max()))
-    inner = inward_neighbour_table(coordinates, reference.layer)
+    inward_neighbours = inward_neighbour_table(coordinates, reference.layer)
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
     return Lattice(
         layers=int(reference.layer.max()),
@@ -139,50 +183,50 @@ def lattice_of(reference: Reference) -> Lattice:
         axial=coordinates[lower_left],
         layer=reference.layer,
         neighbours=neighbours,
-        inward_neighbours=inner,
+        inward_neighbours=inward_neighbours,
         ring_weights=ring_weights(reference.xy_mm, neighbours),
-        inward_weights=ring_weights(reference.xy_mm, inner),
+        inward_weights=ring_weights(reference.xy_mm, inward_neighbours),
         present=reference.present,
     )
 
 
-def _cell_lookup_table(at: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
-    """Where each cell's number stands in a square as large as the layout, with a rim of -1 all around."""
-    out = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
-    out[at[:, 0] + layers + 1, at[:, 1] + layers + 1] = np.arange(len(at))
-    return out
+def _cell_lookup_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
+    """(S, S) int32, S = 2 layers + 3: each cell's number at its axial place; the border and free places hold -1."""
+    lookup = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
+    lookup[axial[:, 0] + layers + 1, axial[:, 1] + layers + 1] = np.arange(len(axial))
+    return lookup
 
 
 @inlined
-def cell_at(holder, q, r):  # type: ignore[no-untyped-def]
-    """The layout's cell at the axial (q, r), or -1: without a branch, as cells come in any order."""
-    last = np.int64(holder.shape[0] - 1)
-    return holder[min(max(q + last // 2, 0), last), min(max(r + last // 2, 0), last)]
+def cell_at(cell_lookup, q, r):  # type: ignore[no-untyped-def]
+    """The layout's cell at the axial (q, r), or -1; branch-free, because cells are read in any order."""
+    last = np.int64(cell_lookup.shape[0] - 1)
+    return cell_lookup[min(max(q + last // 2, 0), last), min(max(r + last // 2, 0), last)]
 
 
 @compiled
-def _cells_at(at, holder):  # type: ignore[no-untyped-def]
-    out = np.empty(at.shape[0], np.int32)
-    for i in range(at.shape[0]):
-        out[i] = cell_at(holder, at[i, 0], at[i, 1])
+def _cells_at(axial, cell_lookup):  # type: ignore[no-untyped-def]
+    out = np.empty(axial.shape[0], np.int32)
+    for i in range(axial.shape[0]):
+        out[i] = cell_at(cell_lookup, axial[i, 0], axial[i, 1])
     return out
 
 
-def cells_at(at: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
-    """(N,) int32, the layout's cell at each axial (q, r), or -1."""
-    return np.asarray(_cells_at(np.ascontiguousarray(at, dtype=np.int32), lattice.cell_lookup))
+def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
+    """(N,) int32, the layout's cell at each axial (q, r) of (N, 2), or -1."""
+    return np.asarray(_cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup))
 
 
 @compiled
-def _fill_corner_ids(at, out):  # type: ignore[no-untyped-def]
+def _fill_corner_ids(axial, out):  # type: ignore[no-untyped-def]
     """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
-    for i in range(at.shape[0]):
-        q, r = at[i, 0], at[i, 1]
+    for i in range(axial.shape[0]):
+        q, r = axial[i, 0], axial[i, 1]
         out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
 
 
-def corner_marker_ids(at: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1) at the corners of the cells (q, r)."""
-    out = np.empty((len(at), 3), np.int32)
-    _fill_corner_ids(np.ascontiguousarray(at, dtype=np.int32), out)
+def corner_marker_ids(axial: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1), the corners of the cells at (q, r) of (N, 2)."""
+    out = np.empty((len(axial), 3), np.int32)
+    _fill_corner_ids(np.ascontiguousarray(axial, dtype=np.int32), out)
     return out

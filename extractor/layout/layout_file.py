@@ -1,7 +1,7 @@
 """An independent reader of ``layout.json``, version 1.
 
-The file is the only bridge from the generator. Nothing in it is believed: every field is checked, then the
-fields against each other, then the digest of the geometry. ``layout.schema.json`` describes the format.
+The file is the only interface to the generator. Every field is checked, then the fields against each other, then the
+digest of the geometry. ``layout.schema.json`` describes the format.
 """
 
 from __future__ import annotations
@@ -21,17 +21,11 @@ from extractor.layout.consistency import check_consistency
 from extractor.layout.reference import COLORS, Reference
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
-
-
-MAX_BYTES = 1 << 28
-
-
+MAX_BYTES = 1 << 28  # of a layout file
 FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
-
-
 OPTIONAL_FIELDS = ("fiducials",)
 
 
@@ -62,7 +56,7 @@ def load_layout(path: str | PathLike[str]) -> Reference:
 
 
 def parse_layout(text: str, name: str = "layout") -> Reference:
-    """The layout in a JSON text; ``name`` opens every error's message.
+    """The layout in a JSON text; every error's message begins with ``name``.
 
     Raises:
         LayoutError: see ``load_layout``.
@@ -84,8 +78,8 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
     cells = fields.mapping(document["cells"], "cells")
     fields.known_fields(cells, ("corners", "color"), "cells.")
     corners = fields.integer_rows(cells["corners"], "cells.corners", count - 1, (3, 4))
-    start = fields.mapping(document["reference"], "reference")
-    fields.known_fields(start, ("cell", "marker"), "reference.")
+    origin = fields.mapping(document["reference"], "reference")
+    fields.known_fields(origin, ("cell", "marker"), "reference.")
     fiducials_mm, fiducial_diameter_mm = _fiducials(document)
     reference = Reference(
         pattern=fields.text_field(document["pattern"], "pattern"),
@@ -97,8 +91,8 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         cell_color=fields.choices(cells["color"], "cells.color", len(corners), COLORS),
         edges=fields.integer_rows(document["edges"], "edges", count - 1, (2,)),
         virtual_per_edge=fields.integer(document["virtual_per_edge"], "virtual_per_edge", 0, 1000),
-        reference_cell=fields.integer(start["cell"], "reference.cell", 0, len(corners) - 1),
-        reference_marker=fields.integer(start["marker"], "reference.marker", 0, count - 1),
+        reference_cell=fields.integer(origin["cell"], "reference.cell", 0, len(corners) - 1),
+        reference_marker=fields.integer(origin["marker"], "reference.marker", 0, count - 1),
         palette=_palette(document["palette"]),
         border_mm=fields.length_mm(document["border_mm"], "border_mm"),
         outline_mm=fields.points_mm(document["outline"], "outline"),
@@ -112,7 +106,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
 
 
 def _check_header(document: dict[str, Any]) -> None:
-    """Format and version first: what another version holds is not this reader's to judge."""
+    """Check format and version before all other fields, which another version may define differently."""
     for field, expected in (("format", "cmp-layout"), ("version", 1), ("units", "mm")):
         value = document.get(field)
         if type(value) is not type(expected) or value != expected:
@@ -140,6 +134,7 @@ def _palette(value: object) -> dict[str, str]:
 
 
 def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
+    """(F, 2) float64 centers and the diameter of the registration marks, mm."""
     if "fiducials" not in document:
         return np.empty((0, 2)), 0.0
     marks = fields.mapping(document["fiducials"], "fiducials")
@@ -152,7 +147,7 @@ def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
 
 
 def _check_digest(reference: Reference) -> None:
-    """In this order: layer, index, corners, color, edges as little-endian int32, then x, y as float64."""
+    """Check the digest of layer, index, corners, color, edges as little-endian int32, then x, y as float64."""
     digest = hashlib.sha256()
     integers = (
         reference.layer,

@@ -1,4 +1,4 @@
-"""Which markers lie in the two rings around each one, and the weights by which they predict its place."""
+"""The markers in the two rings around each marker, and the weights by which they predict the marker's place."""
 
 from __future__ import annotations
 
@@ -8,26 +8,16 @@ from numpy.typing import NDArray
 from extractor.layout.lattice import layer_of, marker_id
 from extractor.numeric.compilation import compiled
 
-QUADRATIC_TERMS, RIGHT_SIDES = (
-    6,
-    3,
-)  # 1, x, y, x^2, xy, y^2 in units of the local edge; right sides: x, y and the leverage
-LINEAR_TERMS = 3  # the terms of a linear map
-MIN_PIVOT = 1e-7
-
-
+QUADRATIC_TERMS = 6  # of a quadratic map: 1, x, y, x^2, xy, y^2 in units of the local edge
+RIGHT_SIDES = 3  # of its normal equations: x, y and the leverage
+LINEAR_TERMS = 3  # of a linear map: 1, x, y
+MIN_PIVOT = 1e-7  # of a Cholesky factor; below it the neighbours do not determine the map
 RING_STEPS = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
-)
-
-
-FIRST_RING = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING_STEPS])
-
-
-MIN_QUADRATIC_NEIGHBOURS = 9  # neighbours for the quadratic; fewer get the linear map
-
-
-MIN_LINEAR_NEIGHBOURS = 4
+)  # (18, 2) axial steps to the markers of the two rings
+FIRST_RING = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING_STEPS])  # (6,)
+MIN_QUADRATIC_NEIGHBOURS = 9  # fewer neighbours get the linear map
+MIN_LINEAR_NEIGHBOURS = 4  # fewer neighbours give no map
 
 
 @compiled
@@ -42,41 +32,44 @@ def _neighbour_ids(axial, layers):  # type: ignore[no-untyped-def]
 
 
 def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
-    """(M, 18) int32 ids of the markers in the two rings around each one; -1 beyond the pattern."""
+    """(M, 18) int32, the ids of the markers in the two rings around each marker at (M, 2); -1 outside the pattern."""
     return np.asarray(_neighbour_ids(axial, layers))
 
 
 def inward_neighbour_table(axial: NDArray[np.int32], layer: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(M, 18) int32: for markers of the outermost layer, the nearest ones of the other layers; else -1."""
+    """(M, 18) int32: for markers of the outermost layer, the nearest markers of the other layers; else -1."""
     from scipy.spatial import cKDTree
 
     table = np.full((len(layer), len(RING_STEPS)), -1, np.int32)
     outer, inner = np.flatnonzero(layer == layer.max()), np.flatnonzero(layer < layer.max())
     count = min(len(RING_STEPS), len(inner))
-    place = axial @ np.array([[1.0, 0.0], [0.5, 0.75**0.5]])
-    near = cKDTree(place[inner]).query(place[outer], count)[1].reshape(len(outer), -1)
-    table[outer, :count] = inner[near]
+    xy = axial @ np.array([[1.0, 0.0], [0.5, 0.75**0.5]])
+    nearest = cKDTree(xy[inner]).query(xy[outer], count)[1].reshape(len(outer), -1)
+    table[outer, :count] = inner[nearest]
     return table
 
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(M, 18) weights that give a marker's place from all neighbours that the pattern has, as ``predicted`` does; 0
-    where these are too few."""
-    there = table >= 0
-    arms = np.where(there[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
-    count = there.sum(axis=1)
-    scale = np.linalg.norm(arms, axis=2).sum(axis=1) / np.maximum(count, 1)
-    x, y = np.moveaxis(arms / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
-    rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * there[..., None]
+    """(M, 18) float64 weights of the neighbours ``table`` (M, 18) whose weighted sum is a marker's place.
+
+    The weights are those of the least-squares map of ``predict_markers`` with all neighbours known: quadratic, or
+    linear below ``MIN_QUADRATIC_NEIGHBOURS``. They are 0 where the neighbours are too few.
+    """
+    exists = table >= 0
+    vectors = np.where(exists[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
+    count = exists.sum(axis=1)
+    scale = np.linalg.norm(vectors, axis=2).sum(axis=1) / np.maximum(count, 1)
+    x, y = np.moveaxis(vectors / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
+    rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * exists[..., None]
     weights = np.zeros(table.shape)
     quadratic = count >= MIN_QUADRATIC_NEIGHBOURS
-    for terms, use in (
+    for terms, selected in (
         (QUADRATIC_TERMS, quadratic),
         (LINEAR_TERMS, (count >= MIN_LINEAR_NEIGHBOURS) & ~quadratic),
     ):
-        map_rows = rows[use, :, :terms]
+        map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
-        sound = np.linalg.eigvalsh(gram)[:, 0] > MIN_PIVOT * count[use]
-        solved = np.linalg.solve(gram[sound], np.swapaxes(map_rows[sound], 1, 2))[:, 0]
-        weights[np.flatnonzero(use)[sound]] = solved
+        regular = np.linalg.eigvalsh(gram)[:, 0] > MIN_PIVOT * count[selected]
+        solutions = np.linalg.solve(gram[regular], np.swapaxes(map_rows[regular], 1, 2))[:, 0]
+        weights[np.flatnonzero(selected)[regular]] = solutions
     return weights

@@ -1,8 +1,4 @@
-"""The layout that an image is compared with: an independent reader of ``layout.json``, version 1.
-
-The file is the only bridge from the generator. Nothing in it is believed: every field is checked, then the
-fields against each other, then the digest of the geometry. ``layout.schema.json`` describes the format.
-"""
+"""The reader's value of a layout: a pattern as ``layout.json``, version 1, describes it."""
 
 from __future__ import annotations
 
@@ -10,38 +6,43 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as with_default
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.frozen_record import FrozenRecord
+
 COLORS = ("red", "green", "blue", "black", "white")
 RED, GREEN, BLUE, BLACK, WHITE = range(5)
+ARRAY_FIELDS = (
+    "layer", "index", "xy_mm", "cell_corners", "cell_color", "edges", "outline_mm", "fiducials_mm",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """A pattern as the layout file describes it, in read-only arrays.
+class Reference(FrozenRecord):
+    """A pattern as the layout file describes it, in read-only arrays and mappings.
 
     Layout frame: mm, origin at marker 0, x right, y up, seen from the front.
 
     Attributes:
         pattern: the pattern's name.
         parameters: the design's parameters.
-        layer, index: (M,) int32; a marker's place in the arrays is its id. Square: row and column.
-        xy_mm: (M, 2) float64.
+        layer, index: (M,) int32, of the markers by id. In a square pattern: row and column.
+        xy_mm: (M, 2) float64, the markers by id.
         cell_corners: (C, 3) int32, in a square pattern (C, 4): marker ids counter-clockwise from the front.
         cell_color: (C,) uint8: red 0, green 1, blue 2, black 3, white 4.
         edges: (E, 2) int32, each from its smaller to its larger marker id, in ascending order.
         virtual_per_edge: virtual markers on every edge.
-        reference_cell, reference_marker: the cell that fixes the numbering, and its corner where it starts.
+        reference_cell, reference_marker: the cell that fixes the numbering, and the corner of it where the numbering
+            starts.
         palette: color name -> "#rrggbb".
         border_mm: width of the black border.
-        outline_mm: (K, 2) float64, the ground's closed outline, counter-clockwise.
+        outline_mm: (K, 2) float64, the closed outline of the black ground, counter-clockwise.
         digest: SHA-256 (hex) of the geometry.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where there are none.
-        fiducial_diameter_mm: their diameter.
+        fiducial_diameter_mm: diameter of these marks.
     """
 
     pattern: str
@@ -63,25 +64,23 @@ class Reference:
     fiducial_diameter_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("layer", "index", "xy_mm", "cell_corners", "cell_color", "edges", "outline_mm"):
+        for name in ARRAY_FIELDS:
             getattr(self, name).setflags(write=False)
-        self.fiducials_mm.setflags(write=False)
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
-        object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
+        self._freeze_mappings("parameters", "palette")
 
     @property
     def mirrored(self) -> bool:
-        """True when the camera is meant to look at the pattern's back."""
+        """Whether the camera is meant to look at the pattern's back."""
         return bool(self.parameters.get("mirrored", False))
 
     @property
     def layers(self) -> int:
-        """The outermost layer's number (in a square pattern: the last row's)."""
+        """The number of the outermost layer (in a square pattern: of the last row)."""
         return int(self.layer[-1])
 
     @cached_property
     def present(self) -> NDArray[np.bool_]:
-        """(M,) True for markers that touch a colored or white cell; no other can be seen on black."""
+        """(M,) bool, the markers that touch a colored or white cell; the others are invisible on black."""
         present = np.zeros(len(self.layer), dtype=np.bool_)
         present[self.cell_corners[self.cell_color != BLACK]] = True
         present.setflags(write=False)

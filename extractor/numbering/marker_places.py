@@ -72,7 +72,7 @@ def merge_corners(
     corners = _cell_corners(*seen, lattice.corner_vectors_mm, lattice.corner_ids, numbering.mirrored, *size)
     xy, around, there, kept, unmatched = _average_corners(corners, len(lattice.marker_mm))
     agreed, whole = corner_agreement(there, lattice.cells_per_marker)
-    unmatched &= lattice.rim
+    unmatched &= lattice.is_rim
     if unmatched.any():
         _update_unmatched_markers(
             xy, around, agreed, unmatched, corners, lattice.marker_mm, lattice.neighbours

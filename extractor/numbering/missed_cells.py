@@ -92,7 +92,11 @@ def _count_visible_places(image, center_px, area_px, cell, numbered, plan, small
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     seen = image_cell_of_layout_cell(cell, plan.ink.shape[0])
     slope = linear_maps(
-        center_px, _places_beside_free(seen, cell, plan.beside), seen, plan.center_mm, plan.beside
+        center_px,
+        _places_beside_free(seen, cell, plan.cell_neighbours),
+        seen,
+        plan.center_mm,
+        plan.cell_neighbours,
     )
     usual, strength = np.empty((0, 3)), np.empty(0)
     count, color = 0, np.zeros(3)
@@ -101,7 +105,7 @@ def _count_visible_places(image, center_px, area_px, cell, numbered, plan, small
             continue
         x, y, size, witnesses = 0.0, 0.0, 0.0, 0
         for k in range(6):
-            u = plan.beside[v, k]
+            u = plan.cell_neighbours[v, k]
             if u < 0 or seen[u] < 0 or np.isnan(slope[seen[u], 0, 0]):
                 continue
             i = seen[u]

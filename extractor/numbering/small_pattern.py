@@ -58,7 +58,11 @@ def _predicted_corners(center_px, cell, plan, mirrored):  # type: ignore[no-unty
     """(N, 3, 2) px, the corners of the numbered cells, clockwise in the image, by the neighbours' centers; (N,) bool,
     which have any."""
     slope = linear_maps(
-        center_px, cell, image_cell_of_layout_cell(cell, plan.ink.shape[0]), plan.center_mm, plan.beside
+        center_px,
+        cell,
+        image_cell_of_layout_cell(cell, plan.ink.shape[0]),
+        plan.center_mm,
+        plan.cell_neighbours,
     )
     corners, good = np.full((cell.shape[0], 3, 2), np.nan), np.zeros(cell.shape[0], np.bool_)
     step = 1 if mirrored else 2  # clockwise a cell's corners run 0, 2, 1, seen from the back 0, 1, 2

@@ -84,7 +84,7 @@ def draw_pattern(view: PyramidLevel, mesh: Topology, fit: Estimate, board: Drawi
     """Everything as the fit says."""
     image, sigma = view.image, fit.sigma
     box = pattern_box(fit.xy, MARGIN_SIGMA * sigma + 2, image.shape[1], image.shape[0])
-    inside = mesh.black, mesh.cell_color, fit.noise
+    inside = mesh.black_cells, mesh.cell_color, fit.noise
     pattern = fit.xy, fit.maps, fit.bend, fit.roughness
     look = packed_appearance(view, fit.levels, sigma, box)
     read, edge_px, bettered = _draw_pattern(image, tuple(board), pattern, packed_topology(mesh), look, inside)

@@ -27,7 +27,7 @@ NO_MODEL = np.empty((0, 0, 3), np.float32)
 
 def initial_appearance(view: PyramidLevel, mesh: Topology, xy: NDArray[np.float64]) -> Appearance:
     """The noise and the levels in the middles of the cells; the blur is not known yet."""
-    usual, tables = DEFAULT_SIGMA_PX / view.scale, (mesh.cells, mesh.black, mesh.cell_color)
+    usual, tables = DEFAULT_SIGMA_PX / view.scale, (mesh.cells, mesh.black_cells, mesh.cell_color)
     noise, *levels = _initial_appearance(view.image, NO_MODEL, xy, *tables, usual, *view.frame)
     return Appearance(view.scale, 0.0, noise, InkLevels(*levels), noise)
 

@@ -107,7 +107,14 @@ def find_outliers(
 
 def _topology_tables(mesh: Topology) -> tuple[NDArray[Any], ...]:
     """What ``outlier_markers`` needs of the mesh."""
-    return mesh.edges, mesh.next_markers, mesh.third_differences, mesh.spokes, mesh.next_edges, mesh.near
+    return (
+        mesh.edges,
+        mesh.next_markers,
+        mesh.third_differences,
+        mesh.spokes,
+        mesh.next_edges,
+        mesh.ring_markers,
+    )
 
 
 @compiled

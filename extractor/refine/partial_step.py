@@ -122,7 +122,7 @@ def partial_step(
         packed_topology(mesh),
         (
             mesh.spokes,
-            mesh.near,
+            mesh.ring_markers,
             mesh.ring_vectors,
             mesh.derivative_stencil,
             mesh.next_markers,

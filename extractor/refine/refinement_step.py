@@ -58,7 +58,7 @@ def extrapolate_pattern(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
     """Markers, those just beyond the known ones put where they must be; which; and the map at each."""
     whole: tuple[Any, Any, Any] = _extrapolate_pattern(
-        xy, mesh.near, mesh.ring_vectors, mesh.derivative_stencil
+        xy, mesh.ring_markers, mesh.ring_vectors, mesh.derivative_stencil
     )
     return whole
 
@@ -93,7 +93,7 @@ def with_pattern_moved(mesh: Topology, fit: Estimate, which: NDArray[np.bool_] |
     if which is None:
         xy, beyond, maps = extrapolate_pattern(mesh, fit.reliable)
     else:
-        about = fit.maps, mesh.near, mesh.ring_vectors, mesh.derivative_stencil
+        about = fit.maps, mesh.ring_markers, mesh.ring_vectors, mesh.derivative_stencil
         xy, beyond, maps = extrapolate_pattern_around(fit.reliable, which, *about)
     return fit._replace(xy=xy, beyond=beyond, maps=maps)
 
@@ -105,7 +105,7 @@ def with_roughness(mesh: Topology, fit: Estimate) -> Estimate:
         mesh.next_markers,
         mesh.third_differences,
         mesh.spokes,
-        mesh.near,
+        mesh.ring_markers,
         np.ones(len(mesh.spokes), np.bool_),
     )
     return fit._replace(roughness=measure_roughness(fit.reliable, fit.maps, fit.information.diagonal, *about))

@@ -77,19 +77,22 @@ class Refiner:
         """
         edge, usual = short_edges(places.xy_px, self._mesh.edges, SHORTEST_RARITY, SHORT_RARITY)
         if before is not None and before.scale == self._reduction_scale(before.scale * before.sigma, usual):
-            view = sights.at(before.scale)
+            view = sights.level(before.scale)
             refined = self._final_steps(view, *self._first_estimate(view, places, places.xy_px, before), edge)
             if refined.seen is not None and refined.seen.near(before):
                 return refined
-        view = sights.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual), 2))
+        view = sights.level(min(self._reduction_scale(SHARP_SIGMA_PX, usual), 2))
         fit, sides, places = self._first_estimate(view, places, places.xy_px)
         scale = self._reduction_scale(view.scale * fit.sigma, usual)
         if scale > view.scale:
-            fit, sides = rescaled(fit, view, sights.at(scale)), rescaled_contrasts(sides, view.scale / scale)
+            fit, sides = (
+                rescaled(fit, view, sights.level(scale)),
+                rescaled_contrasts(sides, view.scale / scale),
+            )
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(fit.measured), np.nan)
-            fit, sides, places = self._first_estimate(sights.at(scale), places, xy)
-        return self._final_steps(sights.at(scale), fit, sides, places, edge, sights)
+            fit, sides, places = self._first_estimate(sights.level(scale), places, xy)
+        return self._final_steps(sights.level(scale), fit, sides, places, edge, sights)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """By how much to reduce an image with this blur and edges."""
@@ -108,7 +111,7 @@ class Refiner:
         """The inks' levels, the blur, and the first round of profiles from ``start`` (M, 2), px in the full image; and
         the places without those that strayed."""
         mesh = self._mesh
-        xy, beyond, maps = extrapolate_pattern(mesh, view.reduced(start))
+        xy, beyond, maps = extrapolate_pattern(mesh, view.to_level(start))
         nothing = Information(np.zeros((len(xy), 3)), np.zeros((len(mesh.edges), 4)))
         smooth, straight = np.zeros(len(xy)), np.zeros((len(mesh.edges), 2))
         stiff = np.zeros(len(mesh.edges))
@@ -147,7 +150,7 @@ class Refiner:
         if fit.dot_gain != 0.0:
             places = replace(places, xy_px=markers_without_dot_gain(places.xy_px, mesh.cells, fit.dot_gain))
         start = with_pattern_moved(mesh, fit)
-        if fit.sigma < steps.sharp_blur_share * edge_px and view.scale < steps.reduced:
+        if fit.sigma < steps.sharp_blur_share * edge_px and view.scale < steps.cheap_reduction:
             start = with_roughness(mesh, start)
             lines = gridlines_of(mesh, start)
             fit, use = profile_step(view, mesh, start, lines, sides, steps.max_profile_rows[1], judged=True)
@@ -160,7 +163,7 @@ class Refiner:
         blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
         usual_px, spent = median_edge(start.xy, mesh.edges) if blurred else edge_px, 0.0
         if sights and coarser and usual_px >= 2 * COARSE_EDGE_PX:
-            start, spent = self._coarse_step(view, start, sights.at(2 * view.scale))
+            start, spent = self._coarse_step(view, start, sights.level(2 * view.scale))
         fit = self._synthesis_solver.steps(view, start, steps, edge_px, usual_px, spent)
         return self._accept_or_recover(view, fit, sides, places)
 
@@ -267,5 +270,5 @@ def _at_full_scale(xy, cov, loose, spokes, start, edge, agreed, scale):  # type:
 def _at_reduced_scale(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
     """Places of the full image in a reduced one."""
     return InitialMarkers(
-        view.reduced(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.whole
+        view.to_level(places.xy_px), places.edge_px / view.scale, places.cells, places.agreed, places.whole
     )

@@ -124,7 +124,7 @@ class SynthesisSolver:
         share = _wide_blur_effort_share(view) if wide else 1.0
         patience = max(steps.patience, WIDE_PATIENCE) if wide else steps.patience
         many = 1.0 if wide else steps.max_partial_share
-        resolved = np.inf if wide or steps.near == 0.0 else SMALL_BLUR
+        resolved = np.inf if wide or steps.converged_blur_share == 0.0 else SMALL_BLUR
         spent += step_effort(size)
         for step in range(MAX_STEPS - 1):
             there = _overlap_corrected(fit, drawing)
@@ -136,7 +136,7 @@ class SynthesisSolver:
             moves = there.measured, drawing.xy, fit.normalized_steps
             explained = fit.noise < MAX_EXPLAINED_NOISE * fit.pixel_noise
             rule = (
-                steps.near,
+                steps.converged_blur_share,
                 drawing.sigma,
                 resolved,
                 steps.converged_deviations,
@@ -204,7 +204,13 @@ class SynthesisSolver:
         sigma = _blur_after_step(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
             bettered = adapt_levels_to_blur(bettered, fit.xy, mesh, drawing.sigma, sigma)
-        about = {"bend_variance": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
+        about = {
+            "bend_variance": loose,
+            "reading": reading,
+            "noise": noise,
+            "sigma": sigma,
+            "levels": bettered,
+        }
         return with_solution(fit, step, median_misfit=usual, dot_gain=swelling, **about)
 
 

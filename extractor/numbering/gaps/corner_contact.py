@@ -68,7 +68,7 @@ def update_corner_neighbours(fresh, center, corner, area, whole, cell, seen_as, 
         if cell[i] < 0 or not whole[i]:
             continue
         for k in range(3):  # the other way from the other cell
-            v = plan.beside[cell[i], k]
+            v = plan.cell_neighbours[cell[i], k]
             if v < 0 or seen_as[v] < 0 or not whole[seen_as[v]]:
                 continue
             j = seen_as[v]
@@ -132,7 +132,7 @@ def fill_map_by_similarity(center, corner, i, arms, u, step, wanted, out):  # ty
 def fill_map_by_neighbours(center, corner, i, u, seen, plan, step, out):  # type: ignore[no-untyped-def]
     """From which corner the triangle of cell i, the layout's u, is counted by the cells ``seen`` (U,) around it; its
     map is written to ``out``."""
-    fill_linear_map(i, center, u, seen, plan.center_mm, plan.beside, out)
+    fill_linear_map(i, center, u, seen, plan.center_mm, plan.cell_neighbours, out)
     return fill_map_by_similarity(center, corner, i, plan.corner_vectors_mm, u, step, out, out)
 
 
@@ -155,7 +155,7 @@ def update_numbers_by_contact(  # type: ignore[no-untyped-def]
     begin, end = 0, 0
     if loose.shape[0] > 0:
         for i in fresh:
-            if _has_free_neighbour(plan.beside, cell[i], free):
+            if _has_free_neighbour(plan.cell_neighbours, cell[i], free):
                 if turn[i] == TURN_NOT_EVALUATED:
                     turn[i] = fill_map_by_neighbours(center, corner, i, cell[i], seen, plan, step, maps[i])
                 if turn[i] >= 0:
@@ -172,7 +172,7 @@ def update_numbers_by_contact(  # type: ignore[no-untyped-def]
         begin += 1
         u = cell[i]
         for k in range(6):
-            v = plan.beside[u, k]
+            v = plan.cell_neighbours[u, k]
             if v < 0 or not free[v]:
                 continue
             x, y = plan.center_mm[v, 0] - plan.center_mm[u, 0], plan.center_mm[v, 1] - plan.center_mm[u, 1]

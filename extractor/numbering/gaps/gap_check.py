@@ -85,7 +85,7 @@ def is_white_cell_contradicted(center, whole, cell, white, white_mm, plan):  # t
     if known.shape[0] < MIN_WHITE_CELL_NEIGHBOURS:
         return False
     seen, xy = image_cell_of_layout_cell(cell, plan.ink.shape[0]), center[known]
-    slope = linear_maps(center, cell, seen, plan.center_mm, plan.beside)
+    slope = linear_maps(center, cell, seen, plan.center_mm, plan.cell_neighbours)
     index, square = np.empty(WHITE_CELL_NEIGHBOURS, np.int32), np.empty(WHITE_CELL_NEIGHBOURS)
     aside, told = np.empty(WHITE_CELL_NEIGHBOURS), 0
     for k in range(fill_nearest_points(xy, bucket_grid(xy), white[0], white[1], index, square)):
