@@ -1,10 +1,13 @@
-"""The extractor: from an image to numbered markers, stage by stage, each timed."""
+"""The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
+
+Stages: image, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, missed (at reduced scales
+only), place, refine, repair, virtual. A warm start of the tracker goes from image over predict and prove to refine.
+"""
 
 from __future__ import annotations
 
 import time
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +39,12 @@ from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
-MAX_MISSED_SHARE = 0.01  # of the pattern's cells that a reduced scale may miss
-MAX_DOMAINS_PER_CELL = 3  # times as many domains as the pattern has cells, and at least
-MIN_DOMAIN_LIMIT = 1000  # so many are not a pattern's alone
+MAX_MISSED_SHARE = 0.01  # of the pattern's cells that recognition at a reduced scale may miss
+MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
+MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
+
+Result = TypeVar("Result")
 
 
 class NumberedCells(NamedTuple):
@@ -49,22 +54,42 @@ class NumberedCells(NamedTuple):
     numbering: Numbering
 
 
-def _recognition_scales(image: NDArray[np.uint8]) -> list[int]:
-    """By how much to reduce an image, one try after the other."""
-    scale = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / WORK_PIXELS)))
-    return [scale >> i for i in range(scale.bit_length())]
+class NumberedMarkers(NamedTuple):
+    """Numbered markers before refinement.
+
+    Attributes:
+        places: the markers as their cells place them.
+        mirrored: the image shows the pattern's back.
+        origin: the evidence that fixed the numbering.
+    """
+
+    places: InitialMarkers
+    mirrored: bool
+    origin: Origin
+
+
+class ReadImage(NamedTuple):
+    """The markers of an image and, for the next image of a sequence, the appearance of this one.
+
+    Attributes:
+        markers: the markers.
+        appearance: blur, noise and levels of the image; None where the pattern was not drawn.
+    """
+
+    markers: Markers
+    appearance: Appearance | None
 
 
 class Stages:
-    """Runs stage after stage, keeping each one's result and time."""
+    """A record of results and times by stage, for debugging and drawing; no stage reads it."""
 
     def __init__(self) -> None:
         self.results: dict[str, Any] = {}
         self.timings_ms: dict[str, float] = {}
         self._last = time.perf_counter()
 
-    def record(self, name: str, result: Any) -> Any:
-        """Book the time since the stage before under ``name`` and hand the result on."""
+    def record(self, name: str, result: Result) -> Result:
+        """Add the time since the last stage to stage ``name``, keep the stage's result, and return this result."""
         now = time.perf_counter()
         self.timings_ms[name] = self.timings_ms.get(name, 0.0) + 1e3 * (now - self._last)
         self.results[name] = result
@@ -73,13 +98,18 @@ class Stages:
 
 
 class Extractor:
-    """Finds and numbers the markers of one layout in images.
+    """Finds and numbers the markers of one layout in images. Can be pickled and copied.
 
     >>> from extractor import Extractor, load_layout
     >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
 
+    Args:
+        layout: a triangular pattern.
+        preset: "fast", "balanced" or "accurate".
+
     Raises:
         LayoutError: the layout is not a triangular pattern.
+        ValueError: no such preset.
     """
 
     def __init__(self, layout: Reference, preset: Preset = "balanced") -> None:
@@ -90,68 +120,121 @@ class Extractor:
         self.layout = layout
         if preset not in PRESETS:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
+        self._preset = preset
         self._lattice = lattice_of(layout)
-        self._mesh = topology_of(layout)
+        self._topology = topology_of(layout)
         self._domain_limit = max(MAX_DOMAINS_PER_CELL * len(self._lattice.ink), MIN_DOMAIN_LIMIT)
-        self._refiner = Refiner(self._mesh, preset, layout.virtual_per_edge)
+        self._refiner = Refiner(self._topology, preset, layout.virtual_per_edge)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is built anew from layout and preset; buffers are not copied."""
+        return type(self), (self.layout, self._preset)
 
     def extract(self, image: NDArray[Any]) -> Markers:
         """The markers in one image, found without any knowledge of other frames.
 
         Args:
-            image: (H, W, 3) uint8 BGR; also uint16 (scaled to 8 bits), BGRA (alpha dropped) and grayscale (which has
-                no color to read: nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
+            image: (H, W, 3) uint8 BGR; also uint16 (scaled to 8 bits), BGRA (alpha dropped) and grayscale (without
+                color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
 
         Raises:
             ImageError: another dtype or shape, or a side below 16 px.
         """
+        return self.read(image).markers
+
+    def read(self, image: NDArray[Any]) -> ReadImage:
+        """``extract``, with the appearance that a tracker needs for the next image."""
         stages = Stages()
         bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
-            return self._no_markers(Reason.NO_COLOR, stages)
-        reason, sights = Reason.NO_COLOR, Pyramid(bgr)
-        for scale in _recognition_scales(bgr):
-            found = self._recognise(sights, scale, stages)
-            if isinstance(found, NumberedCells) and (
-                scale == 1 or self._is_complete(bgr, found, scale, stages)
-            ):
-                return self._measure_markers(sights, found, stages)
-            reason = found if isinstance(found, Reason) else reason
-        return self._no_markers(reason, stages)
+            return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
+        pyramid = Pyramid(bgr)
+        found = self._number_cells(pyramid, stages)
+        if isinstance(found, Reason):
+            return ReadImage(no_markers(self.layout, found, stages), None)
+        cells, numbering = found.cells, found.numbering
+        places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
+        return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
-    def _recognise(self, sights: Pyramid, scale: int, stages: Stages) -> NumberedCells | Reason:
-        """Stages 1 to 7 at 1/``scale`` of the image's scale, or why they do not number anything."""
-        seeds = self._find(sights, scale, stages)
-        if seeds is None:
+    def finish(
+        self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None
+    ) -> ReadImage:
+        """Refinement, repair and virtual markers, the same for cold and warm starts.
+
+        Args:
+            pyramid: the image.
+            numbered: the markers before refinement.
+            stages: the record of the stages so far.
+            before: appearance of the image before, in a sequence.
+        """
+        places, size = numbered.places, pyramid.size
+        refined = stages.record("refine", self._refiner(pyramid, places, before))
+        repaired = stages.record("repair", repair_markers(refined, places, self._lattice, size))
+        virtual = stages.record("virtual", locate_virtual_markers(self._topology, repaired, refined.points))
+        markers = Markers(
+            xy_px=repaired.xy_px,
+            cov_px2=repaired.cov_px2,
+            status=repaired.status,
+            virtual_xy_px=virtual.xy_px,
+            virtual_cov_px2=virtual.cov_px2,
+            virtual_status=virtual.status,
+            mirrored=numbered.mirrored,
+            origin=numbered.origin,
+            reason=None,
+            timings_ms=stages.timings_ms,
+            stages=stages.results,
+        )
+        return ReadImage(markers, refined.seen)
+
+    def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Reason:
+        """Stages 1 to 7 at the first scale that suffices, from coarse to fine; else the reason at the finest scale."""
+        reason = Reason.NO_COLOR
+        for scale in _recognition_scales(pyramid.size):
+            found = self._number_cells_at(pyramid, scale, stages)
+            if isinstance(found, Reason):
+                reason = found
+            elif scale == 1 or self._is_complete(pyramid, found, scale, stages):
+                return found
+        return reason
+
+    def _number_cells_at(self, pyramid: Pyramid, scale: int, stages: Stages) -> NumberedCells | Reason:
+        """Stages 1 to 7 at 1/``scale`` of the full scale, or the reason why no cells are numbered."""
+        colors = stages.record("color", to_colors(pyramid.level(scale).image))
+        target = stages.record("target", find_target(colors))
+        segmentation = stages.record("segment", segment(colors, target, self._nominal_hues_deg))
+        if segmentation is None:
             return Reason.NO_COLOR
+        # at a reduced scale all domains are kept, because a finer scale may resolve clutter
+        limit = self._domain_limit if scale == 1 else NO_DOMAIN_LIMIT
+        seeds = stages.record("seeds", find_seeds(segmentation, limit))
         if scale > 1 and not has_large_domains(seeds):
-            return self._number_by_centers(sights, seeds, scale, stages) or Reason.NO_COLOR
-        regions = stages.record("grow", grow(stages.results["segment"], seeds))
-        triangles = stages.record("triangles", fit_triangles(sights.at(1).image, regions, scale))
+            return self._number_by_centers(pyramid, seeds, scale, stages) or Reason.NO_COLOR
+        regions = stages.record("grow", grow(segmentation, seeds))
+        triangles = stages.record("triangles", fit_triangles(pyramid.level(1).image, regions, scale))
         cells = stages.record("cells", find_cells(seeds, triangles, scale))
-        return self._number_cells(sights, cells, stages)
+        return self._number_found_cells(pyramid, cells, stages)
 
     def _number_by_centers(
-        self, sights: Pyramid, seeds: Seeds, scale: int, stages: Stages
+        self, pyramid: Pyramid, seeds: Seeds, scale: int, stages: Stages
     ) -> NumberedCells | None:
-        """The whole pattern by the centers of its cells, where these are too small at this scale for more."""
+        """The whole pattern numbered by the centers of its cells, where these are too small at this scale to grow."""
         if not is_small_pattern_possible(seeds, len(self._lattice.ink)):
             return None
-        rough = stages.record("triangles", triangles_from_moments(seeds, scale))
-        cells = stages.record("cells", find_cells(seeds, rough, scale))
-        found = self._number_cells(sights, cells, stages)
-        if not isinstance(found, NumberedCells):
+        coarse = stages.record("triangles", triangles_from_moments(seeds, scale))
+        cells = stages.record("cells", find_cells(seeds, coarse, scale))
+        found = self._number_found_cells(pyramid, cells, stages)
+        if isinstance(found, Reason):
             return None
-        triangles = fit_predicted_triangles(sights.at(1).image, cells, found.numbering, self._lattice)
+        triangles = fit_predicted_triangles(pyramid.level(1).image, cells, found.numbering, self._lattice)
         if triangles is None:
             return None
         stages.record("triangles", triangles)
         return NumberedCells(stages.record("cells", cells_with_triangles(cells, triangles)), found.numbering)
 
-    def _number_cells(self, sights: Pyramid, cells: Cells, stages: Stages) -> NumberedCells | Reason:
-        """Stages 6 and 7."""
-        bgr = sights.at(1).image
+    def _number_found_cells(self, pyramid: Pyramid, cells: Cells, stages: Stages) -> NumberedCells | Reason:
+        """Stages 6 and 7: the cells' mesh and numbers, or the reason why there are none."""
+        bgr = pyramid.level(1).image
         mesh = stages.record("mesh", build_cell_mesh(cells))
         if mesh is None or int((mesh.orientation != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
             return Reason.NO_PATTERN
@@ -162,68 +245,31 @@ class Extractor:
             numbering = stages.record("attach", number_detached_cells(cells, numbering, self._lattice))
         return Reason.AMBIGUOUS if numbering.ambiguous else NumberedCells(cells, numbering)
 
-    def _is_complete(self, bgr: NDArray[np.uint8], found: NumberedCells, scale: int, stages: Stages) -> bool:
-        """Whether a finer scale would number no more cells than have been numbered."""
-        count = stages.record(
-            "missed", count_missed_cells(bgr, found.cells, found.numbering, self._lattice, scale)
-        )
-        return int(count) <= MAX_MISSED_SHARE * len(self._lattice.ink)
+    def _is_complete(self, pyramid: Pyramid, found: NumberedCells, scale: int, stages: Stages) -> bool:
+        """Whether a finer scale would number hardly more cells than have been numbered."""
+        cells, numbering = found.cells, found.numbering
+        missed = count_missed_cells(pyramid.level(1).image, cells, numbering, self._lattice, scale)
+        return int(stages.record("missed", missed)) <= MAX_MISSED_SHARE * len(self._lattice.ink)
 
-    def _find(self, sights: Pyramid, scale: int, stages: Stages) -> Seeds | None:
-        """Stages 1 to 3; None where an ink is absent."""
-        colors = stages.record("color", to_colors(sights.at(scale).image))
-        target = stages.record("target", find_target(colors))
-        segmentation = stages.record("segment", segment(colors, target, self._nominal_hues_deg))
-        if segmentation is None:
-            return None
-        # at a reduced scale, a crowd is what another scale may tell
-        crowd = self._domain_limit if scale == 1 else NO_DOMAIN_LIMIT
-        return stages.record("seeds", find_seeds(segmentation, crowd))  # type: ignore[no-any-return]
 
-    def _measure_markers(self, sights: Pyramid, found: NumberedCells, stages: Stages) -> Markers:
-        """The places of what has been numbered, and what follows from them."""
-        cells, numbering = found
-        places = stages.record("place", merge_corners(cells, numbering, self._lattice, sights.size))
-        return self.finish(sights, places, numbering.mirrored, numbering.origin, stages)
+def _recognition_scales(size: tuple[int, int]) -> list[int]:
+    """The scales at which recognition is tried, from coarse to fine, for an image of this width and height, px."""
+    scale = max(1, int(np.sqrt(size[0] * size[1] / WORK_PIXELS)))
+    return [scale >> i for i in range(scale.bit_length())]
 
-    def finish(
-        self,
-        sights: Pyramid,
-        places: InitialMarkers,
-        mirrored: bool,
-        origin: Origin,
-        stages: Stages,
-        before: Appearance | None = None,
-    ) -> Markers:
-        """Refinement, repair and virtual markers: the same for every way to a numbering."""
-        refined = stages.record("refine", self._refiner(sights, places, before))
-        repaired = stages.record("repair", repair_markers(refined, places, self._lattice, sights.size))
-        virtual = stages.record("virtual", locate_virtual_markers(self._mesh, repaired, refined.points))
-        return Markers(
-            xy_px=repaired.xy_px,
-            cov_px2=repaired.cov_px2,
-            status=repaired.status,
-            virtual_xy_px=virtual.xy_px,
-            virtual_cov_px2=virtual.cov_px2,
-            virtual_status=virtual.status,
-            mirrored=mirrored,
-            origin=origin,
-            reason=None,
-            timings_ms=MappingProxyType(stages.timings_ms),
-            stages=MappingProxyType(stages.results),
-        )
 
-    def _no_markers(self, reason: Reason, stages: Stages) -> Markers:
-        markers, edges, count = len(self.layout.layer), len(self.layout.edges), self.layout.virtual_per_edge
-        return Markers(
-            xy_px=np.full((markers, 2), np.nan),
-            cov_px2=np.full((markers, 2, 2), np.nan),
-            status=np.zeros(markers, np.uint8),
-            virtual_xy_px=np.full((edges, count, 2), np.nan),
-            virtual_cov_px2=np.full((edges, count, 2, 2), np.nan),
-            virtual_status=np.zeros((edges, count), np.uint8),
-            mirrored=None,
-            reason=reason,
-            timings_ms=MappingProxyType(stages.timings_ms),
-            stages=MappingProxyType(stages.results),
-        )
+def no_markers(layout: Reference, reason: Reason, stages: Stages) -> Markers:
+    """The result for an image in which no marker was found."""
+    markers, edges, count = len(layout.layer), len(layout.edges), layout.virtual_per_edge
+    return Markers(
+        xy_px=np.full((markers, 2), np.nan),
+        cov_px2=np.full((markers, 2, 2), np.nan),
+        status=np.zeros(markers, np.uint8),
+        virtual_xy_px=np.full((edges, count, 2), np.nan),
+        virtual_cov_px2=np.full((edges, count, 2, 2), np.nan),
+        virtual_status=np.zeros((edges, count), np.uint8),
+        mirrored=None,
+        reason=reason,
+        timings_ms=stages.timings_ms,
+        stages=stages.results,
+    )

@@ -36,10 +36,10 @@ class Schedule(NamedTuple):
     max_profile_rows: tuple[int, int]
     reduction_blur_px: float
     sharp_blur_share: float
-    reduced: float
+    cheap_reduction: float
     max_synthesis_effort: float
     converged_deviations: float
-    near: float
+    converged_blur_share: float
     max_moving_share: float
     patience: int
     max_partial_share: float

@@ -1,7 +1,10 @@
-"""Stage 8, its first half: markers that contradict their neighbours are dropped.
+"""Stage 8, first half: markers that contradict their neighbours are dropped.
 
-Three rules: a marker must lie where its two rings put it; one of the outermost layer where the layers inside do; and
-one of the rim that refinement took far from its triangles must have come nearer to where its neighbours are for it.
+Three rules:
+
+- A marker must lie where the map of its two rings puts it.
+- A marker of the outermost layer must lie where the layers inside put it.
+- A marker of the rim that refinement moved far from its triangles must have come nearer to where its neighbours put it.
 """
 
 from __future__ import annotations
@@ -19,23 +22,22 @@ from extractor.numeric.bilinear import clamp
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.estimate import RefinedMarkers
 
-MAX_ROUNDS = 40  # at most; each drops the worst of every neighbourhood, until none is left
-MAX_DISTANCE = 0.15  # of a marker from where its neighbours put it, in edges
-MAX_TOLERANCE = 0.18  # in edges, where the surface is so bent that
-TOLERANCE_SIGMAS = 6.0  # standard deviations of the prediction are more than that
-OUTER_TOLERANCE = 0.12, 0.3  # in edges, of a marker of the outermost layer from where the others put it, and
-OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations in between;
-MAX_OUTER_DISTANCE = 0.35  # of the shortest edge there, in any case
-MAX_REFINEMENT_SHIFT = 0.12  # in edges, of such a marker by refinement, where
-MAX_GRIDLINE_BEND = 0.02  # its gridlines may bend by more than that, and
-MAX_UNCERTAIN_SHIFT = 0.065  # where
-UNCERTAIN_DEVIATION = 0.018  # its own deviation is larger than that
-MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # in edges, where two triangles agree and the drawing explains nothing
-MAX_AGREED_DISTANCE = 0.3  # in edges, where all triangles agree: only sharp bends explain that
-MAX_PREDICTED_DEVIATION = (
-    0.12  # in edges, deviation of what neighbours say of a marker that only two triangles vouch for
-)
-MAX_UNEXPLAINED_DISTANCE = 0.06  # in edges, of a marker on which something lies
+MAX_ROUNDS = 40  # of rejection; each round drops the worst marker of every neighbourhood
+# Distances between a marker and its prediction, and deviations, are in units of the edge.
+MAX_DISTANCE = 0.15  # from the prediction by two rings
+MAX_TOLERANCE = 0.18  # replaces MAX_DISTANCE at most, where the surface is so bent that
+TOLERANCE_SIGMAS = 6.0  # standard deviations of the prediction exceed MAX_DISTANCE
+OUTER_TOLERANCE = 0.12, 0.3  # smallest and largest distance for the outermost layer; in between
+OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations of the prediction
+MAX_OUTER_DISTANCE = 0.35  # of the shortest edge at the marker, for the outermost layer
+MAX_REFINEMENT_SHIFT = 0.12  # by refinement at the rim, where
+MAX_GRIDLINE_BEND = 0.02  # gridlines may bend by more than this
+MAX_UNCERTAIN_SHIFT = 0.065  # by refinement at the rim, where
+UNCERTAIN_DEVIATION = 0.018  # the marker's own deviation is larger than this
+MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesis explains nothing
+MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
+MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
+MAX_UNEXPLAINED_DISTANCE = 0.06  # of a marker that is obstructed
 MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 
 
@@ -43,9 +45,9 @@ class ConsistentMarkers(NamedTuple):
     """Markers that do not contradict each other.
 
     Attributes:
-        xy_px, cov_px2: (M, 2) and (M, 2, 2), NaN where lost or dropped.
-        edge_px: (M,) the edges at each marker.
-        sound: every marker of the pattern is known, and none was dropped.
+        xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost or dropped.
+        edge_px: (M,) float64, the mean edge at each marker.
+        is_complete: every marker of the pattern is known, and none was dropped.
     """
 
     xy_px: NDArray[np.float64]
@@ -54,86 +56,91 @@ class ConsistentMarkers(NamedTuple):
     is_complete: bool
 
 
+class MarkerEvidence(NamedTuple):
+    """Results of earlier stages by which markers are judged, for each of M markers.
+
+    Attributes:
+        explained: (M,) bool, synthesis explains the image around the marker.
+        bend_deviation_px: (M,) float64, deviation by which the marker's gridlines may bend.
+        initial_px: (M, 2) float64, the place before refinement.
+        edge_px: (M,) float64, the mean edge at the marker.
+        agreed: (M,) bool, all triangles of the marker, or at least two, were found and agree.
+        is_intact: (M,) bool, all triangles of the marker, and at least two, were found and agree.
+    """
+
+    explained: NDArray[np.bool_]
+    bend_deviation_px: NDArray[np.float64]
+    initial_px: NDArray[np.float64]
+    edge_px: NDArray[np.float64]
+    agreed: NDArray[np.bool_]
+    is_intact: NDArray[np.bool_]
+
+
 def reject_inconsistent_markers(
     refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
 ) -> ConsistentMarkers:
     """The markers without those that contradict their neighbours.
 
     Args:
-        refined: the markers as measured.
+        refined: the markers after refinement.
         places: the markers before refinement.
         size: width and height of the image, px.
     """
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
-    seen = (
-        refined.explained,
-        refined.bend_deviation_px,
-        places.xy_px,
-        places.edge_px,
-        places.agreed,
-        places.whole,
+    evidence = MarkerEvidence(
+        explained=refined.explained,
+        bend_deviation_px=refined.bend_deviation_px,
+        initial_px=places.xy_px,
+        edge_px=places.edge_px,
+        agreed=places.agreed,
+        is_intact=places.whole,
     )
-    rings = (
-        lattice.ring_weights,
-        lattice.neighbours,
-        lattice.inward_weights,
-        lattice.inward_neighbours,
-        lattice.first_ring,
-    )
-    edge_px, sound = _update_rejecting_inconsistent(
-        xy, cov, seen, rings, lattice.marker_mm, lattice.present, lattice.is_rim, size
-    )
-    return ConsistentMarkers(xy, cov, edge_px, sound)
+    edge_px, is_complete = _update_rejecting_inconsistent(xy, cov, evidence, lattice.ring_tables, size)
+    return ConsistentMarkers(xy, cov, edge_px, is_complete)
 
 
 @compiled
-def _update_rejecting_inconsistent(xy, cov, seen, rings, marker_mm, present, rim, size):  # type: ignore[no-untyped-def]
-    """Set to NaN what contradicts its neighbours; (M,) the edges at each marker, and whether all are sound."""
-    explained, free, start, edge, agreed, whole = seen
-    weights, table, inner_weights, inner, ring = rings
-    edge, near = edge.copy(), np.zeros(xy.shape[0])
+def _update_rejecting_inconsistent(xy, cov, evidence, tables, size):  # type: ignore[no-untyped-def]
+    """Set inconsistent markers to NaN; (M,) the edge at each marker, and whether all markers are consistent."""
+    explained, agreed, first_ring = evidence.explained, evidence.agreed, tables.first_ring
+    edge_px, tolerance_px = evidence.edge_px.copy(), np.zeros(xy.shape[0])
     for m in range(xy.shape[0]):
         if not agreed[m]:
-            edge[m] = _shortest_edge(xy, m, ring, edge[m])
-        near[m] = edge[m] * (MAX_DISTANCE if explained[m] else MAX_AGREED_UNEXPLAINED_DISTANCE * agreed[m])
-    slide = cov, free, start, edge, rim
-    if _is_consistent(xy, near, slide, (weights, table), (inner_weights, inner), present, size):
-        return edge, True
-    _update_rejecting_outliers(xy, cov, edge, near, (explained, whole, agreed), weights, table, marker_mm)
-    _update_rejecting_outer_outliers(xy, cov, edge, inner_weights, inner, ring, marker_mm)
-    _update_shifted_markers(
-        xy,
-        cov,
-        _shifted_rim_markers(xy, cov, free, start, edge, rim),
-        start,
-        edge,
-        agreed,
-        table,
-        inner,
-        marker_mm,
+            edge_px[m] = _shortest_edge(xy, m, first_ring, edge_px[m])
+        tolerance = MAX_DISTANCE if explained[m] else MAX_AGREED_UNEXPLAINED_DISTANCE * agreed[m]
+        tolerance_px[m] = edge_px[m] * tolerance
+    judged = MarkerEvidence(
+        explained, evidence.bend_deviation_px, evidence.initial_px, edge_px, agreed, evidence.is_intact
     )
-    return edge, False
+    if _is_consistent(xy, cov, tolerance_px, judged, tables, size):
+        return edge_px, True
+    _update_rejecting_outliers(xy, cov, tolerance_px, judged, tables)
+    _update_rejecting_outer_outliers(xy, cov, edge_px, tables)
+    _update_shifted_markers(xy, cov, _shifted_rim_markers(xy, cov, judged, tables.is_rim), judged, tables)
+    return edge_px, False
 
 
 @inlined_no_refcount
-def _shortest_edge(xy, m, ring, edge):  # type: ignore[no-untyped-def]
-    """The edge at marker m, or the way to the nearest of its known neighbours, if that is shorter: a share of a longer
-    edge may reach half-way to another marker."""
-    for k in range(ring.shape[1]):
-        n = ring[m, k]
+def _shortest_edge(xy, m, first_ring, edge_px):  # type: ignore[no-untyped-def]
+    """The smaller of the edge at marker m and the distance to its nearest known neighbour, px.
+
+    A tolerance in units of a longer edge might reach half-way to another marker.
+    """
+    for k in range(first_ring.shape[1]):
+        n = first_ring[m, k]
         if n >= 0:
-            apart = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
-            if apart < edge:
-                edge = apart
-    return edge
+            distance = np.hypot(xy[n, 0] - xy[m, 0], xy[n, 1] - xy[m, 1])
+            if distance < edge_px:
+                edge_px = distance
+    return edge_px
 
 
 @compiled
-def _is_consistent(xy, near, slide, rings, inner_rings, present, size):  # type: ignore[no-untyped-def]
-    """Whether every marker of the pattern is known and none of the rules below could drop it: as a rule, all are."""
-    cov, free, start, edge, rim = slide
-    weights, table = rings
-    inner_weights, inner = inner_rings
+def _is_consistent(xy, cov, tolerance_px, evidence, tables, size):  # type: ignore[no-untyped-def]
+    """Whether every marker of the pattern is known and no rule could drop one, which is the usual case."""
+    edge_px, present, is_rim = evidence.edge_px, tables.present, tables.is_rim
+    weights, neighbours = tables.ring_weights, tables.neighbours
+    inward_weights, inward_neighbours = tables.inward_weights, tables.inward_neighbours
     for m in range(xy.shape[0]):
         x, y = xy[m, 0], xy[m, 1]
         if np.isnan(x):
@@ -142,162 +149,173 @@ def _is_consistent(xy, near, slide, rings, inner_rings, present, size):  # type:
             continue
         if not is_inside_image(x, y, size):
             return False
-        if is_neighbour_outlier(xy, m, near[m], weights, table):
+        if is_neighbour_outlier(xy, m, tolerance_px[m], weights, neighbours):
             return False
-        if inner[m, 0] >= 0 and is_neighbour_outlier(
-            xy, m, OUTER_TOLERANCE[0] * edge[m], inner_weights, inner
+        if inward_neighbours[m, 0] >= 0 and is_neighbour_outlier(
+            xy, m, OUTER_TOLERANCE[0] * edge_px[m], inward_weights, inward_neighbours
         ):
             return False
-        if rim[m] and _is_shifted(xy, m, cov, free, start, edge):
+        if is_rim[m] and _is_shifted(xy, cov, m, evidence):
             return False
     return True
 
 
 @compiled
 def is_inside_image(x, y, size):  # type: ignore[no-untyped-def]
-    """Whether a place is within the image, out to the edges of its pixels; NaN is not."""
+    """Whether a place lies within the image, up to the outer edges of its pixels; False for NaN."""
     return x >= -0.5 and y >= -0.5 and x <= size[0] - 0.5 and y <= size[1] - 0.5
 
 
 @compiled
-def _update_rejecting_outliers(xy, cov, edge, near, kinds, weights, table, marker_mm):  # type: ignore[no-untyped-def]
-    """Set to NaN, the worst of each neighbourhood first, what lies where its neighbours say it cannot."""
-    excess, doubtful = np.zeros(edge.shape[0]), np.zeros(edge.shape[0], np.bool_)
-    stale = np.arange(edge.shape[0])
+def _update_rejecting_outliers(xy, cov, tolerance_px, evidence, tables):  # type: ignore[no-untyped-def]
+    """Set to NaN the markers that do not lie where their neighbours put them, the worst of each neighbourhood first."""
+    neighbours, count = tables.neighbours, xy.shape[0]
+    misfit, doubtful = np.zeros(count), np.zeros(count, np.bool_)
+    pending = np.arange(count)
     for _ in range(MAX_ROUNDS):
-        # only what may be too far is looked at closely, and again where a neighbour has been dropped
+        # only markers beyond the tolerance are predicted, again where a neighbour has been dropped
         doubtful[:] = False
-        for m in stale:
-            excess[m] = 0.0
-            doubtful[m] = not np.isnan(xy[m, 0]) and is_neighbour_outlier(xy, m, near[m], weights, table)
-        place, variance, leverage, support = predict_markers(xy, doubtful, marker_mm, table)
+        for m in pending:
+            misfit[m] = 0.0
+            doubtful[m] = not np.isnan(xy[m, 0]) and is_neighbour_outlier(
+                xy, m, tolerance_px[m], tables.ring_weights, neighbours
+            )
+        predicted, variance, leverage, support = predict_markers(xy, doubtful, tables.marker_mm, neighbours)
         for m in np.flatnonzero(doubtful):
-            apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
+            distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
             sigma = np.sqrt(variance[m] * (1 + leverage[m]))
-            excess[m] = _misfit_ratio(m, apart, sigma, support[m], edge[m], kinds)
-        worst = np.zeros(edge.shape[0], np.bool_)
-        for m in np.flatnonzero(excess > 1.0):
+            misfit[m] = _misfit_ratio(m, distance, sigma, support[m], evidence)
+        worst = np.zeros(count, np.bool_)
+        for m in np.flatnonzero(misfit > 1.0):
             worst[m] = True
-            for n in table[m]:
-                worst[m] = worst[m] and (n < 0 or excess[m] >= excess[n])
+            for n in neighbours[m]:
+                worst[m] = worst[m] and (n < 0 or misfit[m] >= misfit[n])
         if not worst.any():
             break
-        again = worst.copy()
+        affected = worst.copy()
         for m in np.flatnonzero(worst):
             xy[m], cov[m] = np.nan, np.nan
-            for n in table[m]:
+            for n in neighbours[m]:
                 if n >= 0:
-                    again[n] = True
-        stale = np.flatnonzero(again)
+                    affected[n] = True
+        pending = np.flatnonzero(affected)
 
 
 @compiled
-def _misfit_ratio(m, apart, sigma, support, edge, kinds):  # type: ignore[no-untyped-def]
-    """How far a marker lies from where its neighbours put it, over what is allowed; infinite where nobody vouches for
-    it: neither triangles nor neighbours, or these do not know themselves.
+def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-untyped-def]
+    """The distance of a marker from its prediction over the allowed distance.
 
-    What the drawing does not explain must lie nearer, and have neighbours that say so; what triangles do not agree on
-    must have some. What all triangles agree on may lie farther off.
+    It is infinite where neither triangles nor neighbours confirm the marker, or the prediction is too uncertain. The
+    allowed distance is smaller where synthesis does not explain the image; the neighbours must then be known. It is
+    larger where all triangles agree.
+
+    Args:
+        distance: from the prediction, px.
+        sigma: standard deviation of the prediction, px.
+        support: number of known neighbours.
     """
-    explained, whole, agreed = kinds
-    believed, allowed = explained[m] or agreed[m], MAX_DISTANCE
-    if whole[m]:
+    edge_px, explained, agreed = evidence.edge_px[m], evidence.explained[m], evidence.agreed[m]
+    is_intact = evidence.is_intact[m]
+    confirmed, allowed = explained or agreed, MAX_DISTANCE
+    if is_intact:
         allowed = MAX_AGREED_DISTANCE
-    elif not believed:
+    elif not confirmed:
         allowed = MAX_UNEXPLAINED_DISTANCE
-    elif not explained[m]:
+    elif not explained:
         allowed = MAX_AGREED_UNEXPLAINED_DISTANCE
     elif support >= MILD_SUPPORT:
-        allowed = clamp(TOLERANCE_SIGMAS * sigma / edge, MAX_DISTANCE, MAX_TOLERANCE)
-    vague = MAX_PREDICTED_DEVIATION if believed else MAX_UNEXPLAINED_DISTANCE
-    if not (explained[m] or whole[m] or sigma < vague * edge):
+        allowed = clamp(TOLERANCE_SIGMAS * sigma / edge_px, MAX_DISTANCE, MAX_TOLERANCE)
+    max_deviation = MAX_PREDICTED_DEVIATION if confirmed else MAX_UNEXPLAINED_DISTANCE
+    if not (explained or is_intact or sigma < max_deviation * edge_px):
         return np.inf
-    excess = apart / (edge * allowed)
-    if np.isfinite(excess):
-        return excess
-    return 0.0 if agreed[m] else np.inf
+    ratio = distance / (edge_px * allowed)
+    if np.isfinite(ratio):
+        return ratio
+    return 0.0 if agreed else np.inf
 
 
 @compiled
-def _update_rejecting_outer_outliers(xy, cov, edge, weights, table, ring, marker_mm):  # type: ignore[no-untyped-def]
+def _update_rejecting_outer_outliers(xy, cov, edge_px, tables):  # type: ignore[no-untyped-def]
     """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
 
-    An acute corner there belongs to few cells, and ink that ran out moves it and its neighbours alike.
+    An acute corner there belongs to few cells, and ink that ran out moves the marker together with its neighbours.
     """
-    frayed = np.zeros(edge.shape[0], np.bool_)
-    for m in np.flatnonzero((table[:, 0] >= 0) & ~np.isnan(xy[:, 0])):
-        # only what may be too far is looked at closely
-        frayed[m] = is_neighbour_outlier(xy, m, OUTER_TOLERANCE[0] * edge[m], weights, table)
-    if not frayed.any():
+    neighbours, weights = tables.inward_neighbours, tables.inward_weights
+    rejected = np.zeros(edge_px.shape[0], np.bool_)
+    for m in np.flatnonzero((neighbours[:, 0] >= 0) & ~np.isnan(xy[:, 0])):
+        # only markers beyond the smallest tolerance are predicted
+        rejected[m] = is_neighbour_outlier(xy, m, OUTER_TOLERANCE[0] * edge_px[m], weights, neighbours)
+    if not rejected.any():
         return
-    place, variance, _, support = predict_markers(xy, frayed, marker_mm, table)
-    for m in np.flatnonzero(frayed):
-        # the worse a quadratic fits the layers inside, the less it tells beyond them
-        allowed = (
-            clamp(
-                OUTER_TOLERANCE_SIGMAS * np.sqrt(variance[m]) / edge[m],
-                OUTER_TOLERANCE[0],
-                OUTER_TOLERANCE[1],
-            )
-            * edge[m]
-        )
-        limit = min(allowed, MAX_OUTER_DISTANCE * _shortest_edge(xy, m, ring, edge[m]))
-        apart = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
-        frayed[m] = apart > limit and support[m] >= MIN_QUADRATIC_NEIGHBOURS
-    xy[frayed], cov[frayed] = np.nan, np.nan
+    predicted, variance, _, support = predict_markers(xy, rejected, tables.marker_mm, neighbours)
+    for m in np.flatnonzero(rejected):
+        # a quadratic that fits the layers inside badly predicts the outermost layer badly
+        sigmas = OUTER_TOLERANCE_SIGMAS * np.sqrt(variance[m]) / edge_px[m]
+        allowed = clamp(sigmas, OUTER_TOLERANCE[0], OUTER_TOLERANCE[1]) * edge_px[m]
+        limit = min(allowed, MAX_OUTER_DISTANCE * _shortest_edge(xy, m, tables.first_ring, edge_px[m]))
+        distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
+        rejected[m] = distance > limit and support[m] >= MIN_QUADRATIC_NEIGHBOURS
+    xy[rejected], cov[rejected] = np.nan, np.nan
 
 
 @compiled
-def _update_shifted_markers(xy, cov, slid, start, edge, agreed, table, inner, marker_mm):  # type: ignore[no-untyped-def]
-    """The markers of the pattern's rim that refinement took far from their triangles and is not sure of (``slid``) stay
-    only where it took them nearer to where the neighbours put them; else they return to their triangles, or are NaN
-    where the neighbours say something else. Where no triangles agree, there was only a guess to be far from: such a
-    marker stays near to where the neighbours put it, with that much doubt.
+def _update_shifted_markers(xy, cov, shifted, evidence, tables):  # type: ignore[no-untyped-def]
+    """Keep, restore or drop the uncertain rim markers that refinement moved far from their triangles.
 
-    Where two gridlines end that may bend, the corner between them slides along both.
+    Where two gridlines end that may bend, the corner between them may slide along both. A shifted marker (``shifted``
+    (M,) bool) stays where refinement took it nearer to where the neighbours put it. Otherwise it returns to its
+    triangles, or becomes NaN where the neighbours contradict these. Where triangles do not agree, the initial place
+    was a guess: the marker then stays near to where the neighbours put it, with half the distance added as deviation.
     """
-    if not slid.any():
+    if not shifted.any():
         return
-    place, _, _, support = predict_markers(xy, slid, marker_mm, table)
-    # at the corners of the rim two rings hold fewer than a quadratic takes, but the layers inside do not
-    few = slid & (support < MIN_QUADRATIC_NEIGHBOURS)
+    marker_mm, start, edge_px, agreed = (
+        tables.marker_mm,
+        evidence.initial_px,
+        evidence.edge_px,
+        evidence.agreed,
+    )
+    predicted, _, _, support = predict_markers(xy, shifted, marker_mm, tables.neighbours)
+    # at the corners of the rim two rings hold too few markers for a quadratic; the layers inside hold enough
+    few = shifted & (support < MIN_QUADRATIC_NEIGHBOURS)
     if few.any():
-        inside, _, _, enough = predict_markers(xy, few, marker_mm, inner)
+        inward, _, _, inward_support = predict_markers(xy, few, marker_mm, tables.inward_neighbours)
         for m in np.flatnonzero(few):
-            place[m], support[m] = inside[m], enough[m]
-    for m in np.flatnonzero(slid):
-        after = np.hypot(xy[m, 0] - place[m, 0], xy[m, 1] - place[m, 1])
-        before = np.hypot(start[m, 0] - place[m, 0], start[m, 1] - place[m, 1])
-        near, known = MAX_DISTANCE * edge[m], support[m] >= MIN_QUADRATIC_NEIGHBOURS
-        if known and after < near and (after < before or not agreed[m]):
+            predicted[m], support[m] = inward[m], inward_support[m]
+    for m in np.flatnonzero(shifted):
+        after = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
+        before = np.hypot(start[m, 0] - predicted[m, 0], start[m, 1] - predicted[m, 1])
+        limit, known = MAX_DISTANCE * edge_px[m], support[m] >= MIN_QUADRATIC_NEIGHBOURS
+        if known and after < limit and (after < before or not agreed[m]):
             if not after < before:
                 cov[m, 0, 0] += 0.25 * after**2
                 cov[m, 1, 1] += 0.25 * after**2
-        elif known and before < near and agreed[m]:
+        elif known and before < limit and agreed[m]:
             xy[m] = start[m]
-            cov[m] = np.eye(2) * (AGREED_DEVIATION * edge[m]) ** 2
+            cov[m] = np.eye(2) * (AGREED_DEVIATION * edge_px[m]) ** 2
         else:
             xy[m], cov[m] = np.nan, np.nan
 
 
 @inlined_no_refcount
-def _is_shifted(xy, m, cov, free, start, edge):  # type: ignore[no-untyped-def]
-    """Whether a marker lies far from its ``start`` and is not sure, or its gridlines bend (``free``, px)."""
-    spread = cov[m, 0, 0] + cov[m, 1, 1]
-    if spread > (UNCERTAIN_DEVIATION * edge[m]) ** 2:
+def _is_shifted(xy, cov, m, evidence):  # type: ignore[no-untyped-def]
+    """Whether a marker lies far from its initial place, and is uncertain or has gridlines that may bend."""
+    edge_px, start = evidence.edge_px[m], evidence.initial_px
+    variance = cov[m, 0, 0] + cov[m, 1, 1]
+    if variance > (UNCERTAIN_DEVIATION * edge_px) ** 2:
         limit = MAX_UNCERTAIN_SHIFT
-    elif free[m] > MAX_GRIDLINE_BEND * edge[m]:
+    elif evidence.bend_deviation_px[m] > MAX_GRIDLINE_BEND * edge_px:
         limit = MAX_REFINEMENT_SHIFT
     else:
         return False
     dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-    return dx * dx + dy * dy > (limit * edge[m]) ** 2
+    return dx * dx + dy * dy > (limit * edge_px) ** 2
 
 
 @compiled
-def _shifted_rim_markers(xy, cov, free, start, edge, rim):  # type: ignore[no-untyped-def]
-    """(M,) bool, the markers of the rim that slide."""
-    out = np.zeros(xy.shape[0], np.bool_)
+def _shifted_rim_markers(xy, cov, evidence, is_rim):  # type: ignore[no-untyped-def]
+    """(M,) bool, the shifted markers of the rim."""
+    shifted = np.zeros(xy.shape[0], np.bool_)
     for m in range(xy.shape[0]):
-        out[m] = rim[m] and _is_shifted(xy, m, cov, free, start, edge)
-    return out
+        shifted[m] = is_rim[m] and _is_shifted(xy, cov, m, evidence)
+    return shifted

@@ -2,15 +2,15 @@
 
 Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
 do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
-sextant, read at equidistant places. What neither can tell within a tenth of an edge stays lost.
+sextant, read at equidistant places. A marker that neither predicts within a tenth of an edge stays lost.
 
-A marker under dirt may be measured, but so vaguely that the rings know more of its place than it shows itself: it is
-put between the two.
+An uncertain marker, as under dirt, may be predicted by its rings better than it is measured: both are fused.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +26,27 @@ from extractor.refine.drawn_pattern import merged_rows
 from extractor.refine.estimate import RefinedMarkers
 from extractor.result import Status
 
-MAX_IMPLIED_DISTANCE = 0.1  # in edges, of what cells imply from what markers do
-IMPLIED_DEVIATION = 0.02  # in edges
-BORDER_WIDTH = 0.25  # in edges, of the image, where cells that it cuts imply nothing
-MAX_REPAIRED_DEVIATION = 0.08  # of a repaired marker, in edges: three of them stay below a quarter of an edge
-MAX_FITTED_DEVIATION = (
-    0.05  # the same of a fitted one: a layer's quadratic is wrong where the surface is bent
-)
-MIN_RIM_SUPPORT = 6  # the same for what cells imply, too
-MAX_LEVERAGE = 1.2
-MAX_RIM_LEVERAGE = 2.0  # the same for what cells imply, too
+# Distances and deviations are in units of the edge, unless stated otherwise.
+MAX_IMPLIED_DISTANCE = 0.1  # between the place that cells imply and the prediction by markers
+IMPLIED_DEVIATION = 0.02  # of a place that cells imply
+BORDER_WIDTH = 0.25  # of the image's border, which cuts cells; cells there imply nothing
+MAX_REPAIRED_DEVIATION = 0.08  # of a repaired marker: three such deviations stay below a quarter of an edge
+MAX_FITTED_DEVIATION = 0.05  # of a fitted marker: a layer's quadratic is wrong where the surface is bent
+MIN_RIM_SUPPORT = 6  # known neighbours of a lost marker that cells imply
+MAX_LEVERAGE = 1.2  # of the neighbours' errors on a repaired marker
+MAX_RIM_LEVERAGE = 2.0  # the same on a marker that cells imply
 OUTER_RING_ERROR = (
-    0.04  # in edges, what the outer ring may hide where too few of the inner one are known to say so
+    0.04  # possible error of the outer ring where too few markers of the inner ring can confirm it
 )
-MODEL_DEVIATION = 0.012  # of an edge: what a smooth surface may hide from a quadratic map
-# Errors of repaired markers against what their neighbours leave of the fit, from 300 rendered scenes with missing
+MODEL_DEVIATION = 0.012  # deviation of a smooth surface from a quadratic map
+# Errors of repaired markers against the residual of the fit to their neighbours, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the
-# surface hides the more from the map the farther this reaches. A layer's quadratic, which few markers carry, may seem
-# to fit better than it does: its variance counts HEAVY_ERROR times, and never below that of the model.
+# surface departs the more from the map the farther this extrapolates. A layer's quadratic rests on few markers and may
+# seem to fit better than it does: its variance counts HEAVY_ERROR times, and is never below that of the model.
 MILD_ERROR = 1.6
 HEAVY_ERROR = 2.0
-# Likewise against what a cubic leaves in nearly whole rings, on the surfaces under balls, rings, ribs, wedges and cubes
-# (their true markers, of which up to three around were taken away): 99 % of the errors stay below 1.5 such deviations.
+# Likewise against the residual of a cubic in nearly whole rings, on the surfaces under balls, rings, ribs, wedges and
+# cubes (their true markers, with up to three neighbours removed): 99 % of the errors stay below 1.5 such deviations.
 CUBIC_ERROR = 1.6
 LOST, MEASURED = np.uint8(Status.LOST), np.uint8(Status.MEASURED)
 REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
@@ -55,78 +54,114 @@ REPAIRED, FITTED = np.uint8(Status.REPAIRED), np.uint8(Status.FITTED)
 
 @dataclass(frozen=True, eq=False)
 class RepairedMarkers:
-    """Markers after repair: (M, 2) places, (M, 2, 2) covariances, (M,) status; NaN and 0 where lost."""
+    """Markers after repair.
+
+    Attributes:
+        xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost.
+        status: (M,) uint8, a ``Status`` each.
+    """
 
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     status: NDArray[np.uint8]
 
 
+class RingPrediction(NamedTuple):
+    """Predictions of M markers by the markers around them, see ``predict_markers``; NaN where unknown.
+
+    Attributes:
+        xy_px: (M, 2) float64, by two rings.
+        variance: (M,) float64, px^2 per axis, of the residuals in the rings.
+        leverage: (M,) float64, of the neighbours' errors.
+        support: (M,) int32, number of known neighbours.
+        inner_xy_px: (M, 2) float64, by the inner ring alone.
+    """
+
+    xy_px: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    leverage: NDArray[np.float64]
+    support: NDArray[np.int32]
+    inner_xy_px: NDArray[np.float64]
+
+
 def repair_markers(
     refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
 ) -> RepairedMarkers:
-    """Drop what contradicts its neighbours, repair what they imply, and let them say what is vague.
+    """Drop inconsistent markers, repair lost ones that the others predict, and fuse uncertain ones with predictions.
 
     Args:
-        refined: the markers as measured.
+        refined: the markers after refinement.
         places: the markers before refinement.
-        size: width and height of the image; nothing is reported outside.
+        size: width and height of the image, px; no marker is reported outside the image.
     """
-    xy, cov, edge_px, sound = reject_inconsistent_markers(refined, places, lattice, size)
-    vague, some = find_uncertain_markers(cov, edge_px)
-    if sound and not some:
-        return RepairedMarkers(xy, cov, np.isfinite(xy[:, 0]) * MEASURED)
-    tables = lattice.marker_mm, lattice.neighbours, lattice.first_ring, lattice.present, lattice.layers
-    return RepairedMarkers(xy, cov, _fill_lost_markers(xy, cov, vague, edge_px, places.xy_px, *tables, size))
+    kept = reject_inconsistent_markers(refined, places, lattice, size)
+    uncertain, any_uncertain = find_uncertain_markers(kept.cov_px2, kept.edge_px)
+    if kept.is_complete and not any_uncertain:
+        return RepairedMarkers(kept.xy_px, kept.cov_px2, np.isfinite(kept.xy_px[:, 0]) * MEASURED)
+    status = _fill_lost_markers(
+        kept.xy_px, kept.cov_px2, uncertain, kept.edge_px, places.xy_px, lattice.ring_tables, size
+    )
+    return RepairedMarkers(kept.xy_px, kept.cov_px2, status)
 
 
 @compiled
-def _interpolated_edges(edge, table):  # type: ignore[no-untyped-def]
-    """(M,) the edges at each marker; where none was seen, the mean of its neighbours', or NaN."""
-    out = edge.copy()
-    for m in np.flatnonzero(np.isnan(edge)):
+def _interpolated_edges(edge_px, neighbours):  # type: ignore[no-untyped-def]
+    """(M,) the edge at each marker; where it is NaN, the mean of the neighbours' edges, or NaN without any."""
+    out = edge_px.copy()
+    for m in np.flatnonzero(np.isnan(edge_px)):
         total, count = 0.0, 0
-        for n in table[m]:
-            if n >= 0 and not np.isnan(edge[n]):
-                total += edge[n]
+        for n in neighbours[m]:
+            if n >= 0 and not np.isnan(edge_px[n]):
+                total += edge_px[n]
                 count += 1
         out[m] = total / count if count > 0 else np.nan
     return out
 
 
 @compiled
-def _fill_lost_markers(xy, cov, vague, edge, implied, marker_mm, table, ring, present, layers, size):  # type: ignore[no-untyped-def]
-    """Write the places and covariances of the lost markers that can be told, NaN for those outside the image, and put
-    the ``vague`` ones (M,) bool nearer to where others have them; (M,) uint8 the status of all."""
-    lost, edge = np.isnan(xy[:, 0]), _interpolated_edges(edge, table)
+def _fill_lost_markers(xy, cov, uncertain, edge_px, implied, tables, size):  # type: ignore[no-untyped-def]
+    """Write places and covariances of the lost markers that are predicted, and fuse the uncertain ones.
+
+    Markers outside the image become NaN.
+
+    Args:
+        xy, cov: (M, 2) and (M, 2, 2), NaN where lost.
+        uncertain: (M,) bool.
+        edge_px: (M,) edge at each marker, px.
+        implied: (M, 2) the places before refinement, which the cells imply, px.
+
+    Returns:
+        (M,) uint8, the status of all markers.
+    """
+    lost, edge_px = np.isnan(xy[:, 0]), _interpolated_edges(edge_px, tables.neighbours)
     status = np.where(lost, LOST, MEASURED)
-    lost &= present
-    tables = marker_mm, table, ring
-    clear = merged_rows(vague, np.full(xy.shape, np.nan), xy)
-    near, nearer = _predict_by_rings(clear, lost | vague, *tables)
-    for m in np.flatnonzero(lost | vague):
-        variance = _variance_by_neighbours(m, near, nearer, edge[m])
+    lost &= tables.present
+    certain = merged_rows(uncertain, np.full(xy.shape, np.nan), xy)
+    rings = _predict_by_rings(certain, lost | uncertain, tables)
+    for m in np.flatnonzero(lost | uncertain):
+        variance = _variance_by_neighbours(m, rings, edge_px[m])
         if lost[m]:
-            lost[m], status[m] = not _fill_marker(m, near[0][m], variance, xy, cov, size), REPAIRED
+            lost[m], status[m] = not _fill_marker(m, rings.xy_px[m], variance, xy, cov, size), REPAIRED
         elif variance >= 0.0:
-            update_by_fusion(xy[m], cov[m], near[0][m], variance)
-    known = merged_rows(vague, xy, clear)
-    if lost.any() and vague.any():
-        near, nearer = _predict_by_rings(known, lost, *tables)
+            update_by_fusion(xy[m], cov[m], rings.xy_px[m], variance)
+    known = merged_rows(uncertain, xy, certain)
+    if lost.any() and uncertain.any():
+        rings = _predict_by_rings(known, lost, tables)
         for m in np.flatnonzero(lost):
-            variance = _variance_by_neighbours(m, near, nearer, edge[m])
-            lost[m] = not _fill_marker(m, near[0][m], variance, xy, cov, size)
+            variance = _variance_by_neighbours(m, rings, edge_px[m])
+            lost[m] = not _fill_marker(m, rings.xy_px[m], variance, xy, cov, size)
     for m in np.flatnonzero(lost):
-        lost[m] = not _fill_marker(
-            m, implied[m], _variance_by_cells(m, near, implied, edge[m], size), xy, cov, size
-        )
-    if lost.any():  # what says less, and takes longer, is asked only of these
-        bent = cubic_variance(known, lost & (near[3] >= MIN_CUBIC_NEIGHBOURS), marker_mm, table)
-        along, doubt = predict_by_layer(known, layers)
+        variance = _variance_by_cells(m, rings, implied[m], edge_px[m], size)
+        lost[m] = not _fill_marker(m, implied[m], variance, xy, cov, size)
+    if lost.any():  # the weaker and slower predictions, only for the remaining markers
+        dense = lost & (rings.support >= MIN_CUBIC_NEIGHBOURS)
+        by_cubic = cubic_variance(known, dense, tables.marker_mm, tables.neighbours)
+        layer_xy, layer_variance = predict_by_layer(known, tables.layers)
         for m in np.flatnonzero(lost):
-            if not _fill_marker(m, near[0][m], _variance_by_cubic(bent[m], edge[m]), xy, cov, size):
-                status[m] = FITTED
-                _fill_marker(m, along[m], _variance_by_layer(doubt[m], edge[m]), xy, cov, size)
+            variance = _variance_by_cubic(by_cubic[m], edge_px[m])
+            if not _fill_marker(m, rings.xy_px[m], variance, xy, cov, size):
+                status[m], variance = FITTED, _variance_by_layer(layer_variance[m], edge_px[m])
+                _fill_marker(m, layer_xy[m], variance, xy, cov, size)
     for n in range(xy.shape[0]):
         if not (cov[n, 0, 0] >= 0.0 and is_inside_image(xy[n, 0], xy[n, 1], size)):
             xy[n], cov[n], status[n] = np.nan, np.nan, LOST
@@ -134,71 +169,72 @@ def _fill_lost_markers(xy, cov, vague, edge, implied, marker_mm, table, ring, pr
 
 
 @compiled
-def _predict_by_rings(known, wanted, marker_mm, table, ring):  # type: ignore[no-untyped-def]
-    """All that ``predict_markers`` says of the wanted markers by two rings, and where the inner one alone puts them."""
-    return predict_markers(known, wanted, marker_mm, table), predict_markers(known, wanted, marker_mm, ring)[
-        0
-    ]
+def _predict_by_rings(known, wanted, tables):  # type: ignore[no-untyped-def]
+    """The ``RingPrediction`` of the wanted markers (M,) bool from the known places (M, 2)."""
+    xy, variance, leverage, support = predict_markers(known, wanted, tables.marker_mm, tables.neighbours)
+    inner = predict_markers(known, wanted, tables.marker_mm, tables.first_ring)
+    return RingPrediction(xy, variance, leverage, support, inner[0])
 
 
 @compiled
 def _fill_marker(m, place, variance, xy, cov, size):  # type: ignore[no-untyped-def]
-    """Put a marker there, as sure along as across; False where that is not known, or not in the image."""
+    """Write a marker's place and isotropic covariance; False if the variance is NaN or the place not in the image."""
     xy[m, 0], xy[m, 1] = place[0], place[1]
     cov[m, 0, 0], cov[m, 1, 1], cov[m, 0, 1], cov[m, 1, 0] = variance, variance, 0.0, 0.0
     return variance >= 0.0 and is_inside_image(place[0], place[1], size)
 
 
 @compiled
-def _variance_by_neighbours(m, near, nearer, edge):  # type: ignore[no-untyped-def]
-    """The variance of a lost marker's place by the two rings around it; NaN where that is not safe."""
-    place, spread, leverage, support = near
-    dx, dy = place[m, 0] - nearer[m, 0], place[m, 1] - nearer[m, 1]
-    # where the inner ring alone says something else, the surface is too bent for either to be believed
-    alone = np.isnan(nearer[m, 0])
-    doubt = (OUTER_RING_ERROR * edge) ** 2 if alone else (dx * dx + dy * dy) / 4
-    at_most = spread[m] * (1 + leverage[m]) + (MODEL_DEVIATION * edge) ** 2 + doubt
-    if support[m] < MILD_SUPPORT or not (
-        leverage[m] < MAX_LEVERAGE and at_most < (MAX_REPAIRED_DEVIATION * edge) ** 2
+def _variance_by_neighbours(m, rings, edge_px):  # type: ignore[no-untyped-def]
+    """The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe."""
+    variance, leverage, inner = rings.variance[m], rings.leverage[m], rings.inner_xy_px
+    dx, dy = rings.xy_px[m, 0] - inner[m, 0], rings.xy_px[m, 1] - inner[m, 1]
+    # where the inner ring alone predicts another place, the surface is too bent for both predictions
+    unconfirmed = np.isnan(inner[m, 0])
+    model_error = (OUTER_RING_ERROR * edge_px) ** 2 if unconfirmed else (dx * dx + dy * dy) / 4
+    upper_bound = variance * (1 + leverage) + (MODEL_DEVIATION * edge_px) ** 2 + model_error
+    if rings.support[m] < MILD_SUPPORT or not (
+        leverage < MAX_LEVERAGE and upper_bound < (MAX_REPAIRED_DEVIATION * edge_px) ** 2
     ):
         return np.nan
-    hidden = 0.25 * (OUTER_RING_ERROR * edge) ** 2 if alone else 0.0
-    return (MILD_ERROR * leverage[m]) ** 2 * spread[m] + hidden
+    outer_error = 0.25 * (OUTER_RING_ERROR * edge_px) ** 2 if unconfirmed else 0.0
+    return (MILD_ERROR * leverage) ** 2 * variance + outer_error
 
 
 @compiled
-def _variance_by_cubic(left, edge):  # type: ignore[no-untyped-def]
-    """The same where the surface is bent, but the rings are nearly whole, by what a cubic has ``left`` in them."""
-    variance = CUBIC_ERROR**2 * left + (MODEL_DEVIATION * edge) ** 2
-    return variance if variance < (MAX_REPAIRED_DEVIATION * edge) ** 2 else np.nan
+def _variance_by_cubic(residual, edge_px):  # type: ignore[no-untyped-def]
+    """The same where the surface is bent, but the rings are nearly whole, from the ``residual`` of a cubic, px^2."""
+    variance = CUBIC_ERROR**2 * residual + (MODEL_DEVIATION * edge_px) ** 2
+    return variance if variance < (MAX_REPAIRED_DEVIATION * edge_px) ** 2 else np.nan
 
 
 @compiled
-def _variance_by_layer(doubt, edge):  # type: ignore[no-untyped-def]
-    """The same by the quadratic through its layer, which leaves so much ``doubt``."""
-    if not doubt + (3 * MODEL_DEVIATION * edge) ** 2 < (MAX_FITTED_DEVIATION * edge) ** 2:
+def _variance_by_layer(residual, edge_px):  # type: ignore[no-untyped-def]
+    """The same by the quadratic through the marker's layer, from the variance of its ``residual``, px^2."""
+    if not residual + (3 * MODEL_DEVIATION * edge_px) ** 2 < (MAX_FITTED_DEVIATION * edge_px) ** 2:
         return np.nan
-    return HEAVY_ERROR * doubt + (MODEL_DEVIATION * edge) ** 2
+    return HEAVY_ERROR * residual + (MODEL_DEVIATION * edge_px) ** 2
 
 
 @compiled
-def _variance_by_cells(m, near, implied, edge, size):  # type: ignore[no-untyped-def]
-    """The variance of the corners that the cells around a lost marker imply, averaged (the article's eq. 6); NaN where
-    the markers around say something else, and at the image's border, which cuts cells.
+def _variance_by_cells(m, rings, implied, edge_px, size):  # type: ignore[no-untyped-def]
+    """The variance of the mean of the corners that a lost marker's cells imply (the article's eq. 6), px^2.
 
-    Where gridlines bend sharply, the markers around tell little more than that.
+    NaN where the markers around predict another place, and at the image's border, which cuts cells. Where gridlines
+    bend sharply, the prediction by markers is hardly better.
     """
-    expected, spread, leverage, support = near
-    x, y = implied[m]
-    square = (x - expected[m, 0]) ** 2 + (y - expected[m, 1]) ** 2
-    deep = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER_WIDTH * edge
-    if not (deep and support[m] >= MIN_RIM_SUPPORT and square < (MAX_IMPLIED_DISTANCE * edge) ** 2):
+    x, y = implied[0], implied[1]
+    variance, leverage, predicted = rings.variance[m], rings.leverage[m], rings.xy_px
+    distance2 = (x - predicted[m, 0]) ** 2 + (y - predicted[m, 1]) ** 2
+    inside = min(x, y, size[0] - 1 - x, size[1] - 1 - y) > BORDER_WIDTH * edge_px
+    limit2 = (MAX_IMPLIED_DISTANCE * edge_px) ** 2
+    if not (inside and rings.support[m] >= MIN_RIM_SUPPORT and distance2 < limit2):
         return np.nan
-    known, own = spread[m] * (1 + leverage[m]), (IMPLIED_DEVIATION * edge) ** 2
+    predicted_variance, own = variance * (1 + leverage), (IMPLIED_DEVIATION * edge_px) ** 2
     if not (
-        leverage[m] < MAX_RIM_LEVERAGE
-        and known < (MAX_IMPLIED_DISTANCE * edge) ** 2
-        and square < 4 * (known + own)
+        leverage < MAX_RIM_LEVERAGE
+        and predicted_variance < limit2
+        and distance2 < 4 * (predicted_variance + own)
     ):
         return np.nan
-    return 0.25 * square + own
+    return 0.25 * distance2 + own

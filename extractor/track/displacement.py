@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 
 from extractor.layout.reference import Reference
 
-MIN_MARKERS = 4  # that fix a homography
-MAX_CONDITION = 1e6  # of the markers' scatter; collinear ones fix none
+MIN_MARKERS = 4  # for a homography
+MAX_CONDITION = 1e6  # of the markers' scatter; collinear markers determine no homography
 
 Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """The pattern at rest: what displacement is counted from.
+    """The pattern at rest, from which displacements are measured.
 
     Attributes:
         xy_px: (M, 2) float64, NaN where the rest frame has no marker.
         layout_from_image: (3, 3) float64, a homography from px to mm of the layout frame, fitted to all markers
-            at rest; None when there are too few, or when ``mm_per_px`` is given.
-        mm_per_px: a scale; then mm are along the image's x (right) and against its y (up).
+            at rest; None when these are too few, or when ``mm_per_px`` is given.
+        mm_per_px: a scale, with x right and y up along the image's axes; None without one.
         residual_mm: RMS distance per axis between the fitted and the layout's positions; NaN without a homography.
-            A flat sheet in an undistorted camera leaves microns; a dome or a lens leaves more.
+            It is microns for a flat sheet and an undistorted camera, and more for a dome or a lens.
     """
 
     xy_px: Points
@@ -50,13 +50,17 @@ class Rest:
 
 
 def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None) -> Rest:
-    """The rest state with its markers at (M, 2) px, NaN where lost."""
+    """The rest state with its markers at (M, 2) px, NaN where lost.
+
+    Args:
+        mm_per_px: a scale for millimetres; None: a homography to the layout.
+    """
     xy_px = xy_px.copy()
     if mm_per_px is not None:
         return Rest(xy_px, None, mm_per_px, float("nan"))
-    found = np.isfinite(xy_px[:, 0])
-    mm, px = reference.xy_mm[found], xy_px[found]
-    if found.sum() < MIN_MARKERS or np.linalg.cond(mm - mm.mean(axis=0)) > MAX_CONDITION:
+    known = np.isfinite(xy_px[:, 0])
+    mm, px = reference.xy_mm[known], xy_px[known]
+    if known.sum() < MIN_MARKERS or np.linalg.cond(mm - mm.mean(axis=0)) > MAX_CONDITION:
         return Rest(xy_px, None, None, float("nan"))
     homography, _ = cv2.findHomography(px, mm)
     if homography is None:
@@ -67,6 +71,6 @@ def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None
 
 
 def apply_homography(homography: NDArray[np.float64], xy: Points) -> Points:
-    """Points (N, 2) through a homography; NaN stays NaN."""
+    """(N, 2) the points (N, 2) mapped by a homography (3, 3); NaN stays NaN."""
     x, y, w = homography @ np.column_stack([xy, np.ones(len(xy))]).T
     return np.column_stack([x / w, y / w])

@@ -1,8 +1,8 @@
-"""What the image says of predicted cells: whether each shows its own ink inside and nothing of it beyond its edges."""
+"""The check of predicted cells by the image: a cell must show its own ink inside and none of it across its edges."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,111 +12,122 @@ from extractor.numeric.compilation import compiled
 from extractor.numeric.dense_systems import dot3
 from extractor.track.warm_tables import BLACK_CELL, NO_CELL, WHITE_CELL, WarmTables
 
-MIN_WHITE_RATIO = (
-    0.75  # the white cell's brightness against an ink's, summed over the channels; black stays below
+MIN_WHITE_RATIO = 0.75  # of the white cell's brightness (sum of the channels) to an ink's; black is below
+MIN_COSINE = 0.8  # between an ink level over black and the same cell's a frame ago
+STRENGTH_RANGE = (0.4, 2.5)  # of an ink level over black, relative to the same cell's a frame ago
+INNER_SAMPLE_POSITION = (
+    0.5  # of the second samples of the ink, as a share of the way from the middle to a corner
 )
-MIN_COSINE = 0.8  # between an ink and the same cell's ink a frame ago, black subtracted
-STRENGTH_RANGE = (0.4, 2.5)  # of an ink against the same cell's a frame ago
-INNER_SAMPLE_POSITION = 0.5  # of the way from the middle to each corner, where the ink is looked at again
-MIN_INNER_STRENGTH = 0.4  # of the ink's strength that must be there
-LEVEL_RADIUS = 0.15  # of the middle's distance to the corners, over which the ink is averaged
+MIN_INNER_STRENGTH = 0.4  # of the ink level at these samples, relative to the middle
+LEVEL_RADIUS = 0.15  # of the disc over which the ink is averaged, relative to the distance of a corner
 
-UNSEEN, CONTRADICTED, CONFIRMED = range(3)  # what the image says of a cell
+UNSEEN, CONTRADICTED, CONFIRMED = range(3)  # verdicts on a cell
 
 
-@dataclass(frozen=True, eq=False)
-class CellCheck:
-    """What the image says of predicted cells.
+class CellCheck(NamedTuple):
+    """The check of C predicted cells.
 
     Attributes:
         verdict: (C,) uint8, ``UNSEEN`` (outside the image or not predicted), ``CONTRADICTED`` or ``CONFIRMED``.
-        look: (2, C, 3) float64 BGR, each seen cell's ink minus the black around it, and this black.
-        white, not_white: how many edges of inked cells see the white cell beyond them where it belongs, and do not.
-        other_white: how many see something as bright where a black cell belongs.
+        cell_levels: (2, C, 3) float64 BGR, each visible cell's ink level minus the black around the cell, and this
+            black; NaN where unseen.
+        white_count: number of edges of colored cells across which the white cell is bright, as in the layout.
+        white_missing_count: number of edges across which the white cell is not bright.
+        white_elsewhere_count: number of edges across which a black cell is as bright as white.
     """
 
     verdict: NDArray[np.uint8]
     cell_levels: NDArray[np.float64]
-    white: int
+    white_count: int
     white_missing_count: int
     white_elsewhere_count: int
 
 
 @compiled
-def _check_cells(image, xy, ink, beyond, nearest, before, compare):  # type: ignore[no-untyped-def]
-    """Verdict and look of every cell with the corners ``xy`` (C, 3, 2); how often white is seen where it belongs."""
+def _check_cells(image, xy, ink, across_edge, nearest, before, compare):  # type: ignore[no-untyped-def]
+    """The ``CellCheck`` of the cells with the corners ``xy`` (C, 3, 2).
+
+    Args:
+        before: (C, 3) ink levels over black in the frame before; used if ``compare``.
+    """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     count = xy.shape[0]
     verdict = np.zeros(count, np.uint8)
-    look = np.full((2, count, 3), np.nan)
-    middle, black, other = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    white, not_white, other_white = 0, 0, 0
+    levels = np.full((2, count, 3), np.nan)
+    middle, black, across = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    white, white_missing, white_elsewhere = 0, 0, 0
     for i in range(count):
         x, y = xy[i, :, 0].mean(), xy[i, :, 1].mean()
         size = np.hypot(xy[i, 0, 0] - x, xy[i, 0, 1] - y)
         radius = LEVEL_RADIUS * size
         if not fill_patch_mean(flat, height, width, x, y, radius, middle):
             continue
-        blacks, fits, outside = 0, True, False
+        black_count, confirmed, outside = 0, True, False
         black[:] = 0.0
         for k in range(3):
-            if beyond[i, k] == NO_CELL:
+            if across_edge[i, k] == NO_CELL:
                 continue
             mx = xy[i, k, 0] + xy[i, (k + 1) % 3, 0] - x
             my = xy[i, k, 1] + xy[i, (k + 1) % 3, 1] - y
-            if not fill_patch_mean(flat, height, width, mx, my, radius, other[k]):
+            if not fill_patch_mean(flat, height, width, mx, my, radius, across[k]):
                 outside = True
                 continue
-            bright = other[k].sum() > MIN_WHITE_RATIO * middle.sum()
-            if beyond[i, k] == WHITE_CELL:
+            bright = across[k].sum() > MIN_WHITE_RATIO * middle.sum()
+            if across_edge[i, k] == WHITE_CELL:
                 white += bright
-                not_white += not bright
+                white_missing += not bright
             else:
-                other_white += bright
-                fits = fits and not bright
-                black += other[k]
-                blacks += 1
-        if outside or blacks == 0:
+                white_elsewhere += bright
+                confirmed = confirmed and not bright
+                black += across[k]
+                black_count += 1
+        if outside or black_count == 0:
             continue
-        own = look[0, i]
+        own = levels[0, i]
         for channel in range(3):
-            own[channel] = middle[channel] - black[channel] / blacks
-            look[1, i, channel] = black[channel] / blacks
+            own[channel] = middle[channel] - black[channel] / black_count
+            levels[1, i, channel] = black[channel] / black_count
         strength = dot3(own, own)
         for k in range(3):
             px, py = (
                 x + INNER_SAMPLE_POSITION * (xy[i, k, 0] - x),
                 y + INNER_SAMPLE_POSITION * (xy[i, k, 1] - y),
             )
-            at = weighted_sample(flat, height, width, px, py, own[0], own[1], own[2])
-            fits = fits and at - dot3(own, black) / blacks > MIN_INNER_STRENGTH * strength
-            if beyond[i, k] == BLACK_CELL:
-                fits = (
-                    fits and dot3(other[k], own) - dot3(black, own) / blacks < MIN_INNER_STRENGTH * strength
-                )
+            inner = weighted_sample(flat, height, width, px, py, own[0], own[1], own[2])
+            confirmed = confirmed and inner - dot3(own, black) / black_count > MIN_INNER_STRENGTH * strength
+            if across_edge[i, k] == BLACK_CELL:
+                outer = dot3(across[k], own) - dot3(black, own) / black_count
+                confirmed = confirmed and outer < MIN_INNER_STRENGTH * strength
         if compare:
             ratio = dot3(own, before[i]) / max(dot3(before[i], before[i]), 1e-9)
-            fits = fits and ratio > STRENGTH_RANGE[0] and ratio < STRENGTH_RANGE[1]
+            confirmed = confirmed and ratio > STRENGTH_RANGE[0] and ratio < STRENGTH_RANGE[1]
             best, best_cosine = 0, -1.0
             for k in range(3):
-                hue = before[nearest[i, k]]
-                cosine = dot3(own, hue) / np.sqrt(max(strength * dot3(hue, hue), 1e-9))
+                level = before[nearest[i, k]]
+                cosine = dot3(own, level) / np.sqrt(max(strength * dot3(level, level), 1e-9))
                 if cosine > best_cosine:
                     best, best_cosine = k + 1, cosine
-            fits = fits and best == ink[i] and best_cosine > MIN_COSINE
-        verdict[i] = CONFIRMED if fits else CONTRADICTED
-    return verdict, look, white, not_white, other_white
+            confirmed = confirmed and best == ink[i] and best_cosine > MIN_COSINE
+        verdict[i] = CONFIRMED if confirmed else CONTRADICTED
+    return CellCheck(verdict, levels, white, white_missing, white_elsewhere)
 
 
 def check_cells(
     image: NDArray[np.uint8],
     corner_px: NDArray[np.float64],
     tables: WarmTables,
-    look: NDArray[np.float64] | None,
+    levels_before: NDArray[np.float64] | None,
 ) -> CellCheck:
-    """Compare cells with corners at (C, 3, 2) (NaN: not predicted) with the image, and their inks with
-    ``cell_levels``."""
-    before = np.zeros((len(tables.ink), 3)) if look is None else look[0]
-    return CellCheck(
-        *_check_cells(image, corner_px, tables.ink, tables.beyond, tables.nearest, before, look is not None)
+    """Compare predicted cells with the image, and their inks with those in the frame before.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        corner_px: (C, 3, 2) predicted corners, NaN where not predicted.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before; None: inks are not compared.
+    """
+    compare = levels_before is not None
+    before = np.zeros((len(tables.ink), 3)) if levels_before is None else levels_before[0]
+    check: CellCheck = _check_cells(
+        image, corner_px, tables.ink, tables.across_edge, tables.nearest, before, compare
     )
+    return check

@@ -1,4 +1,4 @@
-"""Tracking: frame after frame, each numbered in itself, so that nothing drifts; the frame before only saves time."""
+"""Tracking: every frame is numbered by itself, so that nothing drifts; the frame before only saves time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from extractor.errors import ImageError
 from extractor.image.input import convert_to_bgr
 from extractor.image.pyramid import Pyramid
 from extractor.layout.reference import Reference
-from extractor.pipeline import Extractor, Stages
+from extractor.pipeline import Extractor, NumberedMarkers, Stages, no_markers
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
 from extractor.result import Markers, Origin, Reason, Status
@@ -23,21 +23,19 @@ from extractor.track.image_check import check_cells
 from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
 from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
-MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; below it, a cold start may find more
-WARM_EDGE_PX = (
-    8.0  # a warm start looks at the image at a scale that leaves edges of so many px, or up to twice
-)
-EDGE_SAMPLING_STEP = 8  # edges of the layout; one of so many is looked at for that
-COLD_START_INTERVAL = 200  # frames; a cold start at least this often
+MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more
+WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice
+EDGE_SAMPLING_STEP = 8  # one of this number of edges is measured for the choice of that scale
+COLD_START_INTERVAL = 200  # frames after which a cold start is done
 
 
 class FrameStatus(IntEnum):
-    """What became of a frame. None vanishes."""
+    """The outcome of a frame; every frame has one."""
 
     TRACKED = 1
     LOST = 2  # read, but the pattern was not found; ``reason`` says why
-    UNREADABLE = 3  # no image could be had
-    OTHER_SIZE = 4  # not as large as the first frame
+    UNREADABLE = 3  # no image
+    OTHER_SIZE = 4  # not of the first frame's size
 
 
 class StartKind(StrEnum):
@@ -45,23 +43,23 @@ class StartKind(StrEnum):
 
     COLD = "cold"  # without the frame before
     WARM = "warm"  # predicted from the frame before, proved by the white cell
-    RIM = "warm, by the rim"  # white cell hidden: predicted, proved by the whole rim of the pattern
+    RIM = "warm, by the rim"  # predicted, proved by the pattern's whole rim, as the white cell is hidden
 
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """One frame.
+    """The result of one frame.
 
     Attributes:
-        index: its place in the sequence, from 0.
-        time_s: its time stamp in seconds; NaN where none was given.
-        status: what became of it.
-        reason: why it is not tracked, in words; empty when it is.
-        start: how its numbering was found; None where there is none.
+        index: place in the sequence, from 0.
+        time_s: time stamp in seconds; NaN where none was given.
+        status: outcome of the frame.
+        reason: why the frame is not tracked, in words; empty when it is.
+        start: how the numbering was found; None where there is none.
         markers: the markers, all lost where the frame is not tracked.
-        displacement_px: (M, 2) float64 against the rest frame in the image frame (x right, y down), NaN where unknown.
+        displacement_px: (M, 2) float64 from the rest frame in the image frame (x right, y down), NaN where unknown.
         displacement_mm: (M, 2) float64 in the layout frame (y up), NaN where unknown; see ``Rest``.
-        elapsed_ms: what it took, image to markers.
+        elapsed_ms: time from image to markers.
     """
 
     index: int
@@ -77,22 +75,33 @@ class Tracked:
 
 @dataclass(frozen=True, eq=False)
 class _TrackState:
-    """What a frame leaves to the next: positions, which of them were measured, those before, every cell's look, and how
-    the image looks to refinement."""
+    """The last tracked frame, from which the next one is predicted.
+
+    Attributes:
+        xy_px: (M, 2) float64, NaN where lost.
+        known: (M,) bool, the measured markers.
+        previous_px: (M, 2) float64, the markers of the frame before; None where this was lost.
+        cell_levels: (2, C, 3) float64, see ``CellCheck``; complete.
+        appearance: of the image, for refinement; None where the pattern was not drawn.
+        mirrored: the image shows the pattern's back.
+        expected_count: largest number of measured markers since the last cold start.
+        frames_since_cold: number of frames since the last cold start.
+        is_before_gap: the frame after this one was lost.
+    """
 
     xy_px: NDArray[np.float64]
     known: NDArray[np.bool_]
     previous_px: NDArray[np.float64] | None
     cell_levels: NDArray[np.float64]
-    seen: Appearance | None
+    appearance: Appearance | None
     mirrored: bool
-    expected_count: int  # markers of the last cold start, or more
-    frames_since_cold: int  # frames since
-    gap: bool = False  # the frame after was lost
+    expected_count: int
+    frames_since_cold: int
+    is_before_gap: bool = False
 
 
 class Tracker:
-    """Follows one pattern through a sequence of images of one size.
+    """Follows one pattern through a sequence of images of one size. A copy goes on as the original does.
 
     >>> from extractor import Tracker, load_layout
     >>> tracker = Tracker(load_layout("layout.json"))  # doctest: +SKIP
@@ -101,9 +110,9 @@ class Tracker:
     Args:
         layout: a triangular pattern.
         rest: markers at rest; None: the first tracked frame.
-        mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, through
-            a homography fitted at rest.
-        warm: start from the frame before where the image proves it; False: always cold. The ids are the same.
+        mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
+            homography fitted at rest.
+        warm: start from the frame before where the image proves the prediction; False: always cold. Ids are the same.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
@@ -130,11 +139,11 @@ class Tracker:
             self.rest = fit_rest(rest.xy_px, layout, mm_per_px)
 
     def track(self, image: NDArray[Any] | None, *, time_s: float = float("nan"), reason: str = "") -> Tracked:
-        """The next frame, whatever it holds: a frame that cannot be tracked says so and keeps its place.
+        """Read the next frame; a frame that cannot be tracked says so and keeps its place in the sequence.
 
         Args:
-            image: as for ``Extractor.extract``; None where none could be had, for ``reason``.
-            time_s: its time stamp.
+            image: as for ``Extractor.extract``; None where no image could be had, for ``reason``.
+            time_s: time stamp of the frame.
         """
         started = time.perf_counter()
         markers, status, start = None, FrameStatus.UNREADABLE, None
@@ -144,90 +153,99 @@ class Tracker:
             elif self._size not in (None, np.shape(image)[:2]):
                 status, reason = FrameStatus.OTHER_SIZE, self._size_mismatch_text(image)
             else:
-                markers, start = self._find(image)
+                markers, start = self._read(image)
                 self._size = self._size or image.shape[:2]
                 reason = markers.reason or ""
                 status = FrameStatus.LOST if markers.reason else FrameStatus.TRACKED
         except ImageError as error:
             reason = str(error)
-        markers = markers or self._extractor._no_markers(Reason.NO_PATTERN, Stages())
+        markers = markers or no_markers(self.layout, Reason.NO_PATTERN, Stages())
         elapsed_ms = 1e3 * (time.perf_counter() - started)
         if status == FrameStatus.TRACKED and self.rest is None:
             self.rest = fit_rest(markers.xy_px, self.layout, self._mm_per_px)
         return self._make_tracked(time_s, status, reason, start, markers, elapsed_ms)
 
-    def _find(self, image: NDArray[Any]) -> tuple[Markers, StartKind | None]:
-        found = self._try_warm_start(image)
-        if found is not None:
-            return found
-        markers = self._extractor.extract(image)
+    def _read(self, image: NDArray[Any]) -> tuple[Markers, StartKind | None]:
+        """The markers of an image by a warm or a cold start, and which one it was; None where nothing was found."""
+        warm = self._try_warm_start(image)
+        if warm is not None:
+            return warm
+        markers, appearance = self._extractor.read(image)
         if markers.reason is not None:
-            if self._state is not None:  # positions are worth another try, velocities are not
-                self._state = replace(self._state, previous_px=None, gap=True)
+            if (
+                self._state is not None
+            ):  # the next frame may start from these positions, but not from velocities
+                self._state = replace(self._state, previous_px=None, is_before_gap=True)
             return markers, None
         bgr = convert_to_bgr(image)
         if self._tables is not None and bgr is not None:
-            corner_px = markers.xy_px[self._tables.corners]
-            look = _fill_unseen_levels(
-                check_cells(bgr, corner_px, self._tables, None).cell_levels, self._tables
-            )
+            check = check_cells(bgr, markers.xy_px[self._tables.corners], self._tables, None)
+            _fill_unseen_levels(check.cell_levels, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
-            self._update_state(markers, look, count, 0)
+            self._update_state(markers, appearance, check.cell_levels, count, 0)
         return markers, StartKind.COLD
 
     def _try_warm_start(self, image: NDArray[Any]) -> tuple[Markers, StartKind] | None:
-        """The markers of a warm start, or None where it is not proved."""
-        memory, tables = self._state, self._tables
-        if memory is None or tables is None or memory.frames_since_cold >= COLD_START_INTERVAL:
+        """The markers of a warm start, or None where the image does not prove the prediction."""
+        state, tables = self._state, self._tables
+        if state is None or tables is None or state.frames_since_cold >= COLD_START_INTERVAL:
             return None
         stages = Stages()
         bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
             return None
-        sights = Pyramid(bgr)
-        edge_px = float(short_edges(memory.xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
-        view = sights.at(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
-        guesses = [view.reduced(memory.xy_px)]
-        if memory.previous_px is not None:
-            moving = view.reduced(2 * memory.xy_px - memory.previous_px)
-            guesses.append(np.where(np.isfinite(moving), moving, guesses[0]))
+        pyramid = Pyramid(bgr)
+        edge_px = float(short_edges(state.xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
+        level = pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
+        candidates = [level.to_level(state.xy_px)]
+        if state.previous_px is not None:
+            moving = level.to_level(2 * state.xy_px - state.previous_px)
+            candidates.append(np.where(np.isfinite(moving), moving, candidates[0]))
         predicted = stages.record(
-            "predict", select_prediction(view.image, guesses, tables, memory.cell_levels)
+            "predict", select_prediction(level.image, candidates, tables, state.cell_levels)
         )
         if predicted is None:
             return None
-        start = verify_prediction(
-            view, predict_missing_markers(tables, predicted), memory.known, tables, memory.cell_levels
+        complete = predict_missing_markers(tables, predicted)
+        start = stages.record(
+            "prove", verify_prediction(level, complete, state.known, tables, state.cell_levels)
         )
-        if stages.record("prove", start) is None:
-            return None
-        assert start is not None
-        return self._refine_warm_start(sights, start, stages)
+        return None if start is None else self._refine_warm_start(pyramid, state, start, stages)
 
     def _refine_warm_start(
-        self, sights: Pyramid, start: WarmStart, stages: Stages
+        self, pyramid: Pyramid, state: _TrackState, start: WarmStart, stages: Stages
     ) -> tuple[Markers, StartKind] | None:
-        """Refined, which moves no marker by more than a quarter of an edge; None where too few are left."""
-        memory = self._state
-        assert memory is not None
-        origin = Origin.PREVIOUS if start.by_rim else Origin.WHITE
-        seen = memory.seen and memory.seen.with_lighting(memory.cell_levels, start.cell_levels)
-        markers = self._extractor.finish(sights, start.places, memory.mirrored, origin, stages, seen)
-        count = int((markers.status == Status.MEASURED).sum())
-        if count < MIN_KEPT_SHARE * memory.expected_count:
-            return None
-        self._update_state(
-            markers, start.cell_levels, max(count, memory.expected_count), memory.frames_since_cold + 1
+        """The refined markers, moved by at most a quarter of an edge; None where too few of them are measured."""
+        numbered = NumberedMarkers(
+            start.places, state.mirrored, Origin.PREVIOUS if start.by_rim else Origin.WHITE
         )
+        before = state.appearance and state.appearance.with_lighting(state.cell_levels, start.cell_levels)
+        markers, appearance = self._extractor.finish(pyramid, numbered, stages, before)
+        count = int((markers.status == Status.MEASURED).sum())
+        if count < MIN_KEPT_SHARE * state.expected_count:
+            return None
+        expected, age = max(count, state.expected_count), state.frames_since_cold + 1
+        self._update_state(markers, appearance, start.cell_levels, expected, age)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
-    def _update_state(self, markers: Markers, look: NDArray[np.float64], expected: int, age: int) -> None:
+    def _update_state(
+        self,
+        markers: Markers,
+        appearance: Appearance | None,
+        cell_levels: NDArray[np.float64],
+        expected_count: int,
+        frames_since_cold: int,
+    ) -> None:
         last = self._state
-        before = last.xy_px if last is not None and not last.gap else None
-        known = markers.status == Status.MEASURED
-        seen = markers.stages["refine"].seen
         self._state = _TrackState(
-            markers.xy_px, known, before, look, seen, bool(markers.mirrored), expected, age
+            xy_px=markers.xy_px,
+            known=markers.status == Status.MEASURED,
+            previous_px=last.xy_px if last is not None and not last.is_before_gap else None,
+            cell_levels=cell_levels,
+            appearance=appearance,
+            mirrored=bool(markers.mirrored),
+            expected_count=expected_count,
+            frames_since_cold=frames_since_cold,
         )
 
     def _make_tracked(
@@ -260,11 +278,10 @@ class Tracker:
         return f"{width} x {height} px instead of {self._size[1]} x {self._size[0]} px"
 
 
-def _fill_unseen_levels(look: NDArray[np.float64], tables: WarmTables) -> NDArray[np.float64]:
-    """Cells that were not seen look like the mean of their ink."""
-    seen = np.isfinite(look[0, :, 0])
+def _fill_unseen_levels(cell_levels: NDArray[np.float64], tables: WarmTables) -> None:
+    """Write the mean levels of an ink (2, C, 3) into its cells that were not seen."""
+    seen = np.isfinite(cell_levels[0, :, 0])
     for ink in (1, 2, 3):
-        mine = tables.ink == ink
-        mean = look[:, mine & seen].mean(axis=1, keepdims=True) if (mine & seen).any() else 0.0
-        look[:, mine & ~seen] = mean
-    return look
+        own = tables.ink == ink
+        mean = cell_levels[:, own & seen].mean(axis=1, keepdims=True) if (own & seen).any() else 0.0
+        cell_levels[:, own & ~seen] = mean

@@ -1,16 +1,17 @@
-"""The warm start: a frame's numbering predicted from the frame before, and proved by the image.
+"""The warm start: a frame's numbering is predicted from the frame before, and proved by the image.
 
-Nothing is believed because it was so a frame ago. Every cell must show its own ink inside and nothing of it beyond its
-edges, and must hang together with the white cell (or with the whole rim of the pattern) over cells that do the same.
-A triangle that is off by more than a seventh of an edge fails that, so where two of them share a corner the real cells
-do, too; around a real corner red, green and blue turn clockwise, so a chain of such cells from the white one is
-numbered as the search of a cold start would number it. Whatever falls short is left to the cold start. So the frame
-before saves time and settles nothing, except while the white cell is hidden and the whole rim is seen.
+The frame before is no evidence. Every cell must show its own ink inside and none of it across its edges, and must be
+connected to the white cell (or to the whole rim of the pattern) over cells that do the same. A triangle that is off by
+more than a seventh of an edge fails, so where two of them share a corner the real cells do so, too. Around a real
+corner red, green and blue turn clockwise, so a chain of such cells from the white cell has the numbering of a cold
+start. Frames that fail are left to the cold start. The frame before thus saves time and decides nothing, except while
+the white cell is hidden and the whole rim is visible.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,65 +24,97 @@ from extractor.numeric.dense_systems import dot3
 from extractor.track.image_check import CONFIRMED, UNSEEN, check_cells
 from extractor.track.warm_tables import WarmTables
 
-MIN_VERIFIED_SHARE = 0.95  # of the cells in view that must agree with the image
-MIN_PREDICTED = 0.8  # of the cells in view whose middles must still show their ink before anything is fitted
-MIN_CENTER_STRENGTH = 0.3  # of its ink a frame ago that a middle must show for that
-SEARCH_RADIUS = 0.9  # of an edge, the radius around a cell's middle in which its ink is looked for
-MIN_ROWS = 8  # of pixels at least are looked at there
-MIN_PIXEL_INK = 0.2  # of an ink, for a pixel to count as it
-MIN_INK_SHARE = 0.4  # of a cell's area that must be found there
-MAX_SHIFT = 0.35  # of an edge, how far a cell may lie from where it was predicted
-LARGE_SHIFT = 0.2  # of an edge; after larger ones the window is moved and the ink looked for again
-MAX_SPREAD = 0.25  # of an edge, how far the shifts of cells that share a marker may lie from their mean
-MIN_WHITE_EDGES = (
-    2  # of the three edges of a cell that must see it white, for it to be or to contest the reference
-)
-MIN_VOLUME = (
-    0.05  # sine of an ink's direction to the plane of the two others, below which it cannot be unmixed
-)
-CELL_AREA_RATIO = 3**0.5 / 4  # of a square on its edge, an equilateral cell's area
+MIN_VERIFIED_SHARE = 0.95  # of the cells in view that the image must confirm
+MIN_PREDICTED = 0.8  # of the cells in view whose middles must show their ink under a predicted position
+MIN_CENTER_STRENGTH = 0.3  # of a middle's ink level, relative to the frame before
+SEARCH_RADIUS = 0.9  # of the window around a cell's middle, in edges
+MIN_ROWS = 8  # of pixels that are sampled in the window, at least
+MIN_PIXEL_INK = 0.2  # of an ink, for a pixel to count as this ink
+MIN_INK_SHARE = 0.4  # of a cell's area that must show its ink in the window
+MAX_SHIFT = 0.35  # of a cell from its prediction, in edges
+LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again
+MAX_SPREAD = 0.25  # of the shifts of cells that share a marker, from their mean, in edges
+MIN_WHITE_EDGES = 2  # of a cell's three edges across which it is bright, for the white cell and for a rival
+MIN_VOLUME = 0.05  # sine of the angle of an ink to the plane of the two others, for unmixing
+CELL_AREA_RATIO = 3**0.5 / 4  # area of an equilateral triangle relative to the square on its edge
 
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:
-    """Markers before refinement, how their cells look, and whether the rim proved them as the white cell is hidden."""
+    """A proved warm start.
+
+    Attributes:
+        places: the markers before refinement.
+        cell_levels: (2, C, 3) as in ``CellCheck``; of cells that are not proved, those of the frame before.
+        by_rim: the white cell is hidden, and the rim proved the numbering.
+    """
 
     places: InitialMarkers
     cell_levels: NDArray[np.float64]
     by_rim: bool
 
 
+class AlignedMarkers(NamedTuple):
+    """Predicted markers after their cells were moved onto the image.
+
+    Attributes:
+        xy_px: (M, 2) float64, NaN where the shifts of the cells disagree or are unknown.
+        max_shift: the largest shift of a cell, in edges.
+        edge_px: (M,) float64, the mean edge of the cells at each marker.
+    """
+
+    xy_px: NDArray[np.float64]
+    max_shift: float
+    edge_px: NDArray[np.float64]
+
+
+class VerifiedMarkers(NamedTuple):
+    """The corners of proved cells.
+
+    Attributes:
+        xy_px: (M, 2) float64, NaN where no proved cell has a corner.
+        verified_count, cell_count: (M,) int64, number of proved cells and of all cells that meet at each marker.
+    """
+
+    xy_px: NDArray[np.float64]
+    verified_count: NDArray[np.int64]
+    cell_count: NDArray[np.int64]
+
+
 @compiled
-def _count_matching_centers(image, xy, corners, ink, tint, nearest):  # type: ignore[no-untyped-def]
-    """How many cells are in view, and how many of their middles are closer to their own ink than to the other two."""
+def _count_matching_centers(image, xy, corners, ink, levels, nearest):  # type: ignore[no-untyped-def]
+    """Number of cells in view, and of those whose middle matches their own ink better than the two others."""
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     color = np.zeros(3)
-    seen, right = 0, 0
+    visible, matching = 0, 0
     for i in range(corners.shape[0]):
         a, b, c = xy[corners[i, 0]], xy[corners[i, 1]], xy[corners[i, 2]]
         x, y = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        if not fill_patch_mean(flat, height, width, x, y, 0.5, color):  # NaN is outside, too
+        if not fill_patch_mean(flat, height, width, x, y, 0.5, color):  # outside the image, or NaN
             continue
-        seen += 1
+        visible += 1
         best, best_score = 0, -np.inf
         for k in range(3):
-            other = tint[nearest[i, k]]
+            other = levels[nearest[i, k]]
             norm = np.sqrt(other[0] ** 2 + other[1] ** 2 + other[2] ** 2)
             low = min(color[0], color[1], color[2])
             score = other[0] * (color[0] - low) + other[1] * (color[1] - low) + other[2] * (color[2] - low)
             if score / norm > best_score:
                 best, best_score = k + 1, score / norm
-        own = tint[i]
-        if best == ink[i] and best_score > MIN_CENTER_STRENGTH * np.sqrt(
-            own[0] ** 2 + own[1] ** 2 + own[2] ** 2
-        ):
-            right += 1
-    return seen, right
+        own = levels[i]
+        own_norm = np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+        if best == ink[i] and best_score > MIN_CENTER_STRENGTH * own_norm:
+            matching += 1
+    return visible, matching
 
 
 @compiled
 def _fill_unmixing_weights(own, first, second, row):  # type: ignore[no-untyped-def]
-    """Write the weights of the channels that give 1 for an ink, -1 for the two others, 0 for black; False without."""
+    """Write the weights (3,) of the channels that give 1 for an ink, -1 for the two others and 0 for black.
+
+    Returns:
+        False where the three inks are nearly coplanar.
+    """
     normal = np.empty(3)
     row[:] = 0.0
     for n in range(3):
@@ -98,56 +131,64 @@ def _fill_unmixing_weights(own, first, second, row):  # type: ignore[no-untyped-
 
 
 @compiled
-def _measure_shifts(image, xy, corners, ink, nearest, look):  # type: ignore[no-untyped-def]
-    """(C, 2) from each cell's predicted middle to the middle of its ink nearby, NaN where there is too little.
+def _measure_shifts(image, xy, corners, ink, nearest, levels):  # type: ignore[no-untyped-def]
+    """(C, 2) px from each cell's predicted middle to the centroid of its ink nearby, NaN where there is too little ink.
 
-    The ink is unmixed from the two others, whose cells touch this one's corners, and from white, which shows all three.
-    The window is what a disc in an equilateral cell becomes as the cell is sheared to its corners.
+    The ink is unmixed from the two others, whose cells touch this cell's corners, and from white, which shows all
+    three. The window is the ellipse that a disc in an equilateral cell becomes when the cell is sheared to its corners.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     shift = np.full((corners.shape[0], 2), np.nan)
     row, sums = np.zeros(3), np.zeros(3)
     for i in range(corners.shape[0]):
         a, b, c = xy[corners[i, 0]], xy[corners[i, 1]], xy[corners[i, 2]]
-        first = look[0, nearest[i, (ink[i] + 0) % 3]]
-        second = look[0, nearest[i, (ink[i] + 1) % 3]]
-        if not _fill_unmixing_weights(look[0, i], first, second, row):
+        first = levels[0, nearest[i, (ink[i] + 0) % 3]]
+        second = levels[0, nearest[i, (ink[i] + 1) % 3]]
+        if not _fill_unmixing_weights(levels[0, i], first, second, row):
             continue
-        zero = dot3(row, look[1, i])
+        zero = dot3(row, levels[1, i])
         cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        # axes of the ellipse: a unit along and across the edge a-b of the equilateral cell
+        # images of the unit vectors along and across the edge a-b of the equilateral cell: the ellipse's axes
         ux, uy = b[0] - a[0], b[1] - a[1]
         vx, vy = (c[0] - a[0] - 0.5 * ux) / 0.75**0.5, (c[1] - a[1] - 0.5 * uy) / 0.75**0.5
         area = ux * vy - uy * vx
         if not abs(area) > 1.0:
             continue
-        high, lean = uy * uy + vy * vy, ux * uy + vx * vy
-        top = SEARCH_RADIUS * np.sqrt(high)
+        yy, xy_moment = uy * uy + vy * vy, ux * uy + vx * vy
+        half_height = SEARCH_RADIUS * np.sqrt(yy)
         sums[:] = 0.0
-        every = max(int(2.0 * top / MIN_ROWS), 1)
-        for y in range(max(int(np.ceil(cy - top)), 0), min(int(np.floor(cy + top)), height - 1) + 1, every):
-            off = (y - cy) / high
-            half = abs(area) * np.sqrt(max(SEARCH_RADIUS * SEARCH_RADIUS / high - off * off, 0.0))
-            start = max(int(np.ceil(cx + lean * off - half)), 0)
-            end = min(int(np.floor(cx + lean * off + half)), width - 1)
+        row_step = max(int(2.0 * half_height / MIN_ROWS), 1)
+        top, bottom = max(int(np.ceil(cy - half_height)), 0), min(int(np.floor(cy + half_height)), height - 1)
+        for y in range(top, bottom + 1, row_step):
+            offset = (y - cy) / yy
+            half_width = abs(area) * np.sqrt(max(SEARCH_RADIUS * SEARCH_RADIUS / yy - offset * offset, 0.0))
+            start = max(int(np.ceil(cx + xy_moment * offset - half_width)), 0)
+            end = min(int(np.floor(cx + xy_moment * offset + half_width)), width - 1)
             if start <= end:
                 line = flat[3 * (y * width + start) : 3 * (y * width + end + 1)]
-                _add_ink_moments(line, start - cx, y - cy, row[0], row[1], row[2], zero, sums)
-        if every * sums[0] > MIN_INK_SHARE * CELL_AREA_RATIO * abs(area):
+                _add_ink_moments(line, start - cx, y - cy, row, zero, sums)
+        if row_step * sums[0] > MIN_INK_SHARE * CELL_AREA_RATIO * abs(area):
             shift[i, 0], shift[i, 1] = sums[1] / sums[0], sums[2] / sums[0]
     return shift
 
 
 @vectorized
-def _add_ink_moments(line, x, y, red, green, blue, zero, sums):  # type: ignore[no-untyped-def]
-    """Add the ink of a row of pixels, the first at (x, y), and its moments."""
+def _add_ink_moments(line, x, y, weights, zero, sums):  # type: ignore[no-untyped-def]
+    """Add the area and the first moments in x and y of the ink in a row of pixels.
+
+    Args:
+        line: (3 N,) uint8, the pixels; the first one lies at (x, y).
+        weights, zero: the ink of a pixel is the weighted sum of its channels minus ``zero``.
+        sums: (3,) area and moments.
+    """
+    w0, w1, w2 = weights[0], weights[1], weights[2]
     total, moment = 0.0, 0.0
     for k in range(np.uint64(line.shape[0] // 3)):
-        at = np.uint64(3) * k
-        f = red * line[at] + green * line[at + np.uint64(1)] + blue * line[at + np.uint64(2)] - zero
-        f = min(f, 1.0) * (f > MIN_PIXEL_INK)
-        total += f
-        moment += f * k
+        i = np.uint64(3) * k
+        share = w0 * line[i] + w1 * line[i + np.uint64(1)] + w2 * line[i + np.uint64(2)] - zero
+        share = min(share, 1.0) * (share > MIN_PIXEL_INK)
+        total += share
+        moment += share * k
     sums[0] += total
     sums[1] += moment + total * x
     sums[2] += total * y
@@ -155,9 +196,9 @@ def _add_ink_moments(line, x, y, red, green, blue, zero, sums):  # type: ignore[
 
 @compiled
 def _update_shifts_and_move_markers(xy, shift, corners):  # type: ignore[no-untyped-def]
-    """The markers (M, 2) moved by their cells' mean shift, NaN where these disagree; the largest shift in edges."""
+    """The ``AlignedMarkers`` after the mean shift of their cells; too large shifts (C, 2) become NaN."""
     count = xy.shape[0]
-    total, members, edge = np.zeros((count, 2)), np.zeros(count), np.zeros(count)
+    total, cell_count, edge = np.zeros((count, 2)), np.zeros(count), np.zeros(count)
     largest = 0.0
     for i in range(corners.shape[0]):
         if not np.isfinite(shift[i, 0]):
@@ -167,34 +208,34 @@ def _update_shifts_and_move_markers(xy, shift, corners):  # type: ignore[no-unty
             (b[0] - c[0]) ** 2 + (b[1] - c[1]) ** 2
         )
         size = (size + np.sqrt((c[0] - a[0]) ** 2 + (c[1] - a[1]) ** 2)) / 3
-        far = np.sqrt(shift[i, 0] ** 2 + shift[i, 1] ** 2) / size
-        if far > MAX_SHIFT:
+        distance = np.sqrt(shift[i, 0] ** 2 + shift[i, 1] ** 2) / size
+        if distance > MAX_SHIFT:
             shift[i] = np.nan
             continue
-        largest = max(largest, far)
+        largest = max(largest, distance)
         for k in range(3):
             m = corners[i, k]
             total[m] += shift[i]
             edge[m] += size
-            members[m] += 1.0
+            cell_count[m] += 1.0
     moved = np.full((count, 2), np.nan)
     for m in range(count):
-        if members[m] > 0.0:
-            moved[m] = xy[m] + total[m] / members[m]
+        if cell_count[m] > 0.0:
+            moved[m] = xy[m] + total[m] / cell_count[m]
     for i in range(corners.shape[0]):
         for k in range(3):
             m = corners[i, k]
             if np.isfinite(shift[i, 0]) and np.isfinite(moved[m, 0]):
                 dx, dy = shift[i, 0] - (moved[m, 0] - xy[m, 0]), shift[i, 1] - (moved[m, 1] - xy[m, 1])
-                if dx * dx + dy * dy > (MAX_SPREAD * edge[m] / members[m]) ** 2:
+                if dx * dx + dy * dy > (MAX_SPREAD * edge[m] / cell_count[m]) ** 2:
                     moved[m] = np.nan
-    return moved, largest, edge / np.maximum(members, 1.0)
+    return AlignedMarkers(moved, largest, edge / np.maximum(cell_count, 1.0))
 
 
 @compiled
 def _connected_cells(verdict, first, known, corners, cells_of_marker):  # type: ignore[no-untyped-def]
-    """Which right cells hang together with the ``first`` ones over common markers, and whether they are nearly all of
-    those in view whose markers were ``known``."""
+    """(C,) bool, the confirmed cells that are connected to the ``first`` ones (C,) over common markers; and whether
+    they are nearly all of the cells in view whose markers were ``known`` (M,)."""
     count = corners.shape[0]
     reached = first & (verdict == CONFIRMED)
     queue = np.empty(count, np.int64)
@@ -207,98 +248,112 @@ def _connected_cells(verdict, first, known, corners, cells_of_marker):  # type: 
         i = queue[head]
         head += 1
         for k in range(3):
-            for near in range(3):
-                j = cells_of_marker[corners[i, k], near]
+            for n in range(3):
+                j = cells_of_marker[corners[i, k], n]
                 if j >= 0 and verdict[j] == CONFIRMED and not reached[j]:
                     reached[j] = True
                     queue[tail] = j
                     tail += 1
-    expected, met = 0, 0
+    expected, found = 0, 0
     for i in range(count):
         if verdict[i] != UNSEEN and known[corners[i, 0]] and known[corners[i, 1]] and known[corners[i, 2]]:
             expected += 1
-            met += reached[i]
-    return reached, tail > 0 and met >= MIN_VERIFIED_SHARE * expected
+            found += reached[i]
+    return reached, tail > 0 and found >= MIN_VERIFIED_SHARE * expected
 
 
 @compiled
 def _verified_markers(xy, proved, corners):  # type: ignore[no-untyped-def]
-    """(M, 2) the corners of proved cells, the others NaN; how many proved cells, and how many at all, meet there."""
+    """The ``VerifiedMarkers`` of the cells ``proved`` (C,) bool."""
     kept = np.full(xy.shape, np.nan)
-    there, meeting = np.zeros(xy.shape[0], np.int64), np.zeros(xy.shape[0], np.int64)
+    verified_count, cell_count = np.zeros(xy.shape[0], np.int64), np.zeros(xy.shape[0], np.int64)
     for i in range(corners.shape[0]):
         for k in range(3):
             m = corners[i, k]
-            meeting[m] += 1
+            cell_count[m] += 1
             if proved[i]:
-                there[m] += 1
+                verified_count[m] += 1
                 kept[m] = xy[m]
-    return kept, there, meeting
+    return VerifiedMarkers(kept, verified_count, cell_count)
 
 
 def select_prediction(
     image: NDArray[np.uint8],
-    guesses: list[NDArray[np.float64]],
+    candidates: list[NDArray[np.float64]],
     tables: WarmTables,
-    look: NDArray[np.float64],
+    levels_before: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
-    """The guess (M, 2) under which the most cells show their ink in their middle; None when too few do."""
+    """The candidate under which the most cells show their ink in their middle; None when too few do.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        candidates: (M, 2) predicted markers each, px.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
+    """
     best, best_share = None, MIN_PREDICTED
-    for guess in guesses:
-        seen, right = _count_matching_centers(
-            image, guess, tables.corners, tables.ink, look[0], tables.nearest
+    for candidate in candidates:
+        visible, matching = _count_matching_centers(
+            image, candidate, tables.corners, tables.ink, levels_before[0], tables.nearest
         )
-        if right > best_share * seen:
-            best, best_share = guess, right / seen
-            if right == seen:
+        if matching > best_share * visible:
+            best, best_share = candidate, matching / visible
+            if matching == visible:
                 break
     return best
 
 
 def verify_prediction(
-    view: PyramidLevel,
+    level: PyramidLevel,
     predicted_px: NDArray[np.float64],
     known: NDArray[np.bool_],
     tables: WarmTables,
-    look: NDArray[np.float64],
+    levels_before: NDArray[np.float64],
 ) -> WarmStart | None:
-    """Move the predicted cells onto the image; None unless enough of them are proved to be what they should.
+    """Move the predicted cells onto the image; None unless the image confirms enough of them.
 
     Args:
-        view: the image at the scale at which it is looked at.
-        predicted_px: (M, 2) in the view, NaN where nothing is predicted.
-        known: (M,) markers that the frame before had; cells of these in view are what must be found again.
-        look: (2, C, 3) each cell's ink minus black and black in the frame before.
+        level: the image at the scale of the check.
+        predicted_px: (M, 2) in this level, NaN where not predicted.
+        known: (M,) bool, markers of the frame before; nearly all of their cells in view must be confirmed.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
     """
-    xy, edge_px = _align_to_inks(view.image, predicted_px, tables, look)
-    proof = check_cells(view.image, xy[tables.corners], tables, look)
-    by_rim = proof.white == 0
-    if proof.white_elsewhere_count >= MIN_WHITE_EDGES:
+    aligned = _align_to_inks(level.image, predicted_px, tables, levels_before)
+    check = check_cells(level.image, aligned.xy_px[tables.corners], tables, levels_before)
+    by_rim = check.white_count == 0
+    if check.white_elsewhere_count >= MIN_WHITE_EDGES:
         return None
-    if by_rim and (proof.verdict[tables.rim] != CONFIRMED).any():
+    if by_rim and (check.verdict[tables.is_rim] != CONFIRMED).any():
         return None
-    if not by_rim and (proof.white < MIN_WHITE_EDGES or proof.white_missing_count > 0):
+    if not by_rim and (check.white_count < MIN_WHITE_EDGES or check.white_missing_count > 0):
         return None
-    proved, enough = _connected_cells(
-        proof.verdict, tables.rim if by_rim else tables.white, known, tables.corners, tables.cells_of_marker
-    )
+    first = tables.is_rim if by_rim else tables.is_at_white
+    proved, enough = _connected_cells(check.verdict, first, known, tables.corners, tables.cells_of_marker)
     if not enough:
         return None
-    kept, there, meeting = _verified_markers(xy, proved, tables.corners)
-    now = np.where(proved[:, None], proof.cell_levels, look)
-    size = view.to_full_scale(kept), edge_px * view.scale
-    return WarmStart(
-        InitialMarkers(*size, tables.corners[proved], *corner_agreement(there, meeting)), now, by_rim
+    verified: VerifiedMarkers = _verified_markers(aligned.xy_px, proved, tables.corners)
+    agreement = corner_agreement(verified.verified_count, verified.cell_count)
+    places = InitialMarkers(
+        level.to_full_scale(verified.xy_px),
+        aligned.edge_px * level.scale,
+        tables.corners[proved],
+        *agreement,
     )
+    return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)
 
 
 def _align_to_inks(
-    image: NDArray[np.uint8], predicted_px: NDArray[np.float64], tables: WarmTables, look: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The markers (M, 2) where their cells' inks are, and the edges (M,) around them."""
+    image: NDArray[np.uint8],
+    predicted_px: NDArray[np.float64],
+    tables: WarmTables,
+    levels_before: NDArray[np.float64],
+) -> AlignedMarkers:
+    """The markers (M, 2) moved to where the inks of their cells are, in at most two passes."""
     for _ in range(2):
-        shift = _measure_shifts(image, predicted_px, tables.corners, tables.ink, tables.nearest, look)
-        predicted_px, largest, edge_px = _update_shifts_and_move_markers(predicted_px, shift, tables.corners)
-        if largest < LARGE_SHIFT:
+        shift = _measure_shifts(
+            image, predicted_px, tables.corners, tables.ink, tables.nearest, levels_before
+        )
+        aligned: AlignedMarkers = _update_shifts_and_move_markers(predicted_px, shift, tables.corners)
+        if aligned.max_shift < LARGE_SHIFT:
             break
-    return predicted_px, edge_px
+        predicted_px = aligned.xy_px
+    return aligned
