@@ -1,20 +1,20 @@
 """One view of a sensor: a pinhole with OpenCV's distortion, direct or through mirrors, and its exact inverse.
 
 Camera frame: x right, y down, z forward; x_camera = R x_layout + t. An odd number of mirrors between the pattern and
-the camera makes det R = -1: such a view is the picture of a camera that does not exist, drawn the other way around.
+the camera makes det R = -1: such a view is the mirrored picture of a virtual camera.
 Distortion (k1, k2, p1, p2, k3) acts on normalised coordinates x = X / Z, y = Y / Z, r^2 = x^2 + y^2:
 
     x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
     y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
 
-Beyond the radius at which the radial part turns back, the model means nothing: points there have no picture.
+The model is valid up to the fold radius, at which the radial part turns back. Points beyond it have no picture.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,23 +24,49 @@ from extractor.errors import RigError
 Array = NDArray[np.float64]
 
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
-MAX_ITERATIONS = 60
-CONVERGED = 1e-13  # of normalised coordinates: far below what a pixel tells
-MAX_HALVINGS = 12
+MAX_ITERATIONS = 60  # of Newton's method
+CONVERGED = 1e-13  # error in normalised coordinates, far below the accuracy of a pixel
+ACCEPTED = 1e-9  # error in normalised coordinates above which a point has no inverse
+MAX_HALVINGS = 12  # of a Newton step
 MAX_ORTHONORMALITY_ERROR = 1e-6  # of R R^T from the identity
+
+
+class Distortion(NamedTuple):
+    """The coefficients of OpenCV's distortion, see the module."""
+
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+    k3: float
+
+
+class Linearisation(NamedTuple):
+    """Projected points and their derivatives; NaN where a point has no picture.
+
+    Attributes:
+        xy_px: (N, 2) float64, in the frame of the full image.
+        by_point: (N, 2, 3) float64, px/mm, by the point in the layout frame.
+        by_pose: (N, 2, 6) float64, by the pose: a turn (rad) of the pattern about the layout's origin along the
+            camera's axes, then a shift (mm) along these axes.
+    """
+
+    xy_px: Array
+    by_point: Array
+    by_pose: Array
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera's picture of the pattern, or the part of it that fills an area of the image.
+    """A camera's picture of the pattern, which fills the image or an area of it.
 
     Attributes:
         name: for messages and files.
         focal_px: (fx, fy).
         centre_px: (cx, cy), the principal point, in the frame of the full image.
         distortion: (k1, k2, p1, p2, k3).
-        area_px: (x, y, width, height) of the part of the image that this view fills; None: all of it.
-        mirrored: an odd number of mirrors between the pattern and the camera; None: as R says, else False.
+        area_px: (x, y, width, height) of the part of the image that this view fills; None: the whole image.
+        mirrored: an odd number of mirrors between the pattern and the camera; None: by det R, False without R.
         R_camera_from_layout: (3, 3) float64, orthonormal, det -1 where mirrored; None: not known.
         t_camera_from_layout_mm: (3,) float64; None: not known.
 
@@ -94,34 +120,35 @@ class View:
             object.__setattr__(self, "area_px", area)
 
     def _check_pose(self, rotation: Array, shift: Array) -> None:
-        where = f"view {self.name!r}: "
+        prefix = f"view {self.name!r}: "
         if rotation.shape != (3, 3) or not np.allclose(
             rotation @ rotation.T, np.eye(3), atol=MAX_ORTHONORMALITY_ERROR
         ):
-            raise RigError(f"{where}R_camera_from_layout is not a 3 x 3 rotation or reflection")
+            raise RigError(f"{prefix}R_camera_from_layout is not a 3 x 3 rotation or reflection")
         if shift.shape != (3,) or not np.isfinite(shift).all():
-            raise RigError(f"{where}t_camera_from_layout_mm is {shift}; expected 3 finite numbers")
+            raise RigError(f"{prefix}t_camera_from_layout_mm is {shift}; expected 3 finite numbers")
         if self.mirrored is not None and bool(self.mirrored) != (np.linalg.det(rotation) < 0):
             raise RigError(
-                f"{where}mirrored is {str(bool(self.mirrored)).lower()}, but det R is {np.linalg.det(rotation):+.0f}; "
+                f"{prefix}mirrored is {str(bool(self.mirrored)).lower()}, but det R is {np.linalg.det(rotation):+.0f}; "
                 "an odd number of mirrors means -1"
             )
 
     @property
     def placed(self) -> bool:
-        """Its pose is known."""
+        """Whether the pose is known."""
         return self.R_camera_from_layout is not None
 
     @property
     def position_mm(self) -> Array:
-        """(3,) where the camera, or its mirror image, stands in the layout frame."""
+        """(3,) float64, the position of the camera, or of its mirror image, in the layout frame."""
         return np.asarray(-self.R_camera_from_layout.T @ self.t_camera_from_layout_mm)
 
     @cached_property
     def fold_radius(self) -> float:
-        """The normalised radius at which the radial distortion turns back; infinite where it never does."""
-        k1, k2, _, _, k3 = self.distortion
-        inverse_squares = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])  # of the radius: weak ones do not overflow
+        """The normalised radius at which the radial distortion turns back; infinite without one."""
+        k = Distortion(*self.distortion)
+        # roots in 1 / r^2, so that weak coefficients do not overflow
+        inverse_squares = np.roots([1.0, 3 * k.k1, 5 * k.k2, 7 * k.k3])
         real = inverse_squares.real[abs(inverse_squares.imag) <= 1e-9 * abs(inverse_squares)]
         largest = float(real.max(initial=0.0))
         return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
@@ -131,137 +158,149 @@ class View:
         return replace(self, mirrored=None, R_camera_from_layout=rotation, t_camera_from_layout_mm=shift)
 
     def project(self, xyz_mm: Array) -> Array:
-        """(N, 2) px of (N, 3) mm of the layout frame; NaN behind the camera or where the model turns back."""
-        return self.linearised(xyz_mm)[0]
+        """(N, 2) px of points (N, 3) mm in the layout frame; NaN behind the camera and beyond the fold radius."""
+        return self.linearised(xyz_mm).xy_px
 
-    def linearised(self, xyz_mm: Array) -> tuple[Array, Array, Array]:
-        """Pictures of points and how they move.
-
-        Returns:
-            (N, 2) px; (N, 2, 3) px/mm by the point; (N, 2, 6) by the pose: a turn (rad) of the pattern about the
-            layout's origin along the camera's axes, then a shift (mm) along them. NaN where there is no picture.
-        """
-        turned = xyz_mm @ self.R_camera_from_layout.T
-        camera = turned + self.t_camera_from_layout_mm
+    def linearised(self, xyz_mm: Array) -> Linearisation:
+        """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
+        rotated = xyz_mm @ self.R_camera_from_layout.T
+        camera = rotated + self.t_camera_from_layout_mm
         depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
-        plain = camera[:, :2] / depth[:, None]
-        plain[np.hypot(*plain.T) >= self.fold_radius] = np.nan
-        bent, by_plain = distort_points(plain, self.distortion)
-        by_camera = np.zeros((len(plain), 2, 3))
+        normalised = camera[:, :2] / depth[:, None]
+        normalised[np.hypot(*normalised.T) >= self.fold_radius] = np.nan
+        distorted, by_normalised = distort_points(normalised, self.distortion)
+        by_camera = np.zeros((len(normalised), 2, 3))
         by_camera[:, 0, 0] = by_camera[:, 1, 1] = 1 / depth
-        by_camera[:, :, 2] = -plain / depth[:, None]
-        by_camera = np.array(self.focal_px)[:, None] * (by_plain @ by_camera)
-        by_pose = np.concatenate([by_camera @ -cross_matrix(turned), by_camera], axis=2)
-        xy_px = bent * self.focal_px + self.centre_px
-        return xy_px, by_camera @ self.R_camera_from_layout, by_pose
+        by_camera[:, :, 2] = -normalised / depth[:, None]
+        by_camera = np.array(self.focal_px)[:, None] * (by_normalised @ by_camera)
+        by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
+        xy_px = distorted * self.focal_px + self.centre_px
+        return Linearisation(xy_px, by_camera @ self.R_camera_from_layout, by_pose)
 
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""
-        bent = np.asarray((xy_px - self.centre_px) / self.focal_px)
-        return undistort_points(bent, self.distortion, self.fold_radius)
+        distorted = np.asarray((xy_px - self.centre_px) / self.focal_px)
+        return undistort_points(distorted, self.distortion, self.fold_radius)
 
     def rays(self, xy_px: Array) -> Array:
-        """(N, 3) unit directions in the layout frame, from the camera through pixels (N, 2); NaN as above."""
-        plain = self.normalised(xy_px)
-        along = np.column_stack([plain, np.ones(len(plain))]) @ self.R_camera_from_layout
-        return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+        """(N, 3) unit vectors in the layout frame, from the camera through pixels (N, 2); NaN as ``normalised``."""
+        normalised = self.normalised(xy_px)
+        direction = np.column_stack([normalised, np.ones(len(normalised))]) @ self.R_camera_from_layout
+        return np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
 
 
 def is_finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
-    """Where all numbers along the last axes are finite."""
+    """Whether all numbers along this number of last axes are finite."""
     return np.asarray(np.isfinite(values).all(axis=tuple(range(-axes, 0))))
 
 
 def is_covariance(cov_px2: Array) -> NDArray[np.bool_]:
-    """Which (..., 2, 2) are finite and positive definite; a pixel whose covariance is not is taken for unseen."""
+    """(...,) bool, which matrices (..., 2, 2) are finite and positive definite; pixels with others count as unseen."""
     safe = np.where(is_finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
     determinant = safe[..., 0, 0] * safe[..., 1, 1] - safe[..., 0, 1] * safe[..., 1, 0]
     return np.asarray((safe[..., 0, 0] > 0) & (determinant > 0))
 
 
 def cross_matrix(vectors: Array) -> Array:
-    """(N, 3, 3): the matrices that multiply a vector like a cross product from the left."""
+    """(N, 3, 3) the matrices [v]x of vectors (N, 3): [v]x w is the cross product of v and w."""
     out = np.zeros((len(vectors), 3, 3))
     out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = vectors.T
     out[:, 1, 2], out[:, 2, 0], out[:, 0, 1] = -vectors.T
     return out
 
 
-def distort_points(plain: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
-    """(N, 2) distorted normalised coordinates and (N, 2, 2) their derivatives by the plain ones."""
-    k1, k2, p1, p2, k3 = distortion
-    x, y = plain.T
+def distort_points(normalised: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
+    """(N, 2) distorted coordinates of undistorted ones (N, 2), and their derivatives (N, 2, 2).
+
+    Args:
+        normalised: X / Z, Y / Z.
+        distortion: (k1, k2, p1, p2, k3).
+    """
+    k = Distortion(*distortion)
+    p1, p2 = k.p1, k.p2
+    x, y = normalised.T
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r^2, twice
-    bent = np.column_stack(
+    radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))
+    slope = 2 * (k.k1 + r2 * (2 * k.k2 + r2 * 3 * k.k3))  # 2 d radial / d r^2
+    distorted = np.column_stack(
         [
             x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
         ]
     )
-    by_plain = np.empty((len(plain), 2, 2))
-    by_plain[:, 0, 0] = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
-    by_plain[:, 1, 1] = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-    by_plain[:, 0, 1] = by_plain[:, 1, 0] = slope * x * y + 2 * p1 * x + 2 * p2 * y
-    return bent, by_plain
+    derivatives = np.empty((len(normalised), 2, 2))
+    derivatives[:, 0, 0] = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
+    derivatives[:, 1, 1] = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
+    derivatives[:, 0, 1] = derivatives[:, 1, 0] = slope * x * y + 2 * p1 * x + 2 * p2 * y
+    return distorted, derivatives
 
 
-def undistort_points(bent: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
-    """(N, 2) plain normalised coordinates, by damped Newton steps to 1e-13; NaN where there are none.
+def undistort_points(distorted: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
+    """(N, 2) undistorted coordinates of distorted ones (N, 2), by damped Newton steps to 1e-13; NaN without an inverse.
 
-    A fixed-point iteration, as is common, diverges at strong distortion and does not say so. Here a result is inside
-    the radius at which the model turns back and is carried onto the input again, or it is NaN.
+    The usual fixed-point iteration diverges at strong distortion without notice. A result of this function lies within
+    the fold radius and is mapped onto the input again.
     """
     if not any(distortion):
-        return bent.copy()
-    radius = np.hypot(*bent.T)
+        return distorted.copy()
+    radius = np.hypot(*distorted.T)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        plain = bent * np.minimum(1.0, 0.9 * fold_radius / radius)[:, None]
-    plain[radius == 0] = 0.0
-    error = np.full(len(bent), np.inf)
+        normalised = distorted * np.minimum(1.0, 0.9 * fold_radius / radius)[:, None]
+    normalised[radius == 0] = 0.0
+    error = np.full(len(distorted), np.inf)
     for _ in range(MAX_ITERATIONS):
-        there, by_plain = distort_points(plain, distortion)
-        away = bent - there
-        error = np.hypot(*away.T)
-        todo = np.flatnonzero(error > CONVERGED * (1 + radius))
-        if not len(todo):
+        predicted, derivatives = distort_points(normalised, distortion)
+        residual = distorted - predicted
+        error = np.hypot(*residual.T)
+        active = np.flatnonzero(error > CONVERGED * (1 + radius))
+        if not len(active):
             break
-        moved = _damped_newton_step(
-            plain[todo], bent[todo], away[todo], by_plain[todo], distortion, fold_radius
+        step = _newton_step(residual[active], derivatives[active])
+        moved = _damped_step(
+            normalised[active], step, distorted[active], error[active], distortion, fold_radius
         )
-        if np.array_equal(moved, plain[todo], equal_nan=True):
+        if np.array_equal(moved, normalised[active], equal_nan=True):
             break
-        plain[todo] = moved
-    _, by_plain = distort_points(plain, distortion)
-    good = np.asarray((error < 1e-9 * (1 + radius)) & (np.hypot(*plain.T) < fold_radius))
-    good &= np.linalg.det(np.where(np.isfinite(by_plain), by_plain, 0.0)) > 0
-    plain[~good] = np.nan
-    return np.asarray(plain)
+        normalised[active] = moved
+    _, derivatives = distort_points(normalised, distortion)
+    valid = np.asarray((error < ACCEPTED * (1 + radius)) & (np.hypot(*normalised.T) < fold_radius))
+    valid &= np.linalg.det(np.where(np.isfinite(derivatives), derivatives, 0.0)) > 0
+    normalised[~valid] = np.nan
+    return np.asarray(normalised)
 
 
-def _damped_newton_step(
-    plain: Array,
-    bent: Array,
-    away: Array,
-    by_plain: Array,
+def _newton_step(residual: Array, derivatives: Array) -> Array:
+    """(N, 2) solutions of 2 x 2 systems (N, 2, 2) for residuals (N, 2); not finite where singular."""
+    (a, b), (c, d) = derivatives.transpose(1, 2, 0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        step = np.column_stack(
+            [d * residual[:, 0] - b * residual[:, 1], a * residual[:, 1] - c * residual[:, 0]]
+        )
+        step /= (a * d - b * c)[:, None]
+    return step
+
+
+def _damped_step(
+    start: Array,
+    step: Array,
+    distorted: Array,
+    error: Array,
     distortion: tuple[float, ...],
     fold_radius: float,
 ) -> Array:
-    """A Newton step, halved until it stays inside the model and the error gets smaller; else none."""
-    (a, b), (c, d) = by_plain.transpose(1, 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = np.column_stack([d * away[:, 0] - b * away[:, 1], a * away[:, 1] - c * away[:, 0]])
-        step /= (a * d - b * c)[:, None]
-    out, error = plain.copy(), np.hypot(*away.T)
+    """(N, 2) points after their steps, each halved until its ``error`` (N,) decreases within the fold radius.
+
+    Points whose error does not decrease keep their place.
+    """
+    moved = start.copy()
     waiting = np.isfinite(step).all(axis=1)
     for _ in range(MAX_HALVINGS):
-        tried = plain + step
-        better = np.hypot(*(bent - distort_points(tried, distortion)[0]).T) < error
+        tried = start + step
+        better = np.hypot(*(distorted - distort_points(tried, distortion)[0]).T) < error
         better &= waiting & (np.hypot(*tried.T) < fold_radius)
-        out[better] = tried[better]
+        moved[better] = tried[better]
         waiting &= ~better
         if not waiting.any():
             break
-        step *= 0.5
-    return out
+        step = 0.5 * step
+    return moved

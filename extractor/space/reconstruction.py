@@ -1,7 +1,7 @@
 """From the markers of two or more views to the surface in space: positions, displacements, normals, covariances.
 
-Everything is in mm of the layout frame: x right, y up, z out of the front. The views are placed once, by the markers at
-rest; each frame is then reconstructed by itself, so nothing drifts.
+All results are in mm of the layout frame: x right, y up, z out of the front. The views' poses are estimated once, from
+the markers at rest; each frame is then reconstructed by itself, so nothing drifts.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import GATE_SIGMAS, INFLATION_SIGMAS, PointReason, Points, triangulate
 
-MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position, above which it is not reported
-NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers, above which it is not chance
-MIN_REST_MARKERS = 3  # markers that must have a place at rest
+MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges
+NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated
+MIN_REST_MARKERS = 3  # markers that must have a position at rest
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """The surface in one frame, in mm of the layout frame; NaN where unknown.
+    """The surface in one frame, in mm of the layout frame; NaN where unknown. Can be pickled and copied.
 
     Attributes:
         xyz_mm: (M, 3) float64, the markers by id.
-        cov_mm2: (M, 3, 3) float64: of the pixels' noise, of what the camera model leaves open, and of the poses. The
-            last part is common to all markers.
-        displacement_mm: (M, 3) float64 from the rest frame.
+        cov_mm2: (M, 3, 3) float64, of the pixels' noise, of the error of the camera model, and of the poses. The last
+            part is common to all markers.
+        displacement_mm: (M, 3) float64, from the rest frame.
         displacement_cov_mm2: (M, 3, 3) float64; errors of the poses that both frames share cancel.
         normals: (M, 3) float64, unit vectors out of the front.
-        status: (M,) uint8, a ``Status`` each: the lesser of the views'.
+        status: (M,) uint8, a ``Status`` each: the weakest one of the views'.
         reason: (M,) uint8, a ``PointReason`` each: why a marker has no position.
-        misfit: (M,) float64: by how many of its standard deviations the rays miss each other; also of markers that
-            are not reported for that.
+        misfit: (M,) float64, the distance by which the rays miss each other, in standard deviations; also of markers
+            that are not reported for this reason.
         virtual_xyz_mm, virtual_displacement_mm, virtual_normals: (E, m, 3) float64, on the smooth surface through
             the markers, by edge from its smaller id.
         virtual_cov_mm2: (E, m, 3, 3) float64.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
-        problem: which views show nothing, and why; empty where all show the pattern.
+        problem: which views show nothing, and why; empty where all views show the pattern.
     """
 
     xyz_mm: Array
@@ -77,7 +77,7 @@ class Shape:
 
 
 class Reconstructor:
-    """Turns each frame's markers into a ``Shape``.
+    """Reconstructs a ``Shape`` from each frame's markers. Can be pickled and copied.
 
     >>> from extractor import Reconstructor, ViewExtractor, load_layout, load_rig
     >>> views = ViewExtractor(load_layout("layout.json"), load_rig("rig.toml"))  # doctest: +SKIP
@@ -86,22 +86,22 @@ class Reconstructor:
 
     Args:
         layout: any pattern.
-        rig: two views or more; those without a pose are placed by the markers at rest.
-        rest: the markers at rest, view by view; None: all poses are the rig's, and displacement is counted from the
+        rig: two views or more; poses that are not given are estimated from the markers at rest.
+        rest: the markers at rest, view by view; None: all poses are the rig's, and displacement is measured from the
             layout's plane.
-        flatness_mm: standard deviation by which the markers at rest may lie off the layout, one number or (x, y, z).
-            0: the pattern at rest is the layout. Otherwise the views are placed jointly, and a dome is a dome.
-        model_px: what the camera model leaves open, as a standard deviation per axis that is added to the pixels'
-            own; None: what the rest frame's rays miss each other by beyond their covariances.
+        flatness_mm: standard deviation of the markers at rest around the layout, one number or (x, y, z). 0: the
+            pattern at rest is the layout. Otherwise the poses are estimated jointly, and a dome stays a dome.
+        model_px: error of the camera model, as a standard deviation per axis that is added to the pixels' own; None:
+            estimated from the misfit of the rest frame's rays beyond their covariances.
         gate_sigmas: misfit above which a marker is not reported.
         max_sigma_mm: standard deviation of a position above which it is not reported; None: a tenth of an edge.
 
     Attributes:
-        poses: the views in their places, see ``Poses``.
-        rest_xyz_mm: (M, 3) float64, where the markers were at rest.
+        poses: the views with their poses, see ``Poses``.
+        rest_xyz_mm: (M, 3) float64, the markers at rest.
 
     Raises:
-        PoseError: fewer than two views, a view that cannot be placed, or views that do not tell depth.
+        PoseError: fewer than two views, a view whose pose cannot be estimated, or views that give no depth.
     """
 
     def __init__(
@@ -139,20 +139,18 @@ class Reconstructor:
         self._rest_virtual_mm = self._virtual(self.rest_xyz_mm)
 
     def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
-        """The surface that the views show; a view that shows nothing is data, never an exception.
+        """The surface that the views show; a view that shows nothing raises no error.
 
         Args:
-            markers: view by view, in the rig's order and the frame of the full image; None: no picture was had.
+            markers: view by view, in the rig's order and the frame of the full image; None: no image.
         """
         kept, problem = self._select_views(markers)
         points = self._inflated_covariances(self._points(kept))
-        status = np.max(
-            [
-                np.where(_has_position(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
-                for m in kept
-            ],
-            axis=0,
-        )
+        by_view = [
+            np.where(_has_position(m), m.status, 0) if m is not None else np.zeros_like(points.reason)
+            for m in kept
+        ]
+        status = np.max(by_view, axis=0)
         status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
         normals = self.field.normals(points.xyz_mm)
         virtual_mm = self._virtual(points.xyz_mm)
@@ -177,7 +175,7 @@ class Reconstructor:
 
     @property
     def rest_positions_mm(self) -> Array:
-        """(M + E m, 3) float64, where all points were at rest, the virtual ones last."""
+        """(M + E m, 3) float64, the positions of all points at rest, the virtual markers last."""
         return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
 
     def _estimate_poses(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
@@ -227,28 +225,29 @@ class Reconstructor:
         raise PoseError(f"views {names} {says.get(why, 'show no marker in common')}")
 
     def _select_views(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
-        """The views that show the pattern as their pose says, and what is wrong with the others."""
+        """The markers of the views that show the side of the pattern that their pose faces, and the others' problems."""
         self._require_count(markers)
         kept: list[Markers | None] = []
         problems = []
-        for view, seen in zip(self.poses.views, markers, strict=True):
-            why = ""
-            if seen is None:
-                why = "no picture"
-            elif seen.reason is not None:
-                why = str(seen.reason)
-            elif seen.mirrored is not None and seen.mirrored != _appears_mirrored(view):
-                why = "shows the pattern's other side"
-            kept.append(None if why else seen)
-            if why:
-                problems.append(f"{view.name}: {why}")
+        for view, found in zip(self.poses.views, markers, strict=True):
+            problem = ""
+            if found is None:
+                problem = "no picture"
+            elif found.reason is not None:
+                problem = str(found.reason)
+            elif found.mirrored is not None and found.mirrored != _appears_mirrored(view):
+                problem = "shows the pattern's other side"
+            kept.append(None if problem else found)
+            if problem:
+                problems.append(f"{view.name}: {problem}")
         return kept, "; ".join(problems)
 
     def _points(self, markers: Sequence[Markers | None], model_px: float | None = None) -> Points:
+        """The triangulated markers; with ``model_px``, this is the camera model's error and no misfit is rejected."""
         count = len(self.layout.xy_mm)
-        more = np.eye(2) * (self.model_px if model_px is None else model_px) ** 2
+        model_cov = np.eye(2) * (self.model_px if model_px is None else model_px) ** 2
         xy = [np.full((count, 2), np.nan) if m is None else m.xy_px for m in markers]
-        cov = [np.full((count, 2, 2), np.nan) if m is None else m.cov_px2 + more for m in markers]
+        cov = [np.full((count, 2, 2), np.nan) if m is None else m.cov_px2 + model_cov for m in markers]
         return triangulate(
             self.poses.views,
             np.stack(xy),
@@ -259,25 +258,25 @@ class Reconstructor:
         )
 
     def _inflated_covariances(self, points: Points) -> Points:
-        """Covariances where a whole neighbourhood's rays miss each other by more than they should.
+        """The points with larger covariances where the rays of a whole neighbourhood miss each other.
 
-        Under a sharp contact gridlines bend more than extraction can follow, and its covariances do not say so.
+        Under a sharp contact, gridlines bend more than extraction can follow, and its covariances are too small.
         """
-        around = self.field.mean_around(points.misfit**2)
-        more = np.where(around > NEIGHBOURHOOD_SIGMAS**2, around, 1.0)
-        done = np.where(points.misfit > INFLATION_SIGMAS, points.misfit**2, 1.0)
-        factor = np.where(np.isfinite(more), np.maximum(more / done, 1.0), 1.0)
+        nearby = self.field.mean_around(points.misfit**2)
+        wanted = np.where(nearby > NEIGHBOURHOOD_SIGMAS**2, nearby, 1.0)
+        applied = np.where(points.misfit > INFLATION_SIGMAS, points.misfit**2, 1.0)
+        factor = np.where(np.isfinite(wanted), np.maximum(wanted / applied, 1.0), 1.0)
         return replace(points, cov_mm2=points.cov_mm2 * factor[:, None, None])
 
     def _estimate_model_px(self, rest: Sequence[Markers]) -> float:
-        """What the rest frame's rays miss each other by beyond their covariances; those far off do not count."""
+        """The misfit of the rest frame's rays beyond their covariances, px per axis, without outliers."""
         misfit = self._points(rest, 0.0).misfit
         misfit = misfit[np.isfinite(misfit)]
         if len(misfit) < MIN_REST_MARKERS:
             return 0.0
-        usual = misfit[misfit <= GATE_SIGMAS * np.median(misfit)]
+        inliers = misfit[misfit <= GATE_SIGMAS * np.median(misfit)]
         variance = np.mean([np.nanmedian(np.trace(m.cov_px2, axis1=1, axis2=2)) / 2 for m in rest])
-        return float(np.sqrt(max(0.0, np.mean(usual**2) - 1) * variance))
+        return float(np.sqrt(max(0.0, np.mean(inliers**2) - 1) * variance))
 
     def _displacement_cov(self, points: Points) -> Array:
         if self._rest is None:
@@ -286,7 +285,10 @@ class Reconstructor:
         return points.cov_mm2 + self._rest.cov_mm2 + _propagate_covariance(moved, self.poses.cov)
 
     def _virtual(self, xyz_mm: Array) -> Array:
-        """(E, m, 3) on the smooth surface through markers (M, 3); straight where too few neighbours are known."""
+        """(E, m, 3) mm, the virtual markers on the smooth surface through markers (M, 3).
+
+        Where too few neighbours are known, the chord replaces the slope.
+        """
         start, end = self.layout.edges.T
         step = self.layout.xy_mm[end] - self.layout.xy_mm[start]
         slopes = self.field.gradients(xyz_mm)
@@ -301,14 +303,15 @@ class Reconstructor:
         return (np.arange(count) + 1.0) / (count + 1)
 
     def _virtual_cov(self, cov: Array, known: NDArray[np.bool_]) -> Array:
-        """By the shares of the edge's two markers; the directions at the ends add little."""
+        """(E, m, 3, 3) mm^2, from the covariances (M, 3, 3) of the edge's markers, without the slopes at its ends."""
         flat = cov.reshape(len(cov), 9)
         start, end = self.layout.edges.T
         share = 3 * self._fractions**2 - 2 * self._fractions**3
-        squares = (1 - share[:, None]) ** 2 * flat[start, None] + share[:, None] ** 2 * flat[end, None]
-        return np.asarray(np.where(known[..., None, None], squares.reshape(*known.shape, 3, 3), np.nan))
+        virtual = (1 - share[:, None]) ** 2 * flat[start, None] + share[:, None] ** 2 * flat[end, None]
+        return np.asarray(np.where(known[..., None, None], virtual.reshape(*known.shape, 3, 3), np.nan))
 
     def _virtual_normals(self, normals: Array, known: NDArray[np.bool_]) -> Array:
+        """(E, m, 3) unit vectors between the normals (M, 3) of the edge's markers."""
         start, end = self.layout.edges.T
         t = self._fractions[:, None]
         mixed = (1 - t) * normals[start, None] + t * normals[end, None]
@@ -321,15 +324,16 @@ def _has_position(markers: Markers) -> NDArray[np.bool_]:
 
 
 def _appears_mirrored(view: View) -> bool:
-    """The pattern's picture is turned over: seen from the back, or from the front through a mirror."""
+    """Whether the picture of the pattern is mirrored: it shows the back directly, or the front through a mirror."""
     return bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0)
 
 
 def _propagate_covariance(by_pose: Array, cov: Array) -> Array:
+    """(N, 3, 3) covariances J C J^T for derivatives J (N, 3, 6 V) and the poses' covariance C (6 V, 6 V)."""
     return np.asarray(by_pose @ cov @ np.swapaxes(by_pose, 1, 2))
 
 
 def translate_markers(markers: Markers, offset_px: tuple[float, float]) -> Markers:
-    """The same markers in a frame whose origin lies this much further left and up."""
+    """The same markers in a frame whose origin lies this offset (px) further left and up."""
     offset = np.asarray(offset_px, np.float64)
     return replace(markers, xy_px=markers.xy_px + offset, virtual_xy_px=markers.virtual_xy_px + offset)

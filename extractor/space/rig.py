@@ -1,4 +1,4 @@
-"""The rig file: which views a sensor has. TOML, one [[view]] table a view; unknown fields are refused.
+"""The rig file: the views of a sensor. TOML, one [[view]] table for each view; unknown fields are refused.
 
 [[view]]
 name = "left"
@@ -52,17 +52,18 @@ class Rig:
                 )
 
     def without_poses(self) -> Rig:
-        """The same views, to be placed by a rest frame; whether they are mirrored is kept."""
+        """The same views without poses, which a rest frame gives; ``mirrored`` is kept."""
         poseless = {"R_camera_from_layout": None, "t_camera_from_layout_mm": None}
         return Rig(tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The names of the views."""
         return tuple(view.name for view in self.views)
 
 
 def load_rig(path: str | PathLike[str]) -> Rig:
-    """Read and check a rig file; a scene file with [[view]] tables serves, too: its other tables are not read.
+    """Read and check a rig file, or the [[view]] tables of a scene file.
 
     Raises:
         RigError: one line that names the file, the field, the value and what is expected.
@@ -76,7 +77,7 @@ def load_rig(path: str | PathLike[str]) -> Rig:
 
 
 def parse_rig(text: str, name: str = "rig") -> Rig:
-    """The rig in a TOML text; ``name`` opens every error's message.
+    """The rig in a TOML text; every error's message begins with ``name``.
 
     Raises:
         RigError: see ``load_rig``.
@@ -94,28 +95,28 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
 
 
 def _parse_view(table: Mapping[str, Any], index: int) -> View:
-    where = f"view[{index}]."
+    prefix = f"view[{index}]."
     for field in table:
         if field not in KNOWN_FIELDS:
-            _raise_rig_error(where + shown(field), "unknown", f"only the fields {', '.join(KNOWN_FIELDS)}")
+            _raise_rig_error(prefix + shown(field), "unknown", f"only the fields {', '.join(KNOWN_FIELDS)}")
     for field in REQUIRED_FIELDS:
         if field not in table:
-            _raise_rig_error(where + field, "missing", f"{NUMBER_COUNTS[field]} numbers")
+            _raise_rig_error(prefix + field, "missing", f"{NUMBER_COUNTS[field]} numbers")
     values: dict[str, Any] = {
-        field: _parse_numbers(table[field], where + field, count, field == "area_px")
+        field: _parse_numbers(table[field], prefix + field, count, field == "area_px")
         for field, count in NUMBER_COUNTS.items()
         if field in table
     }
     name = table.get("name", f"view{index}")
     if not isinstance(name, str) or not name or not name.isprintable():
-        _raise_rig_error(where + "name", shown(name), "a printable text")
+        _raise_rig_error(prefix + "name", shown(name), "a printable text")
     if "mirrored" in table:
         if not isinstance(table["mirrored"], bool):
-            _raise_rig_error(where + "mirrored", shown(table["mirrored"]), "true or false")
+            _raise_rig_error(prefix + "mirrored", shown(table["mirrored"]), "true or false")
         values["mirrored"] = table["mirrored"]
     if "R_camera_from_layout" in table:
         values["R_camera_from_layout"] = _parse_matrix(
-            table["R_camera_from_layout"], where + "R_camera_from_layout"
+            table["R_camera_from_layout"], prefix + "R_camera_from_layout"
         )
     return View(name=name, **values)
 

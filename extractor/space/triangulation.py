@@ -1,8 +1,8 @@
-"""Points in space from their pictures in two or more views: the most likely place, and how far it may be trusted.
+"""Triangulation: the most likely points in space from their pictures in two or more views, with covariances.
 
-Gauss-Newton on the likelihood of the pixels, each weighted by its own covariance, started where the rays come nearest
-to each other. With two views one degree of freedom is left over: how far the two rays miss each other. A point whose
-rays miss by more than its covariances and the poses' allow is not one point, and is not reported.
+The method is Gauss-Newton on the likelihood of the pixels, each weighted by its own covariance, started at the point
+nearest to all rays. With two views one degree of freedom remains: the distance by which the two rays miss each other. A
+point whose rays miss by more than its covariances and those of the poses allow is not reported.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,39 +18,37 @@ from numpy.typing import NDArray
 from extractor.space.camera import Array, View, is_covariance, is_finite
 
 ITERATIONS = 12
-CONVERGED = 1e-5  # of a standard deviation
-GATE_SIGMAS = 6.0
-TOLERANCE_PX = (
-    0.1  # gridlines that bend more than extraction can follow err by so much beyond their covariance
-)
-MIN_EIGENVALUE = (
-    1e-13  # smallest eigenvalue of information with a unit diagonal, below which it has no inverse
-)
-INFLATION_SIGMAS = 3.0  # misfit that chance hardly makes: such a point's covariance grows with it
-MIN_RAY_DIVERGENCE = 1e-14  # half the squared angle between two rays, below which they are one
+CONVERGED = 1e-5  # last step, in standard deviations
+GATE_SIGMAS = 6.0  # misfit above which a point is not reported
+TOLERANCE_PX = 0.1  # error beyond the covariance where gridlines bend more than extraction can follow
+MIN_EIGENVALUE = 1e-13  # of an information matrix with a unit diagonal, for an inverse
+INFLATION_SIGMAS = 3.0  # misfit above which a point's covariance is inflated
+MIN_RAY_DIVERGENCE = 1e-14  # half the squared angle between two rays, below which they are parallel
+LARGE_RESIDUAL_PX = 1e6  # residual of a point without a picture, so that a step there is refused
+MIN_DAMPING = 1e-3  # after a refused step
 
 
 class PointReason(IntEnum):
-    """Why a point has no place in space."""
+    """Why a point has no position in space."""
 
-    NONE = 0  # it has one
-    UNSEEN = 1  # no view shows it
-    ONE_VIEW = 2  # one view alone does: it lies somewhere on a ray
+    NONE = 0  # the point has a position
+    UNSEEN = 1  # no view shows the point
+    ONE_VIEW = 2  # only one view shows the point, which then lies anywhere on a ray
     NO_RAY = 3  # a pixel where the lens' distortion has no inverse
-    PARALLEL = 4  # rays too nearly parallel, or pixels too uncertain, to tell its depth
+    PARALLEL = 4  # the rays are too nearly parallel, or the pixels too uncertain, for depth
     DISAGREE = 5  # the rays miss each other by more than their covariances allow
-    SURROUNDINGS = 6  # a virtual marker, and an end of its edge is lost
+    SURROUNDINGS = 6  # a virtual marker with a lost marker at an end of its edge
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points in the layout frame, by index.
+    """N points in the layout frame, from V views.
 
     Attributes:
-        xyz_mm: (N, 3) float64, NaN where there is none.
+        xyz_mm: (N, 3) float64, NaN where unknown.
         cov_mm2: (N, 3, 3) float64, from the pixels' covariances alone; times the square of a misfit above 3.
-        by_pose: (N, 3, 6 V) float64: how they move with errors of the views' poses.
-        misfit: (N,) float64: the residual left over, in standard deviations of its own; NaN where nothing is.
+        by_pose: (N, 3, 6 V) float64, derivatives by the views' poses.
+        misfit: (N,) float64, the RMS residual in its standard deviations; NaN where unknown.
         reason: (N,) uint8, a ``PointReason`` each.
     """
 
@@ -58,6 +57,40 @@ class Points:
     by_pose: Array
     misfit: Array
     reason: NDArray[np.uint8]
+
+
+class Observations(NamedTuple):
+    """The pixels of N points in V views.
+
+    Attributes:
+        views: V views with poses.
+        xy_px: (V, N, 2) float64.
+        cov_px2: (V, N, 2, 2) float64.
+        seen: (V, N) bool; other pixels are ignored.
+    """
+
+    views: Sequence[View]
+    xy_px: Array
+    cov_px2: Array
+    seen: NDArray[np.bool_]
+
+    def of(self, points: NDArray[np.intp]) -> Observations:
+        """The observations of these points."""
+        return Observations(self.views, self.xy_px[:, points], self.cov_px2[:, points], self.seen[:, points])
+
+
+class Residuals(NamedTuple):
+    """Residuals of N points in V views and their derivatives; 0 where a point is not seen.
+
+    Attributes:
+        px: (V, N, 2) float64, observed minus projected.
+        by_point: (V, N, 2, 3) float64, derivatives of the projection by the point, px/mm.
+        by_pose: (V, N, 2, 6) float64, derivatives of the projection by the view's pose, see ``Linearisation``.
+    """
+
+    px: Array
+    by_point: Array
+    by_pose: Array
 
 
 def triangulate(
@@ -70,36 +103,35 @@ def triangulate(
     gate_sigmas: float = GATE_SIGMAS,
     tolerance_px: float = TOLERANCE_PX,
 ) -> Points:
-    """Where points lie that V placed views see.
+    """The points in space that V placed views see.
 
     Args:
-        views: with poses.
+        views: V views with poses.
         xy_px: (V, N, 2) float64, NaN where a view does not show a point.
         cov_px2: (V, N, 2, 2) float64.
-        cov_pose: (6 V, 6 V) of the poses' errors, which widen what residuals may be; None: the poses are exact.
-        max_sigma_mm: standard deviation along its worst direction above which a point is ``PARALLEL``.
+        cov_pose: (6 V, 6 V) covariance of the poses, which widens the expected residuals; None: the poses are exact.
+        max_sigma_mm: standard deviation in the worst direction, above which a point is ``PARALLEL``.
         gate_sigmas: misfit above which a point is ``DISAGREE``,
-        tolerance_px: if its residuals' norm over all views also is above this.
+        tolerance_px: if the norm of its residuals over all views is also above this.
     """
     seen = is_finite(xy_px) & is_covariance(cov_px2)
     reason = np.where(seen.sum(axis=0) == 1, PointReason.ONE_VIEW, PointReason.NONE).astype(np.uint8)
     reason[~seen.any(axis=0)] = PointReason.UNSEEN
-    start, ray = _intersect_rays(views, xy_px, seen)
-    reason[(reason == PointReason.NONE) & (seen & ~ray).any(axis=0)] = PointReason.NO_RAY
+    start, has_ray = _intersect_rays(views, xy_px, seen)
+    reason[(reason == PointReason.NONE) & (seen & ~has_ray).any(axis=0)] = PointReason.NO_RAY
     reason[(reason == PointReason.NONE) & ~is_finite(start)] = PointReason.PARALLEL
-    use = np.flatnonzero(reason == PointReason.NONE)
-    out = _empty_points(len(reason), len(views), reason)
-    if not len(use):
-        return out
-    miss_px = _fill_solution(
-        views, xy_px[:, use], cov_px2[:, use], seen[:, use], start[use], cov_pose, use, out
-    )
-    gate = np.where(miss_px > tolerance_px, gate_sigmas, np.inf)
-    _update_rejecting_points(out, use, max_sigma_mm, gate)
-    return out
+    solvable = np.flatnonzero(reason == PointReason.NONE)
+    points = _unknown_points(len(reason), len(views), reason)
+    if not len(solvable):
+        return points
+    observations = Observations(views, xy_px, cov_px2, seen).of(solvable)
+    residual_px = _fill_solutions(observations, start[solvable], cov_pose, solvable, points)
+    gate = np.where(residual_px > tolerance_px, gate_sigmas, np.inf)
+    _update_rejecting_points(points, solvable, max_sigma_mm, gate)
+    return points
 
 
-def _empty_points(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
+def _unknown_points(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
     unknown = np.full((count, 3, 6 * views), np.nan)
     return Points(unknown[:, :, 0].copy(), unknown[:, :, :3].copy(), unknown, unknown[:, 0, 0].copy(), reason)
 
@@ -107,141 +139,151 @@ def _empty_points(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
 def _intersect_rays(
     views: Sequence[View], xy_px: Array, seen: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """(N, 3) the points nearest to all rays, NaN where these are parallel; (V, N) which pixels have rays."""
+    """(N, 3) the points nearest to all rays, NaN where these are parallel; (V, N) bool, which pixels have rays.
+
+    Where the rays meet behind a camera, the point is that of the camera's ray on the layout's plane.
+    """
     normal, right = np.zeros((xy_px.shape[1], 3, 3)), np.zeros((xy_px.shape[1], 3))
-    have = np.zeros(seen.shape, np.bool_)
+    has_ray = np.zeros(seen.shape, np.bool_)
     on_plane = np.full((len(views), xy_px.shape[1], 3), np.nan)
     for v, view in enumerate(views):
         ray, origin = view.rays(xy_px[v]), view.position_mm
-        have[v] = is_finite(ray) & seen[v]
+        has_ray[v] = is_finite(ray) & seen[v]
         across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
-        across[~have[v]] = 0.0
+        across[~has_ray[v]] = 0.0
         normal += across
         right += across @ origin
-        on_plane[v] = np.where(have[v, :, None], origin - ray * (origin[2] / ray[:, 2:]), np.nan)
-    sound = np.linalg.eigvalsh(normal)[:, 0] > MIN_RAY_DIVERGENCE
-    out = np.full(right.shape, np.nan)
-    out[sound] = np.linalg.solve(normal[sound], right[sound, :, None])[:, :, 0]
-    for v, view in enumerate(
-        views
-    ):  # rays that meet behind a camera: their points on the layout's plane do not
-        behind = have[v] & (out @ view.R_camera_from_layout[2] + view.t_camera_from_layout_mm[2] <= 0)
-        out[behind] = on_plane[v, behind]
-    return out, have
+        on_plane[v] = np.where(has_ray[v, :, None], origin - ray * (origin[2] / ray[:, 2:]), np.nan)
+    regular = np.linalg.eigvalsh(normal)[:, 0] > MIN_RAY_DIVERGENCE
+    xyz = np.full(right.shape, np.nan)
+    xyz[regular] = np.linalg.solve(normal[regular], right[regular, :, None])[:, :, 0]
+    for v, view in enumerate(views):
+        behind = has_ray[v] & (xyz @ view.R_camera_from_layout[2] + view.t_camera_from_layout_mm[2] <= 0)
+        xyz[behind] = on_plane[v, behind]
+    return xyz, has_ray
 
 
-def _fill_solution(
-    views: Sequence[View],
-    xy_px: Array,
-    cov_px2: Array,
-    seen: NDArray[np.bool_],
+def _fill_solutions(
+    observations: Observations,
     start: Array,
     cov_pose: Array | None,
-    use: NDArray[np.intp],
-    out: Points,
+    solvable: NDArray[np.intp],
+    points: Points,
 ) -> Array:
-    """Fill ``out`` at ``weight``: all points step together, each by its own damped Gauss-Newton step.
+    """Fill ``points`` at the indices ``solvable``; every point takes its own damped Gauss-Newton steps.
+
+    Args:
+        observations: of the N solvable points.
+        start: (N, 3) mm.
 
     Returns:
         (N,) the norm of the residuals over all views, px.
     """
-    noise = np.where(seen[..., None, None], cov_px2, np.eye(2))
+    seen = observations.seen
+    noise = np.where(seen[..., None, None], observations.cov_px2, np.eye(2))
     weight = np.where(seen[..., None, None], np.linalg.inv(noise), 0.0)
     xyz, damping = start.copy(), np.zeros(len(start))
-    away, by_point, by_pose = _residuals(views, xyz, xy_px, seen)
+    now = _residuals(observations, xyz)
     for _ in range(ITERATIONS):
-        design = np.swapaxes(by_point, 2, 3) @ weight
-        normal = (design @ by_point).sum(axis=0)
-        gradient = (design @ away[..., None]).sum(axis=0)[..., 0]
+        design = np.swapaxes(now.by_point, 2, 3) @ weight
+        normal = (design @ now.by_point).sum(axis=0)
+        gradient = (design @ now.px[..., None]).sum(axis=0)[..., 0]
         step = _solve_scaled(normal * (1 + damping[:, None, None] * np.eye(3)), gradient)
-        there = _residuals(views, xyz + step, xy_px, seen)
-        better = _chi_square(there[0], weight) <= _chi_square(away, weight) * (1 + 1e-12)
+        tried = _residuals(observations, xyz + step)
+        better = _chi_square(tried.px, weight) <= _chi_square(now.px, weight) * (1 + 1e-12)
         xyz[better] += step[better]
-        for old, new in zip((away, by_point, by_pose), there, strict=True):
+        for old, new in zip(now, tried, strict=True):
             old[:, better] = new[:, better]
-        damping = np.where(better, damping / 10, np.maximum(10 * damping, 1e-3))
+        damping = np.where(better, damping / 10, np.maximum(10 * damping, MIN_DAMPING))
         if not (np.einsum("na,na->n", step, gradient) > CONVERGED**2).any():
             break
-    design = np.swapaxes(by_point, 2, 3) @ weight
-    out.xyz_mm[use], out.cov_mm2[use] = xyz, _scaled_inverse((design @ by_point).sum(axis=0))
-    bounded = np.where(np.isfinite(out.cov_mm2[use]), out.cov_mm2[use], 0.0)  # what is not is refused below
-    toward = -bounded @ (design @ by_pose)
-    out.by_pose[use] = np.moveaxis(toward, 0, 2).reshape(len(use), 3, -1)
-    out.misfit[use] = _misfit(away, by_point, by_pose, weight, seen, out.by_pose[use], cov_pose)
-    return np.asarray(np.sqrt((away**2).sum(axis=(0, 2))))
+    design = np.swapaxes(now.by_point, 2, 3) @ weight
+    cov = _scaled_inverse((design @ now.by_point).sum(axis=0))
+    points.xyz_mm[solvable], points.cov_mm2[solvable] = xyz, cov
+    bounded = np.where(np.isfinite(cov), cov, 0.0)  # points with infinite variances are rejected later
+    point_by_pose = -bounded @ (design @ now.by_pose)
+    by_pose = np.moveaxis(point_by_pose, 0, 2).reshape(len(solvable), 3, -1)
+    points.by_pose[solvable] = by_pose
+    points.misfit[solvable] = _misfit(now, weight, seen, points.by_pose[solvable], cov_pose)
+    return np.asarray(np.sqrt((now.px**2).sum(axis=(0, 2))))
 
 
-def _residuals(
-    views: Sequence[View], xyz: Array, xy_px: Array, seen: NDArray[np.bool_]
-) -> tuple[Array, Array, Array]:
-    """(V, N, 2) px, and their derivatives by point (V, N, 2, 3) and pose (V, N, 2, 6); 0 where not seen."""
-    linearised = [view.linearised(xyz) for view in views]
-    away = np.stack([xy_px[v] - part[0] for v, part in enumerate(linearised)])
-    by_point, by_pose = (np.stack([part[k] for part in linearised]) for k in (1, 2))
-    nowhere = seen & ~is_finite(away)
-    away[nowhere] = 1e6  # a step to where there is no picture is refused
-    by_point[nowhere], by_pose[nowhere] = 0.0, 0.0
-    for values in (away, by_point, by_pose):
-        values[~seen] = 0.0
-    return away, by_point, by_pose
+def _residuals(observations: Observations, xyz: Array) -> Residuals:
+    """The residuals of points (N, 3) mm."""
+    linearised = [view.linearised(xyz) for view in observations.views]
+    px = np.stack([seen_px - one.xy_px for seen_px, one in zip(observations.xy_px, linearised, strict=True)])
+    by_point = np.stack([one.by_point for one in linearised])
+    by_pose = np.stack([one.by_pose for one in linearised])
+    invisible = observations.seen & ~is_finite(px)
+    px[invisible] = LARGE_RESIDUAL_PX
+    by_point[invisible], by_pose[invisible] = 0.0, 0.0
+    for values in (px, by_point, by_pose):
+        values[~observations.seen] = 0.0
+    return Residuals(px, by_point, by_pose)
 
 
-def _chi_square(away: Array, weight: Array) -> Array:
-    return np.asarray((away[:, :, None] @ weight @ away[..., None]).sum(axis=0)[:, 0, 0])
+def _chi_square(residual_px: Array, weight: Array) -> Array:
+    """(N,) the sum over all views of r^T W r, for residuals (V, N, 2) and weights (V, N, 2, 2)."""
+    return np.asarray((residual_px[:, :, None] @ weight @ residual_px[..., None]).sum(axis=0)[:, 0, 0])
 
 
 def _solve_scaled(normal: Array, gradient: Array) -> Array:
-    """Solutions of 3 x 3 systems in their own scale; 0 where singular."""
+    """(N, 3) solutions of 3 x 3 systems in their own scale; 0 where singular."""
     inverse = np.nan_to_num(_scaled_inverse(normal), posinf=0, neginf=0)
     return np.asarray((inverse @ gradient[..., None])[..., 0])
 
 
 def _scaled_inverse(normal: Array) -> Array:
-    """Inverses of 3 x 3 matrices, in their own scale; infinite variances where singular."""
-    out = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
-    scale = np.diagonal(normal, axis1=1, axis2=2)
-    sound = is_finite(normal, 2) & (scale > 0).all(axis=1)
-    root = np.sqrt(scale[sound])
-    root = root[:, :, None] * root[:, None, :]
-    even = normal[sound] / root
-    good = np.linalg.eigvalsh(even)[:, 0] > MIN_EIGENVALUE
-    out[np.flatnonzero(sound)[good]] = np.linalg.inv(even[good]) / root[good]
-    return out
+    """(N, 3, 3) inverses of symmetric matrices in their own scale; infinite variances where singular."""
+    inverse = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
+    diagonal = np.diagonal(normal, axis1=1, axis2=2)
+    positive = is_finite(normal, 2) & (diagonal > 0).all(axis=1)
+    root = np.sqrt(diagonal[positive])
+    scale = root[:, :, None] * root[:, None, :]
+    correlation = normal[positive] / scale
+    regular = np.linalg.eigvalsh(correlation)[:, 0] > MIN_EIGENVALUE
+    inverse[np.flatnonzero(positive)[regular]] = np.linalg.inv(correlation[regular]) / scale[regular]
+    return inverse
 
 
 def _misfit(
-    away: Array,
-    by_point: Array,
-    by_pose: Array,
+    residuals: Residuals,
     weight: Array,
     seen: NDArray[np.bool_],
     point_by_pose: Array,
     cov_pose: Array | None,
 ) -> Array:
-    """(N,) RMS of what is left over, in the deviations that pixels and poses allow."""
+    """(N,) the RMS residual in units of the deviation that follows from pixels and poses.
+
+    Args:
+        weight: (V, N, 2, 2), inverse covariances of the pixels.
+        point_by_pose: (N, 3, 6 V), derivatives of the points by the poses.
+    """
     freedom = 2.0 * seen.sum(axis=0) - 3
     if cov_pose is not None and cov_pose.any():
-        moved = by_point @ point_by_pose
+        by_pose = residuals.by_point @ point_by_pose
         for v in range(len(seen)):
-            moved[v, :, :, 6 * v : 6 * v + 6] += by_pose[v]
-        spread = moved @ cov_pose @ np.swapaxes(moved, 2, 3)
-        freedom = freedom + np.einsum("vnij,vnji->n", weight, spread)
-    return np.asarray(np.sqrt(_chi_square(away, weight) / freedom))
+            by_pose[v, :, :, 6 * v : 6 * v + 6] += residuals.by_pose[v]
+        pose_cov = by_pose @ cov_pose @ np.swapaxes(by_pose, 2, 3)
+        freedom = freedom + np.einsum("vnij,vnji->n", weight, pose_cov)
+    return np.asarray(np.sqrt(_chi_square(residuals.px, weight) / freedom))
 
 
-def _update_rejecting_points(out: Points, use: NDArray[np.intp], max_sigma_mm: float, gate: Array) -> None:
-    """Widen the covariance of what is doubtful, take back what cannot be believed."""
-    doubtful = use[out.misfit[use] > INFLATION_SIGMAS]
-    out.cov_mm2[doubtful] *= out.misfit[doubtful, None, None] ** 2
-    cov = out.cov_mm2[use]
-    worst = np.full(len(use), np.inf)
-    sound = is_finite(cov, 2)
-    worst[sound] = np.sqrt(np.maximum(np.linalg.eigvalsh(cov[sound])[:, -1], 0))
-    for doubt, reason in (
+def _update_rejecting_points(
+    points: Points, solved: NDArray[np.intp], max_sigma_mm: float, gate: Array
+) -> None:
+    """Inflate covariances where the misfit is large, and reject points that are too uncertain or beyond the gate."""
+    inflated = solved[points.misfit[solved] > INFLATION_SIGMAS]
+    points.cov_mm2[inflated] *= points.misfit[inflated, None, None] ** 2
+    cov = points.cov_mm2[solved]
+    worst = np.full(len(solved), np.inf)
+    finite = is_finite(cov, 2)
+    worst[finite] = np.sqrt(np.maximum(np.linalg.eigvalsh(cov[finite])[:, -1], 0))
+    for rejected, reason in (
         (~(worst <= max_sigma_mm) | ~np.isfinite(worst), PointReason.PARALLEL),
-        (out.misfit[use] > gate, PointReason.DISAGREE),
+        (points.misfit[solved] > gate, PointReason.DISAGREE),
     ):
-        hit = doubt & (out.reason[use] == PointReason.NONE)
-        out.reason[use[hit]] = reason
-    lost = out.reason != PointReason.NONE
-    out.xyz_mm[lost], out.cov_mm2[lost], out.by_pose[lost] = np.nan, np.nan, np.nan
+        first = rejected & (points.reason[solved] == PointReason.NONE)
+        points.reason[solved[first]] = reason
+    lost = points.reason != PointReason.NONE
+    points.xyz_mm[lost], points.cov_mm2[lost], points.by_pose[lost] = np.nan, np.nan, np.nan

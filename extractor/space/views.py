@@ -1,4 +1,4 @@
-"""One image that holds several views, as behind a pair of mirrors, or one image a view: each is read by itself."""
+"""Several views in one image, as behind a pair of mirrors, or one image for each view: each is read by itself."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def crop_to_view(image: Any, view: View) -> Any:
     """The part of an image that a view fills.
 
     Raises:
-        ImageError: not an image, or the area reaches beyond it.
+        ImageError: not an image, or the area reaches beyond the image.
     """
     if view.area_px is None:
         return image
@@ -45,11 +45,12 @@ def crop_to_view(image: Any, view: View) -> Any:
 
 
 def _view_origin_px(view: View) -> tuple[float, float]:
+    """The first pixel (x, y) of the view in the full image."""
     return (0.0, 0.0) if view.area_px is None else (float(view.area_px[0]), float(view.area_px[1]))
 
 
 def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> list[Image | None]:
-    """An image for every view."""
+    """One image for every view."""
     if image is None or isinstance(image, np.ndarray):
         return [image] * len(rig.views)
     if len(image) != len(rig.views):
@@ -58,7 +59,7 @@ def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> l
 
 
 class ViewExtractor:
-    """Finds the markers of every view.
+    """Finds the markers of every view. Can be pickled and copied.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
@@ -72,31 +73,30 @@ class ViewExtractor:
         """The markers view by view, in the frame of the full image.
 
         Args:
-            image: one that holds all views, or a sequence of one for each.
+            image: one image with all views, or a sequence of one image for each view.
 
         Raises:
             ImageError: not an image, or smaller than a view's area.
         """
         found = []
         for view, picture in zip(self.rig.views, _images_by_view(image, self.rig), strict=True):
-            found.append(
-                translate_markers(self._extractor.extract(crop_to_view(picture, view)), _view_origin_px(view))
-            )
+            markers = self._extractor.extract(crop_to_view(picture, view))
+            found.append(translate_markers(markers, _view_origin_px(view)))
         return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeFrame:
-    """One frame in space.
+    """The result of one frame in space. Can be pickled and copied.
 
     Attributes:
-        index: its place in the sequence, from 0.
-        time_s: its time stamp in seconds; NaN where none was given.
+        index: place in the sequence, from 0.
+        time_s: time stamp in seconds; NaN where none was given.
         status: ``TRACKED`` when at least one marker has a position.
-        reason: why not, or which view shows nothing; empty when all do.
+        reason: why not, or which view shows nothing; empty when all views show the pattern.
         shape: the surface.
-        views: what tracking says of every view.
-        elapsed_ms: what it took, images to surface.
+        views: the tracked frame of every view.
+        elapsed_ms: time from images to surface.
     """
 
     index: int
@@ -111,9 +111,11 @@ class ShapeFrame:
 class ShapeTracker:
     """Follows the surface through a sequence; a frame that cannot be read says so and keeps its place.
 
+    A copy goes on as the original does.
+
     Args:
-        reconstructor: with the views in their places.
-        warm: start from the frame before where the image proves it.
+        reconstructor: with the poses of the views.
+        warm: start from the frame before where the image proves the prediction.
     """
 
     def __init__(self, reconstructor: Reconstructor, *, warm: bool = True) -> None:
@@ -124,11 +126,11 @@ class ShapeTracker:
     def track(
         self, image: Image | Sequence[Image | None] | None, *, time_s: float = float("nan"), reason: str = ""
     ) -> ShapeFrame:
-        """The next frame, whatever it holds.
+        """Read the next frame.
 
         Args:
-            image: one for all views or one for each; None where none could be had, for ``reason``.
-            time_s: its time stamp.
+            image: one image for all views or one for each; None where no image could be had, for ``reason``.
+            time_s: time stamp of the frame.
         """
         started = time.perf_counter()
         rig = self.reconstructor.rig
@@ -137,8 +139,8 @@ class ShapeTracker:
             self._track_view(view, tracker, picture, time_s, reason)
             for view, tracker, picture in zip(rig.views, self._trackers, pictures, strict=True)
         )
-        shown = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
-        shape = self.reconstructor.reconstruct(shown)
+        markers = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
+        shape = self.reconstructor.reconstruct(markers)
         found = bool(np.isfinite(shape.xyz_mm).any())
         worst = max((frame.status for frame in tracked), default=FrameStatus.LOST)
         status = FrameStatus.TRACKED if found else max(worst, FrameStatus.LOST)
@@ -166,9 +168,12 @@ class ShapeTracker:
 
 
 def _frame_reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: bool) -> str:
-    said = [f"{name}: {frame.reason}" for name, frame in zip(rig.names, tracked, strict=True) if frame.reason]
-    if not said and shape.problem:
-        said = [shape.problem]
-    if not said and not found:
-        said = ["the views have no marker in common that can be believed"]
-    return "; ".join(said)
+    """The reasons of the views, else the problem of the shape; empty without any."""
+    reasons = [
+        f"{name}: {frame.reason}" for name, frame in zip(rig.names, tracked, strict=True) if frame.reason
+    ]
+    if not reasons and shape.problem:
+        reasons = [shape.problem]
+    if not reasons and not found:
+        reasons = ["the views have no marker in common that can be believed"]
+    return "; ".join(reasons)
