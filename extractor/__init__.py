@@ -2,6 +2,20 @@
 
 >>> from extractor import Extractor, load_layout
 >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
+
+The rooms (folders and modules) in their order; a room imports only rooms before it, and the small modules ``errors``,
+``result`` and ``presets``:
+
+- ``numeric``: compilation, linear systems, sampling of images, nearest points.
+- ``layout``: ``layout.json`` and the tables of a layout.
+- ``image``: stages 1 and 2, from pixels to inks.
+- ``cells``: stages 3 to 6, from inks to triangles, cells and their mesh.
+- ``localmap``: local maps from layout to image.
+- ``numbering``: stage 7, from cells to numbered markers.
+- ``refine``: all markers solved together, by profiles and synthesis.
+- ``complete``: repair of lost markers, and virtual markers.
+- ``pipeline``: the stages in their order, from an image to markers. ``draw`` shows their results.
+- ``track``: sequences of images. ``space``: surfaces from two or more views.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Pictures of what was found: the overlay of an image, and one picture for every stage."""
+"""Pictures of the results: an image with its markers, and one picture for every stage."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -12,11 +12,21 @@ from extractor.image.input import convert_to_bgr
 from extractor.layout.reference import Reference
 from extractor.result import Markers, Status
 
+if TYPE_CHECKING:
+    from extractor.cells.cell_mesh import CellMesh
+    from extractor.cells.cells import Cells
+    from extractor.cells.region_growing import Regions
+    from extractor.cells.seeds import Seeds
+    from extractor.cells.triangle_fit import Triangles
+    from extractor.image.ink_segmentation import Segmentation
+    from extractor.image.target_area import Target
+
 Picture = NDArray[np.uint8]
 
-SHORT_SIDE_PX = 1000  # smaller images are enlarged to about this, so that ids can be read
-ID_EDGE_PX = 30  # edges this long have room for an id beside every marker
-SHIFT = 4  # OpenCV draws with 4 fractional bits
+SHORT_SIDE_PX = 1000  # smaller images are enlarged to about this side, so that ids are legible
+ID_EDGE_PX = 30  # length of the edges from which ids are drawn
+SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
+# of no ink, red, green and blue
 INK_BGR = np.array([[40, 40, 40], [60, 60, 230], [80, 190, 60], [230, 110, 60]], np.uint8)
 STATUS_BGR = {
     Status.MEASURED: (80, 255, 255),
@@ -30,7 +40,9 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     """The image with its gridlines, markers (colored by status), ids and a caption.
 
     Args:
-        image: as given to ``Extractor.extract``.
+        image: as for ``Extractor.extract``.
+        reference: the layout of the markers.
+        markers: the markers of the image.
 
     Returns:
         (H * s, W * s, 3) uint8 BGR, enlarged by a whole number s where the image is small.
@@ -54,7 +66,13 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
 
 
 def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> dict[str, Picture]:
-    """One picture for every stage that was reached, in order."""
+    """One picture (H * s, W * s, 3) uint8 BGR for every stage that was reached, by the stage's name, in order.
+
+    Args:
+        image: as for ``Extractor.extract``.
+        reference: the layout of the markers.
+        markers: the markers of the image, with their ``stages``.
+    """
     base = _bgr_picture(image)
     scale = _enlargement(base)
     results = markers.stages
@@ -90,10 +108,10 @@ def _enlargement(base: Picture) -> int:
 
 
 def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
-    """Enlarged without smoothing, so that every pixel can be seen, and dimmed under what is drawn."""
+    """The picture enlarged without smoothing, so that pixels stay visible, and dimmed as a background."""
     height, width = base.shape[:2]
-    big = cv2.resize(base, (width * scale, height * scale), interpolation=cv2.INTER_NEAREST)
-    return cv2.convertScaleAbs(big, alpha=brightness)  # type: ignore[return-value]
+    large = cv2.resize(base, (width * scale, height * scale), interpolation=cv2.INTER_NEAREST)
+    return cv2.convertScaleAbs(large, alpha=brightness)  # type: ignore[return-value]
 
 
 def _resized_to_picture(picture: Picture, base: Picture, scale: int) -> Picture:
@@ -102,23 +120,22 @@ def _resized_to_picture(picture: Picture, base: Picture, scale: int) -> Picture:
 
 
 def _picture_coordinates(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
-    """Image coordinates (pixel centres at integers) in the enlarged picture."""
+    """Image coordinates (pixel centers at integers) in the enlarged picture."""
     return (xy_px + 0.5) * scale - 0.5
 
 
 def _draw_dot(
     canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1
 ) -> None:
-    one = 1 << SHIFT
-    cv2.circle(
-        canvas, (round(x * one), round(y * one)), round(radius * one), color, thickness, cv2.LINE_AA, SHIFT
-    )
+    unit = 1 << SHIFT
+    center = round(x * unit), round(y * unit)
+    cv2.circle(canvas, center, round(radius * unit), color, thickness, cv2.LINE_AA, SHIFT)
 
 
 def _draw_lines(
     canvas: Picture, lines: NDArray[np.float64], color: tuple[int, int, int], thickness: int = 1
 ) -> None:
-    """Closed polygons or open two-point lines: (N, K, 2)."""
+    """Draw N closed polygons (N, K, 2), or open lines (N, 2, 2)."""
     fixed = np.round(lines * (1 << SHIFT)).astype(np.int32)
     cv2.polylines(canvas, list(fixed), lines.shape[1] > 2, color, thickness, cv2.LINE_AA, SHIFT)
 
@@ -137,18 +154,18 @@ def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.fl
 
 
 def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
-    """Rings where the registration marks must be, carried over from the layout by the markers' homography."""
+    """Draw rings where the registration marks must be by the markers' homography from the layout."""
     known = np.isfinite(points[:, 0])
     if len(reference.fiducials_mm) == 0 or known.sum() < 4:
         return
-    carry, _ = cv2.findHomography(reference.xy_mm[known], points[known])
-    if carry is None:
+    homography, _ = cv2.findHomography(reference.xy_mm[known], points[known])
+    if homography is None:
         return
-    around = np.linspace(0.0, 2 * np.pi, 33)[:-1]
-    ring = 0.5 * reference.fiducial_diameter_mm * np.stack([np.cos(around), np.sin(around)], axis=1)
-    rings = (reference.fiducials_mm[:, None] + ring).reshape(-1, 1, 2)
-    drawn = np.asarray(cv2.perspectiveTransform(rings, carry), np.float64).reshape(-1, len(ring), 2)
-    _draw_lines(canvas, drawn, WHITE_BGR, 2)
+    angles = np.linspace(0.0, 2 * np.pi, 33)[:-1]
+    ring = 0.5 * reference.fiducial_diameter_mm * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    rings_mm = (reference.fiducials_mm[:, None] + ring).reshape(-1, 1, 2)
+    rings = np.asarray(cv2.perspectiveTransform(rings_mm, homography), np.float64)
+    _draw_lines(canvas, rings.reshape(-1, len(ring), 2), WHITE_BGR, 2)
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
@@ -162,9 +179,9 @@ def _draw_ids(canvas: Picture, points: NDArray[np.float64], edge: float) -> None
     size = float(np.clip(edge / 110, 0.3, 0.6))
     for marker in np.flatnonzero(np.isfinite(points[:, 0])):
         x, y = points[marker]
-        at = (round(x + edge * 0.08), round(y - edge * 0.08))
-        cv2.putText(canvas, str(marker), at, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 3, cv2.LINE_AA)
-        cv2.putText(canvas, str(marker), at, cv2.FONT_HERSHEY_SIMPLEX, size, WHITE_BGR, 1, cv2.LINE_AA)
+        corner = (round(x + edge * 0.08), round(y - edge * 0.08))
+        cv2.putText(canvas, str(marker), corner, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 3, cv2.LINE_AA)
+        cv2.putText(canvas, str(marker), corner, cv2.FONT_HERSHEY_SIMPLEX, size, WHITE_BGR, 1, cv2.LINE_AA)
 
 
 def _summary(markers: Markers) -> str:
@@ -180,34 +197,34 @@ def _draw_caption(canvas: Picture, text: str) -> None:
     height, width = canvas.shape[:2]
     size = float(np.clip(width / 1600, 0.4, 1.0))
     cv2.rectangle(canvas, (0, height - round(34 * size)), (width, height), (25, 25, 25), -1)
-    at = (round(12 * size), height - round(11 * size))
-    cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+    corner = (round(12 * size), height - round(11 * size))
+    cv2.putText(canvas, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
 
 
-def _draw_target(base: Picture, scale: int, target: Any) -> Picture:
+def _draw_target(base: Picture, scale: int, target: Target) -> Picture:
     height, width = base.shape[:2]
-    big = cv2.resize(target.mask, None, fx=target.tile_px, fy=target.tile_px, interpolation=cv2.INTER_NEAREST)
-    mask = cv2.resize(big, (width, height), interpolation=cv2.INTER_NEAREST)
+    tile_px = target.tile_px
+    large = cv2.resize(target.mask, None, fx=tile_px, fy=tile_px, interpolation=cv2.INTER_NEAREST)
+    mask = cv2.resize(large, (width, height), interpolation=cv2.INTER_NEAREST)
     return _enlarged(np.where(mask[..., None] > 0, base, base // 4).astype(np.uint8), scale, 1.0)
 
 
-def _draw_seeds(base: Picture, scale: int, segmentation: Any, seeds: Any) -> Picture:
+def _draw_seeds(base: Picture, scale: int, segmentation: Segmentation, seeds: Seeds) -> Picture:
     canvas = _resized_to_picture((INK_BGR[segmentation.label] // 2).astype(np.uint8), base, scale)
-    for x, y in _picture_coordinates(
-        seeds.xy.astype(np.float64), _work_scale(base, scale, segmentation.label)
-    ):
+    total_scale = _level_scale(base, scale, segmentation.label)
+    for x, y in _picture_coordinates(seeds.xy.astype(np.float64), total_scale):
         _draw_dot(canvas, x, y, 4.0, WHITE_BGR)
     return canvas
 
 
-def _draw_regions(base: Picture, scale: int, regions: Any) -> Picture:
+def _draw_regions(base: Picture, scale: int, regions: Regions) -> Picture:
     ink = np.concatenate([[0], regions.ink]).astype(np.uint8)
     return _resized_to_picture(INK_BGR[ink[regions.region_map]], base, scale)
 
 
-def _work_scale(base: Picture, scale: int, work: NDArray[Any]) -> float:
-    """Pixels of the picture for one pixel of the scale at which regions were grown."""
-    return float(scale * round(base.shape[1] / work.shape[1]))
+def _level_scale(base: Picture, scale: int, level: NDArray[Any]) -> float:
+    """Pixels of the enlarged picture for one pixel of the level in which the seeds were found."""
+    return float(scale * round(base.shape[1] / level.shape[1]))
 
 
 def _bright_color(ink: int) -> tuple[int, int, int]:
@@ -215,20 +232,16 @@ def _bright_color(ink: int) -> tuple[int, int, int]:
     return blue, green, red
 
 
-def _draw_triangles(base: Picture, scale: int, triangles: Any) -> Picture:
+def _draw_triangles(base: Picture, scale: int, triangles: Triangles) -> Picture:
     canvas = _enlarged(base, scale, 0.4)
     for ink in (1, 2, 3):
-        _draw_lines(
-            canvas,
-            _picture_coordinates(triangles.corner_px[triangles.ink == ink], scale),
-            _bright_color(ink),
-            2,
-        )
+        corners = _picture_coordinates(triangles.corner_px[triangles.ink == ink], scale)
+        _draw_lines(canvas, corners, _bright_color(ink), 2)
     return canvas
 
 
-def _draw_mesh(base: Picture, scale: int, cells: Any, mesh: Any) -> Picture:
-    """Markers and black cells as triangles between three centers: those that turn clockwise are yellow."""
+def _draw_mesh(base: Picture, scale: int, cells: Cells, mesh: CellMesh) -> Picture:
+    """The faces between three centers, which are markers or black cells; faces that turn clockwise are yellow."""
     canvas = _enlarged(base, scale, 0.4)
     centers = _picture_coordinates(cells.center_px, scale)
     for turn, color in ((-1, (150, 150, 150)), (1, (80, 255, 255))):
@@ -242,7 +255,7 @@ def _draw_mesh(base: Picture, scale: int, cells: Any, mesh: Any) -> Picture:
 
 
 def _draw_spiral(base: Picture, scale: int, reference: Reference, xy_px: NDArray[np.float64]) -> Picture:
-    """The order of the search: from the white cell's bottom corner around every layer, blue to red."""
+    """The order of the ids, blue to red: from the white cell's bottom corner around every layer."""
     canvas = _enlarged(base, scale, 0.4)
     points = _picture_coordinates(xy_px, scale)
     found = np.flatnonzero(np.isfinite(points[:, 0]))

@@ -225,7 +225,7 @@ class Reconstructor:
         raise PoseError(f"views {names} {says.get(why, 'show no marker in common')}")
 
     def _select_views(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
-        """The markers of the views that show the side of the pattern that their pose faces, and the others' problems."""
+        """The markers of the views that show the pattern's side that their pose faces, and the others' problems."""
         self._require_count(markers)
         kept: list[Markers | None] = []
         problems = []
