@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import PoseError
 from extractor.space.camera import Array, View, is_covariance, is_finite
+from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 
 MIN_MARKERS = 6  # of a view, for a pose
 MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose

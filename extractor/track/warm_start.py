@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers, corner_agreement
 from extractor.numeric.bilinear import fill_patch_mean
-from extractor.numeric.compilation import compiled, vectorized
-from extractor.numeric.dense_systems import dot3
+from extractor.numeric.compilation import compiled
 from extractor.track.image_check import CONFIRMED, UNSEEN, check_cells
+from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
 
 MIN_VERIFIED_SHARE = 0.95  # of the cells in view that the image must confirm
