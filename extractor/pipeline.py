@@ -185,7 +185,7 @@ class Extractor:
             timings_ms=stages.timings_ms,
             stages=stages.results,
         )
-        return ReadImage(markers, refined.seen)
+        return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Reason:
         """Stages 1 to 7 at the first scale that suffices, from coarse to fine; else the reason at the finest scale."""

@@ -126,7 +126,7 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
 @compiled
 def _corrected_levels(view, picture, topology, xy, cell, noise):  # type: ignore[no-untyped-def]
     """``InkLevels``: the levels ``cell`` (K, 3) corrected by the residual in the middle of the cells."""
-    cells, black_cells, color = topology.cells, topology.black, topology.cell_color
+    cells, black_cells, color = topology.cells, topology.black_cells, topology.cell_color
     own = cell_means(view.image, picture, xy, cells, 0.0)
     own[:, :3] += cell
     black = cell_means(view.image, picture, xy, black_cells, 0.0)

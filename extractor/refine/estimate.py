@@ -180,9 +180,9 @@ class StartPlaces(NamedTuple):
 
 def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
     """Places of the full image in a reduced one."""
-    return replace(places, xy_px=view.reduced(places.xy_px), edge_px=places.edge_px / view.scale)
+    return replace(places, xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)
 
 
 def start_places(places: InitialMarkers) -> StartPlaces:
     """The part of the places that compiled functions take."""
-    return StartPlaces(places.xy_px, places.edge_px, places.agreed, places.whole)
+    return StartPlaces(places.xy_px, places.edge_px, places.agreed, places.is_intact)

@@ -33,7 +33,7 @@ def initial_appearance(view: PyramidLevel, topology: Topology, xy: NDArray[np.fl
 @compiled
 def _initial_appearance(view, topology, xy, sigma, no_model):  # type: ignore[no-untyped-def]
     """The noise and ``InkLevels``."""
-    image, cells, black_cells, color = view.image, topology.cells, topology.black, topology.cell_color
+    image, cells, black_cells, color = view.image, topology.cells, topology.black_cells, topology.cell_color
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
     drawn = cell_means(image, no_model, xy, cells, sigma)
     black = cell_means(image, no_model, xy, black_cells, sigma)

@@ -92,7 +92,7 @@ def correct_outliers(
         return estimate, places
     xy, _, agreed, is_intact = corrected.places
     estimate = estimate._replace(measured=corrected.measured, reliable=corrected.reliable)
-    return estimate, replace(places, xy_px=xy, agreed=agreed, whole=is_intact)
+    return estimate, replace(places, xy_px=xy, agreed=agreed, is_intact=is_intact)
 
 
 @compiled
@@ -108,7 +108,7 @@ def _correct_outliers(topology, measured, reliable, hidden, maps, places, suspec
     agreed, is_intact = places.agreed.copy(), places.is_intact.copy()
     known[outliers] = np.nan
     stencil = topology.derivative_stencil
-    xy = extrapolate_rings(known, topology.near, topology.ring_vectors, stencil, EXTRAPOLATED_RINGS)
+    xy = extrapolate_rings(known, topology.ring_markers, topology.ring_vectors, stencil, EXTRAPOLATED_RINGS)
     for m in np.flatnonzero(outliers):
         if not np.isfinite(xy[m, 0]):
             continue
@@ -178,7 +178,7 @@ def outlier_markers(xy, maps, suspect, edge, topology):  # type: ignore[no-untyp
     Returns:
         (M,) bool.
     """
-    count, near = xy.shape[0], topology.near
+    count, near = xy.shape[0], topology.ring_markers
     out, outliers, changed = xy.copy(), np.zeros(count, np.bool_), np.ones(count, np.bool_)
     shifts = AgreedShifts(
         np.zeros(count, np.bool_), np.zeros((count, 2)), np.full(count, np.nan), np.zeros(count, np.bool_)

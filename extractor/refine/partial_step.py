@@ -178,7 +178,7 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
     add_neighbours(redrawn, edges, free)
     if not image_state.wide_blur:
         rows = MarkerRows(edges, topology.next_markers, topology.third_differences)
-        new = measure_roughness(reliable, maps, diagonal, rows, topology.spokes, topology.near, free)
+        new = measure_roughness(reliable, maps, diagonal, rows, topology.spokes, topology.ring_markers, free)
         roughness = merged_rows(free, new, roughness)
     noise, dot_gain = image_state.noise, image_state.dot_gain
     state = PatternState(

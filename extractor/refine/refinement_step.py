@@ -94,7 +94,7 @@ class StepSolution(NamedTuple):
 @compiled
 def extrapolate_pattern(xy, topology):  # type: ignore[no-untyped-def]
     """``ExtrapolatedPattern`` of the markers (M, 2), NaN where unknown."""
-    near, offset, stencil = topology.near, topology.ring_vectors, topology.derivative_stencil
+    near, offset, stencil = topology.ring_markers, topology.ring_vectors, topology.derivative_stencil
     maps = local_maps(xy, near, offset, stencil)
     xy, hidden = extrapolate_markers(xy, maps, near, offset)
     return ExtrapolatedPattern(xy, hidden, maps)
@@ -104,7 +104,7 @@ def extrapolate_pattern(xy, topology):  # type: ignore[no-untyped-def]
 def extrapolate_pattern_around(xy, selected, maps, topology):  # type: ignore[no-untyped-def]
     """``ExtrapolatedPattern`` with new maps at the selected markers (M,) bool and their neighbours; the maps (M, 2, 5)
     elsewhere stay."""
-    near, offset, stencil = topology.near, topology.ring_vectors, topology.derivative_stencil
+    near, offset, stencil = topology.ring_markers, topology.ring_vectors, topology.derivative_stencil
     asked = selected.copy()
     for m in np.flatnonzero(selected):
         for k in range(FIRST_RING):
@@ -137,7 +137,7 @@ def with_pattern_moved(
 def with_roughness(topology: Topology, estimate: Estimate) -> Estimate:
     """The estimate with the roughness of its markers."""
     rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
-    about = rows, topology.spokes, topology.near, np.ones(len(topology.spokes), np.bool_)
+    about = rows, topology.spokes, topology.ring_markers, np.ones(len(topology.spokes), np.bool_)
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
     return estimate._replace(roughness=measure_roughness(*markers, *about))
 

@@ -86,21 +86,21 @@ class Refiner:
         if before is not None and before.scale == self._reduction_scale(
             before.scale * before.sigma, usual_edge
         ):
-            view = pyramid.at(before.scale)
+            view = pyramid.level(before.scale)
             first = self._first_estimate(view, places, places.xy_px, before)
             refined = self._final_steps(view, *first, short_edge)
             if refined.appearance is not None and refined.appearance.is_similar(before):
                 return refined
-        view = pyramid.at(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
+        view = pyramid.level(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
         estimate, contrasts, places = self._first_estimate(view, places, places.xy_px)
         scale = self._reduction_scale(view.scale * estimate.sigma, usual_edge)
         if scale > view.scale:
-            estimate = rescaled(estimate, view, pyramid.at(scale))
+            estimate = rescaled(estimate, view, pyramid.level(scale))
             contrasts = rescaled_contrasts(contrasts, view.scale / scale)
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(estimate.measured), np.nan)
-            estimate, contrasts, places = self._first_estimate(pyramid.at(scale), places, xy)
-        return self._final_steps(pyramid.at(scale), estimate, contrasts, places, short_edge, pyramid)
+            estimate, contrasts, places = self._first_estimate(pyramid.level(scale), places, xy)
+        return self._final_steps(pyramid.level(scale), estimate, contrasts, places, short_edge, pyramid)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """The factor by which an image with this blur and these edges is reduced."""
@@ -129,7 +129,7 @@ class Refiner:
         """
         topology = self._topology
         markers, edges = len(topology.spokes), len(topology.edges)
-        xy, hidden, maps = extrapolate_pattern(view.reduced(start), topology)
+        xy, hidden, maps = extrapolate_pattern(view.to_level(start), topology)
         look = before or initial_appearance(view, topology, xy)
         estimate = Estimate(
             xy=xy,
@@ -183,13 +183,13 @@ class Refiner:
             xy = markers_without_dot_gain(places.xy_px, topology.cells, estimate.dot_gain)
             places = replace(places, xy_px=xy)
         start = with_pattern_moved(topology, estimate)
-        if estimate.sigma < schedule.sharp_blur_share * edge_px and view.scale < schedule.reduced:
+        if estimate.sigma < schedule.sharp_blur_share * edge_px and view.scale < schedule.cheap_reduction:
             return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
         coarser = start.sigma >= 2 * COARSE_BLUR * schedule.reduction_blur_px
         blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
         usual_px, spent = median_edge(start.xy, topology.edges) if blurred else edge_px, 0.0
         if pyramid and coarser and usual_px >= 2 * COARSE_EDGE_PX:
-            start, spent = self._coarse_step(view, start, pyramid.at(2 * view.scale))
+            start, spent = self._coarse_step(view, start, pyramid.level(2 * view.scale))
         estimate = self._synthesis_solver.steps(view, start, schedule, edge_px, usual_px, spent)
         return self._accept_or_recover(view, estimate, contrasts, places)
 

@@ -213,9 +213,9 @@ class SynthesisSolver:
     ) -> tuple[NDArray[np.bool_], int, bool]:
         """``UnconvergedMarkers`` after a step."""
         assert estimate.reading is not None
-        unlimited = wide_blur or schedule.near == 0.0
+        unlimited = wide_blur or schedule.converged_blur_share == 0.0
         rule = ConvergenceRule(
-            converged_blur_share=schedule.near,
+            converged_blur_share=schedule.converged_blur_share,
             sigma=drawing.sigma,
             max_blur_share=np.inf if unlimited else SMALL_BLUR,
             converged_deviations=schedule.converged_deviations,

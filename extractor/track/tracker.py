@@ -237,9 +237,6 @@ class Tracker:
         frames_since_cold: int,
     ) -> None:
         last = self._state
-        before = last.xy_px if last is not None and not last.gap else None
-        known = markers.status == Status.MEASURED
-        seen = markers.stages["refine"].appearance
         self._state = _TrackState(
             xy_px=markers.xy_px,
             known=markers.status == Status.MEASURED,
