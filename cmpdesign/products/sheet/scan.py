@@ -151,9 +151,12 @@ def _find_codes(gray: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
         # A picture smaller than a search size is searched at its own size, once.
         factors = dict.fromkeys(min(1.0, side / max(region.gray.shape)) for side in SEARCH_PX)
         for factor, detector in product(factors, detectors):
-            reduced = region.gray
-            if factor != 1:
-                reduced = cv2.resize(reduced, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+            area = cv2.INTER_AREA
+            reduced = (
+                region.gray
+                if factor == 1
+                else cv2.resize(region.gray, None, fx=factor, fy=factor, interpolation=area)
+            )
             text, corners, _ = detector.detectAndDecode(reduced)
             key = parse_key(text) if text else None
             if key is not None and corners is not None:
