@@ -47,9 +47,9 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     require_no_errors(findings)
     figures: dict[str, Any] = {}
     parts = make_parts(stack)
-    mold = [_add_checked_figures(f"mold/{part.name}", make_part_mesh(part), figures) for part in parts]
+    mold = [_add_checked_figures(f"mold/{part.name}", *make_part_mesh(part), figures) for part in parts]
     pad = [
-        _add_checked_figures(f"pad/{mesh.name}", PartMesh(mesh, volume_mm3, EXACT_TOLERANCE), figures)
+        _add_checked_figures(f"pad/{mesh.name}", mesh, volume_mm3, EXACT_TOLERANCE, figures)
         for mesh, volume_mm3 in pad_meshes(stack)
     ]
     files: dict[str, str | bytes] = {f"{FOLDER}/mold-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in mold}
@@ -96,7 +96,9 @@ def make_part_mesh(part: Part) -> PartMesh:
     return PartMesh(tessellate_solid(part.name, part.color, solid), slab_volume_mm3(slab), EXACT_TOLERANCE)
 
 
-def _add_checked_figures(name: str, part_mesh: PartMesh, figures: dict[str, Any]) -> TriangleMesh:
+def _add_checked_figures(
+    name: str, mesh: TriangleMesh, volume_mm3: float, tolerance: float, figures: dict[str, Any]
+) -> TriangleMesh:
     """Check a mesh with trimesh, and add its figures to ``figures``; the mesh.
 
     Raises:
@@ -104,7 +106,6 @@ def _add_checked_figures(name: str, part_mesh: PartMesh, figures: dict[str, Any]
     """
     import trimesh
 
-    mesh, volume_mm3, tolerance = part_mesh.mesh, part_mesh.volume_mm3, part_mesh.tolerance
     body = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
     error = abs(float(mesh.volume_mm3()) / volume_mm3 - 1)
     if not body.is_watertight or not body.is_winding_consistent or error > tolerance:
