@@ -1,4 +1,4 @@
-"""What a design can be turned into, one folder a product; ``registry`` names them all.
+"""Products of a design, one folder each; ``registry`` lists them all.
 
 In: a ``Design`` and its ``Layout``. Out: files by name, figures and findings.
 """

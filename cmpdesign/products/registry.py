@@ -1,9 +1,9 @@
-"""What a design can be turned into: the registry of products, and their making.
+"""The registry of products, and the function that makes them.
 
-A product is added by one line in ``PRODUCTS``, which names its maker as "module:function"
-so that nothing is imported before it is asked for. The maker takes ``(design, layout)`` and returns a
-``ProductFiles``: the files (path relative to the output folder -> content) and, where it has any, figures for
-``report.json`` (they stand there under the product's name) and findings that the user should hear of.
+A product is added by one line in ``PRODUCTS``. The line names the product's maker as "module:function", so that
+the module is imported only when the product is made. A maker takes ``(design, layout)`` and returns
+``ProductFiles``: files (path relative to the output folder -> content), figures for ``report.json`` (under the
+product's name), and findings for the user.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ProductFiles:
-    """What a product came to.
+    """The result of a maker.
 
     Attributes:
         files: path relative to the output folder, with "/" -> content; the same bytes for the same design.
-        figures: what the product measures of itself, as JSON values; its member in ``report.json``.
-        findings: what will not or may not work.
-        pictures: name -> (H, W, 3) uint8 BGR, of what was made; they are shown in ``preview.png``.
+        figures: measures of the product as JSON values; the product's member in ``report.json``.
+        findings: errors and warnings about the product.
+        pictures: name -> (H, W, 3) uint8 BGR picture of the product, shown in ``preview.png``.
     """
 
     files: Mapping[str, str | bytes]
@@ -51,8 +51,8 @@ class Product:
 
     Attributes:
         maker: "module:function" of the ``Maker``.
-        where: the file or folder that appears, for help texts.
-        usual: made by a plain ``build``; the others only when ``--only`` names them.
+        where: the file or folder that the product writes; a folder ends with "/".
+        usual: True if a plain ``build`` makes the product; other products are made when ``--only`` names them.
     """
 
     maker: str
@@ -64,7 +64,7 @@ PREVIEW, REPORT = "preview", "report"
 PRODUCTS: Mapping[str, Product] = {
     "svg": Product("cmpdesign.products.registry:_make_svg", "pattern.svg", usual=True),
     "layout": Product("cmpdesign.products.registry:_make_layout", "layout.json", usual=True),
-    # The preview and the report are no ``Maker``s: they show what the others made and measured.
+    # The preview and the report are no ``Maker``s: they show the pictures and figures of the other products.
     PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
     "laser": Product("cmpdesign.products.laser.make:make_laser", "laser/"),
     "mold": Product("cmpdesign.products.mold.make:make_mold", "mold/"),
@@ -76,10 +76,13 @@ USUAL_NAMES = ",".join(name for name, product in PRODUCTS.items() if product.usu
 
 
 def chosen_products(only: str) -> list[str]:
-    """The names in a text such as "svg, layout", in the registry's order.
+    """Parse the names in a text such as "svg, layout".
+
+    Returns:
+        The names in the registry's order, each once.
 
     Raises:
-        CmpDesignError: an unknown name, or none.
+        CmpDesignError: a name is unknown, or the text has no name.
     """
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
@@ -91,7 +94,7 @@ def chosen_products(only: str) -> list[str]:
 
 
 def product_folders() -> list[str]:
-    """Folders that products fill, as "mold/"."""
+    """The folders of products, as "mold/"."""
     return [product.where for product in PRODUCTS.values() if product.where.endswith("/")]
 
 
@@ -100,14 +103,13 @@ def make_products(
 ) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
     """Make the named products.
 
-    A product that has figures brings ``report.json`` with it, one that has pictures ``preview.png``, named or
-    not.
+    ``report.json`` is also made when a named product has figures, and ``preview.png`` when one has pictures.
 
     Returns:
-        All files by relative path, in the registry's order, and the products' findings.
+        All files by relative path, in the registry's order, and the findings of the products.
 
     Raises:
-        CmpDesignError: one of them cannot be made; nothing has been written.
+        CmpDesignError: a product cannot be made. No file has been written.
     """
     made = {name: _load_maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
     pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}

@@ -1,4 +1,4 @@
-"""Drawings: ``pattern.svg``, true to size, and ``preview.png``.
+"""Drawings of the pattern: ``pattern.svg`` at true size, and ``preview.png``.
 
-In: a ``Layout``. Out: texts and pictures.
+In: a ``Layout``. Out: SVG text and PNG bytes.
 """

@@ -1,8 +1,9 @@
-"""preview.png: the pattern as a dimensioned drawing, to look at."""
+"""preview.png: a dimensioned drawing of the pattern."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,11 @@ from cmpdesign.patterns.colors import BLACK, COLORS
 LONG_SIDE_PX = 1000
 MARGIN_PX = 70
 TITLE_PX = 60
-# Drawn larger and averaged down: smooth edges, and the same pixels on every machine.
+# The pattern is drawn larger by this factor and averaged: smooth edges, and the same pixels on every machine.
 _SUPERSAMPLING = 4
+# Fractional bits of OpenCV's fixed-point coordinates.
 _SUBPIXEL_BITS = 8
-# Ids are drawn when an edge is long enough to hold one.
+# Ids are drawn when the median edge has at least this length.
 _ID_EDGE_PX = 34
 
 _PAPER_BGR = (250, 250, 248)
@@ -27,11 +29,14 @@ Image = NDArray[np.uint8]
 
 
 def preview_png(layout: Layout, pictures: Mapping[str, Image] | None = None) -> bytes:
-    """The preview as PNG bytes: pattern, overall dimensions, key figures, ids where there is room.
+    """Draw the preview: pattern, overall dimensions, key figures, and ids where edges are long enough.
 
     Args:
         layout: the pattern.
-        pictures: of what else was made, by name; they follow beside and below.
+        pictures: name -> (H, W, 3) uint8 BGR pictures of other products, placed right of and below the drawing.
+
+    Returns:
+        The bytes of a PNG file.
     """
     import cv2
 
@@ -44,38 +49,51 @@ def preview_png(layout: Layout, pictures: Mapping[str, Image] | None = None) -> 
 
 
 def draw_preview(layout: Layout) -> Image:
-    """The preview as a (H, W, 3) uint8 BGR image; the outline's longer side takes ``LONG_SIDE_PX``."""
+    """Draw the preview without pictures of other products.
+
+    Returns:
+        (H, W, 3) uint8 BGR; the longer side of the pattern's outline measures ``LONG_SIDE_PX``.
+    """
     scale = LONG_SIDE_PX / max(layout.size_mm)
     width, height = (int(np.ceil(scale * side)) for side in layout.size_mm)
     image: Image = np.full(
         (height + 2 * MARGIN_PX + TITLE_PX, width + 2 * MARGIN_PX, 3), _PAPER_BGR, np.uint8
     )
-    origin = np.array([MARGIN_PX, MARGIN_PX + TITLE_PX])
-    corner = layout.outline_mm.min(axis=0)[0], layout.outline_mm.max(axis=0)[1]
+    frame = _PixelFrame(MARGIN_PX, MARGIN_PX + TITLE_PX, width, height)
+    top_left_mm = layout.outline_mm.min(axis=0)[0], layout.outline_mm.max(axis=0)[1]
 
     def to_px(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(origin + scale * (xy_mm - corner) * (1, -1))
+        return np.asarray(np.array([frame.left, frame.top]) + scale * (xy_mm - top_left_mm) * (1, -1))
 
     image = _cells_image(image, layout, to_px(layout.outline_mm), to_px(layout.marker_xy_mm))
-    _draw_ids(image, layout, to_px(layout.marker_xy_mm), scale)
-    _draw_dimensions(image, layout, origin, (width, height))
+    _draw_ids(image, layout, to_px(layout.marker_xy_mm))
+    _draw_dimensions(image, layout, frame)
     _draw_title(image, layout)
     return image
 
 
+class _PixelFrame(NamedTuple):
+    """The bounding box of the drawn pattern, px."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+
 def _cells_image(
-    image: Image, layout: Layout, outline: NDArray[np.float64], xy: NDArray[np.float64]
+    image: Image, layout: Layout, outline_px: NDArray[np.float64], marker_px: NDArray[np.float64]
 ) -> Image:
+    """A picture of the size of ``image`` with the ground and the colored cells."""
     import cv2
 
     large: Image = np.empty((image.shape[0] * _SUPERSAMPLING, image.shape[1] * _SUPERSAMPLING, 3), np.uint8)
     large[:] = _PAPER_BGR
-    _draw_polygons(large, [outline], _ink_bgr(layout, BLACK))
+    _draw_polygons(large, [outline_px], _ink_bgr(layout, BLACK))
     for color in range(len(COLORS)):
         if color != BLACK:
-            _draw_polygons(
-                large, list(xy[layout.cell_corners[layout.cell_color == color]]), _ink_bgr(layout, color)
-            )
+            cells = layout.cell_corners[layout.cell_color == color]
+            _draw_polygons(large, list(marker_px[cells]), _ink_bgr(layout, color))
     small = cv2.resize(large, (image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)
 
@@ -83,37 +101,38 @@ def _cells_image(
 def _draw_polygons(large: Image, polygons: list[NDArray[np.float64]], color: tuple[int, int, int]) -> None:
     import cv2
 
-    # A pixel's centre is a whole number for OpenCV, so the large image's grid lies half a pixel off.
+    # OpenCV puts pixel centres at whole numbers, so the grid of the large image lies half a pixel off.
     unit = 1 << _SUBPIXEL_BITS
     for polygon in polygons:
         points = np.rint((_SUPERSAMPLING * polygon - 0.5) * unit).astype(np.int32)
         cv2.fillConvexPoly(large, points, color, cv2.LINE_8, _SUBPIXEL_BITS)
 
 
-def _draw_ids(image: Image, layout: Layout, xy: NDArray[np.float64], scale: float) -> None:
-    """Every seen marker as a dot with its id, when there is room for all of them."""
-    ends = xy[layout.edges]
+def _draw_ids(image: Image, layout: Layout, marker_px: NDArray[np.float64]) -> None:
+    """Draw the id above every marker that is present, if edges are long enough."""
+    ends = marker_px[layout.edges]
     edge_px = float(np.median(np.hypot(*(ends[:, 1] - ends[:, 0]).T)))
     if edge_px < _ID_EDGE_PX:
         return
     size = min(0.5, edge_px / 130)
     for marker in np.flatnonzero(layout.present).tolist():
-        at = xy[marker] + (0, -0.16 * edge_px)
-        _draw_text(image, str(marker), at, size, (255, 255, 255), outline=True)
+        place = marker_px[marker] + (0, -0.16 * edge_px)
+        _draw_text(image, str(marker), place, size, (255, 255, 255), outline=True)
 
 
-def _draw_dimensions(image: Image, layout: Layout, origin: NDArray[np.int64], size: tuple[int, int]) -> None:
-    """Overall width below and overall height on the right, as on an engineering drawing."""
-    (left, top), (width, height) = origin, size
-    below, beside = top + height + MARGIN_PX // 2, left + width + MARGIN_PX // 2
-    for x in (left, left + width):
-        _draw_line(image, (x, top + height + 8), (x, below + 8), _FAINT_BGR)
-    for y in (top, top + height):
-        _draw_line(image, (left + width + 8, y), (beside + 8, y), _FAINT_BGR)
-    _draw_arrow(image, (left, below), (left + width, below))
-    _draw_arrow(image, (beside, top), (beside, top + height))
-    _draw_label(image, f"{layout.size_mm[0]:.2f} mm", (left + width / 2, below), upright=False)
-    _draw_label(image, f"{layout.size_mm[1]:.2f} mm", (beside, top + height / 2), upright=True)
+def _draw_dimensions(image: Image, layout: Layout, frame: _PixelFrame) -> None:
+    """Draw the overall width below the pattern and the overall height right of it."""
+    right, bottom = frame.left + frame.width, frame.top + frame.height
+    line_y, line_x = bottom + MARGIN_PX // 2, right + MARGIN_PX // 2
+    for x in (frame.left, right):
+        _draw_line(image, (x, bottom + 8), (x, line_y + 8), _FAINT_BGR)
+    for y in (frame.top, bottom):
+        _draw_line(image, (right + 8, y), (line_x + 8, y), _FAINT_BGR)
+    _draw_arrow(image, (frame.left, line_y), (right, line_y))
+    _draw_arrow(image, (line_x, frame.top), (line_x, bottom))
+    middle_x, middle_y = frame.left + frame.width / 2, frame.top + frame.height / 2
+    _draw_label(image, f"{layout.size_mm[0]:.2f} mm", (middle_x, line_y), upright=False)
+    _draw_label(image, f"{layout.size_mm[1]:.2f} mm", (line_x, middle_y), upright=True)
 
 
 def _draw_title(image: Image, layout: Layout) -> None:
@@ -153,7 +172,7 @@ def _draw_line(
 
 
 def _draw_label(image: Image, text: str, middle: tuple[float, float], upright: bool) -> None:
-    """A label that interrupts its dimension line; upright ones read from below to above."""
+    """Draw a label over the middle of a dimension line; an upright label reads from below to above."""
     import cv2
 
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
@@ -170,26 +189,27 @@ def _draw_label(image: Image, text: str, middle: tuple[float, float], upright: b
 def _draw_text(
     image: Image,
     text: str,
-    at: NDArray[np.float64] | tuple[float, float],
+    place: NDArray[np.float64] | tuple[float, float],
     size: float,
     color: tuple[int, int, int],
     left: bool = False,
     outline: bool = False,
     weight: int = 1,
 ) -> None:
-    """Text with its baseline's left end, or its middle, at a place."""
+    """Draw a text with its middle, or (``left``) the left end of its base line, at a place in px."""
     import cv2
 
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, weight)
-    x, y = (at[0], at[1]) if left else (at[0] - width / 2, at[1] + height / 2)
-    place = [round(float(x)), round(float(y))]
+    x, y = (place[0], place[1]) if left else (place[0] - width / 2, place[1] + height / 2)
+    start = [round(float(x)), round(float(y))]
     if outline:
         for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-            around = [place[0] + dx, place[1] + dy]
-            cv2.putText(image, text, around, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), weight, cv2.LINE_AA)
-    cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, color, weight, cv2.LINE_AA)
+            shifted = [start[0] + dx, start[1] + dy]
+            cv2.putText(image, text, shifted, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), weight, cv2.LINE_AA)
+    cv2.putText(image, text, start, cv2.FONT_HERSHEY_SIMPLEX, size, color, weight, cv2.LINE_AA)
 
 
 def _ink_bgr(layout: Layout, color: int) -> tuple[int, int, int]:
+    """Blue, green, red (0 to 255) of an index into ``COLORS``."""
     text = layout.palette[COLORS[color]]
     return int(text[5:7], 16), int(text[3:5], 16), int(text[1:3], 16)

@@ -1,4 +1,4 @@
-"""pattern.svg: true to size (1 user unit = 1 mm), one group per color, one closed path per cell."""
+"""pattern.svg: true size (1 user unit = 1 mm), one group per color, one closed path per cell."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from cmpdesign.files.atomic import write_file
 from cmpdesign.layout.layout import DECIMALS, Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
 
+# Height of the strip for scale bar and caption.
 SCALE_STRIP_MM = 6.0
 _TEXT_COLOR = "#000000"
 _FONT = {"font_family": "sans-serif"}
-# The mean letter of a wide sans-serif face.
+# Width of the mean letter of a wide sans-serif face, in units of the font size.
 _EM_PER_LETTER = 0.6
 
 SheetMap = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -34,15 +35,19 @@ def write_svg(
 
 
 def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mirror: bool = False) -> str:
-    """The pattern as SVG text: width and height in mm, the viewBox in mm, y down from the outline's top.
+    """Format the pattern as SVG: width, height and viewBox in mm, y down from the top of the outline.
 
-    Coordinates are computed, never transformed, so that any reader finds them in the path data. The ground
-    (group "black") is drawn first; black cells are ground and not drawn again.
+    Path data hold final coordinates; no transform is applied. The ground (group "black") is drawn first. Black
+    cells belong to the ground and have no path of their own.
 
     Args:
-        ids: every seen marker's id in small white letters (group "ids").
-        scale: a scale bar and a caption below the pattern (group "scale").
-        mirror: the drawing as in a mirror, for film that is transferred face down.
+        layout: the pattern.
+        ids: add the id of every present marker in small white letters (group "ids").
+        scale: add a scale bar and a caption below the pattern (group "scale").
+        mirror: mirror the drawing left to right, for film that is transferred face down.
+
+    Returns:
+        The text of the file.
     """
     import svgwrite
 
@@ -102,7 +107,7 @@ def _id_group(drawing: Any, layout: Layout, xy: NDArray[np.float64], mirror: boo
 
 
 def _scale_group(drawing: Any, layout: Layout, mirror: bool) -> Any:
-    """A bar with its length beside it, and below them a caption that shrinks until it fits the sheet."""
+    """A bar labelled with its length, and below it a caption whose font is at most as wide as the drawing."""
     width, height = layout.size_mm
     length = scale_length_mm(width)
     caption = _caption_text(layout)
@@ -115,13 +120,13 @@ def _scale_group(drawing: Any, layout: Layout, mirror: bool) -> Any:
 
 
 def scale_length_mm(width_mm: float) -> float:
-    """The longest of 1, 2, 5, 10, ... mm that is at most half the width."""
+    """The largest of 1, 2, 5, 10, ... mm that is at most half the width."""
     decade = 10.0 ** np.floor(np.log10(width_mm / 2))
-    return float(max(step * decade for step in (1, 2, 5) if step * decade <= width_mm / 2))
+    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= width_mm / 2))
 
 
 def _text_element(drawing: Any, text: str, x: float, y: float, mirror: bool) -> Any:
-    """Text at a place; mirrored with the drawing, so that it reads rightly after the transfer."""
+    """A text at a place in mm; mirrored with the drawing, so that the text is legible after the transfer."""
     if not mirror:
         return drawing.text(text, insert=(x, y))
     return drawing.text(text, insert=(0, 0), transform=f"translate({x!r} {y!r}) scale(-1 1)")

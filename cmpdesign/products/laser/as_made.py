@@ -1,5 +1,4 @@
-"""What a job leaves: areas, corners and webs of the cavities, from the beam swept over the paths, at both
-faces."""
+"""The geometry that a job leaves at both faces: areas, corners and webs, from the beam swept over the paths."""
 
 from __future__ import annotations
 
@@ -16,23 +15,22 @@ from cmpdesign.products.laser.paths.kerf import polygon_areas
 from cmpdesign.products.laser.paths.webs import burn_depth_mm, smallest_web_mm
 
 SheetFace = Literal["front", "back"]
-# Webs wider than this are no concern of anybody's; only cavities nearer than this are compared.
+# Cavities further apart than this many pitches are not compared.
 WEB_REACH_PITCHES = 1.5
 
 
 @dataclass(frozen=True)
 class FaceFigures:
-    """A pass at one face. Lengths in mm, areas in percent of the nominal cell.
+    """The figures of a pass at one face.
 
     Attributes:
-        area_error_percent: of all cells together.
-        area_error_worst_percent: of the worst cell, with its sign.
-        corner_loss_mm: from a nominal corner to the nearest point burnt, the worst one.
-        burnt_beside_mm: how far the burn reaches past a cell's sides, at most.
-        web_mm: the smallest wall left between two cavities of this pass; None for a lone cavity.
-        web_to_filled_mm: the smallest wall to a cavity filled before; None for the first pass. Where
-        cavities meet,
-            this is 0, and negative where the burn runs into the filled one.
+        area_error_percent: error of the total area, in percent of the nominal area.
+        area_error_worst_percent: signed error of the cell with the largest absolute error.
+        corner_loss_mm: largest distance from a nominal corner to the nearest burnt point.
+        burnt_beside_mm: largest distance by which the burn exceeds a cell's sides; 0 if nowhere.
+        web_mm: smallest wall between two cavities of this pass; None without neighbouring cavities.
+        web_to_filled_mm: smallest wall to a cavity filled before; None for the first pass. 0 where cavities meet,
+            negative where the burn runs into the filled cavity.
     """
 
     area_error_percent: float
@@ -45,7 +43,7 @@ class FaceFigures:
 
 @dataclass(frozen=True)
 class PassFigures:
-    """A pass at both faces; None where the beam has closed before the back."""
+    """The figures of a pass at both faces; ``back`` is None if the beam closes before the back."""
 
     name: str
     front: FaceFigures
@@ -53,73 +51,75 @@ class PassFigures:
 
 
 def measure_as_made(job: LaserJob) -> tuple[PassFigures, ...]:
-    """The figures of every pass of cells."""
+    """Measure every pass of cells, in burning order."""
     back = job.back if min(job.back.x_mm, job.back.y_mm) > 0 else None
     front_figures = _measure_face(job, job.front)
     back_figures = _measure_face(job, back) if back else [None] * len(front_figures)
     return tuple(
-        PassFigures(one.name, front, rear)
-        for one, front, rear in zip(job.cell_passes, front_figures, back_figures, strict=True)
+        PassFigures(laser_pass.name, front, rear)
+        for laser_pass, front, rear in zip(job.cell_passes, front_figures, back_figures, strict=True)
     )
 
 
-def burnt_cell_outlines_mm(one: LaserPass, beam: BeamFootprint) -> Points:
-    """(N, P, 2) outlines of a pass' cavities on the bed, in burning order."""
-    assert one.cavities is not None
-    return burnt_outlines_mm(one.cavities, beam)
+def burnt_cell_outlines_mm(laser_pass: LaserPass, beam: BeamFootprint) -> Points:
+    """(N, P, 2) outlines of a pass' cavities in the bed's frame, in burning order, mm."""
+    assert laser_pass.cavities is not None
+    return burnt_outlines_mm(laser_pass.cavities, beam)
 
 
 def _measure_face(job: LaserJob, beam: BeamFootprint) -> list[FaceFigures]:
     figures: list[FaceFigures] = []
     filled: list[Points] = []
-    paths: list[Cavities] = []
+    filled_cavities: list[Cavities] = []
     reach_mm = WEB_REACH_PITCHES * float(job.layout.parameters["pitch_mm"])
-    for one in job.cell_passes:
-        made = one.cavities
-        assert made is not None
-        outlines = burnt_outlines_mm(made, beam)
-        web = smallest_web_mm([made], [outlines], beam, reach_mm)
+    for laser_pass in job.cell_passes:
+        cavities = laser_pass.cavities
+        assert cavities is not None
+        outlines = burnt_outlines_mm(cavities, beam)
+        web = smallest_web_mm([cavities], [outlines], beam, reach_mm)
         to_filled = None
         if filled:
-            to_filled = smallest_web_mm([made, *paths], [outlines, *filled], beam, reach_mm, across=True)
+            to_filled = smallest_web_mm(
+                [cavities, *filled_cavities], [outlines, *filled], beam, reach_mm, across=True
+            )
             if to_filled is not None and to_filled <= 0:
                 to_filled = -burn_depth_mm(outlines, np.concatenate(filled))
-        figures.append(_face_figures(made, outlines, beam, web, to_filled))
+        figures.append(_face_figures(cavities, outlines, beam, web, to_filled))
         filled.append(outlines)
-        paths.append(made)
+        filled_cavities.append(cavities)
     return figures
 
 
 def _face_figures(
-    made: Cavities, outlines: Points, beam: BeamFootprint, web: float | None, to_filled: float | None
+    cavities: Cavities, outlines: Points, beam: BeamFootprint, web: float | None, to_filled: float | None
 ) -> FaceFigures:
-    nominal = polygon_areas(made.nominal_mm)
-    burnt = burnt_areas_mm2(made, beam)
+    nominal = polygon_areas(cavities.nominal_mm)
+    burnt = burnt_areas_mm2(cavities, beam)
     errors = 100 * (burnt / nominal - 1)
     return FaceFigures(
         area_error_percent=_round_figure(100 * (float(burnt.sum()) / float(nominal.sum()) - 1)),
         area_error_worst_percent=_round_figure(float(errors[np.abs(errors).argmax()])),
-        corner_loss_mm=_round_figure(float(corner_losses_mm(made, outlines).max())),
-        burnt_beside_mm=_round_figure(float(np.maximum(burnt_reach_beside_mm(made, outlines), 0).max())),
+        corner_loss_mm=_round_figure(float(corner_losses_mm(cavities, outlines).max())),
+        burnt_beside_mm=_round_figure(float(np.maximum(burnt_reach_beside_mm(cavities, outlines), 0).max())),
         web_mm=None if web is None else _round_figure(web),
         web_to_filled_mm=None if to_filled is None else _round_figure(to_filled),
     )
 
 
-def corner_losses_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
-    """(N, K) from each nominal corner to the nearest point of the burnt outline; 0 where it is burnt."""
-    corners = made.nominal_mm.shape[1]
+def corner_losses_mm(cavities: Cavities, outlines: Points) -> NDArray[np.float64]:
+    """(N, K) distance from each nominal corner to the nearest point of the burnt outline; 0 for a burnt corner."""
+    corners = cavities.nominal_mm.shape[1]
     arcs = outlines.reshape(len(outlines), corners, -1, 2)
-    gap = np.linalg.norm(arcs - made.nominal_mm[:, :, None], axis=-1).min(axis=2)
-    # Past the corner along the spur there is nothing left to lose.
-    outward = made.nominal_mm - made.path_mm
-    past = ((arcs - made.nominal_mm[:, :, None]) * outward[:, :, None]).sum(axis=-1).max(axis=2) > 0
+    gap = np.linalg.norm(arcs - cavities.nominal_mm[:, :, None], axis=-1).min(axis=2)
+    # A burn that passes the corner along the spur leaves no loss.
+    outward = cavities.nominal_mm - cavities.path_mm
+    past = ((arcs - cavities.nominal_mm[:, :, None]) * outward[:, :, None]).sum(axis=-1).max(axis=2) > 0
     return np.where(past, 0.0, gap)
 
 
-def burnt_reach_beside_mm(made: Cavities, outlines: Points) -> NDArray[np.float64]:
-    """(N,) how far each burnt outline reaches past its cell's sides; negative where it stays inside."""
-    start = made.nominal_mm
+def burnt_reach_beside_mm(cavities: Cavities, outlines: Points) -> NDArray[np.float64]:
+    """(N,) largest distance by which each burnt outline exceeds its cell's sides; negative if it stays inside."""
+    start = cavities.nominal_mm
     side = np.roll(start, -1, axis=1) - start
     outward = np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.linalg.norm(side, axis=-1, keepdims=True)
     offset = (start * outward).sum(axis=-1)
@@ -128,5 +128,5 @@ def burnt_reach_beside_mm(made: Cavities, outlines: Points) -> NDArray[np.float6
 
 
 def _round_figure(value: float) -> float:
-    """Rounded to what the geometry holds, so that every machine writes the same figure."""
+    """Round to 6 decimals, so that every computer writes the same figure."""
     return round(value, 6) + 0.0

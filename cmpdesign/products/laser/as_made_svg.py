@@ -1,6 +1,6 @@
-"""as-made.svg: the pattern as the laser leaves it and the inks fill it, true to size, at the front.
+"""as-made.svg: the pattern with the cavities as the laser leaves them at the front, filled with ink, at true size.
 
-It is drawn like ``pattern.svg``, so that it can be compared, rendered and read by the extractor.
+The drawing is built like ``pattern.svg``, so that programs can compare and render it and the extractor can read it.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.paths.beam import Points
 
-# Every fourth point of the corners' arcs: chords stay within 2 micrometres of a curve of 0.125 mm radius.
+# Every fourth point of the outlines is drawn: chords stay within 2 micrometres of a curve of 0.125 mm radius.
 POINT_STRIDE = 4
 
 
 def as_made_svg(job: LaserJob) -> str:
-    """One group a pass, filled with its ink, over the black ground; y down from the outline's top."""
+    """Format the drawing: one group per pass in the pass' ink over the black ground; y down from the outline's top."""
     low, high = job.outline_mm.min(axis=0), job.outline_mm.max(axis=0)
     width, height = (high - low).tolist()
     lines = [
@@ -25,10 +25,14 @@ def as_made_svg(job: LaserJob) -> str:
         f'height="{format_mm(height)}mm" viewBox="0 0 {format_mm(width)} {format_mm(height)}">',
         _pass_group("black", job.layout.palette[COLORS[BLACK]], [job.outline_mm], low[0], high[1]),
     ]
-    for one in job.cell_passes:
-        assert one.color is not None
-        outlines = list(burnt_cell_outlines_mm(one, job.front)[:, ::POINT_STRIDE])
-        lines.append(_pass_group(one.name, job.layout.palette[COLORS[one.color]], outlines, low[0], high[1]))
+    for laser_pass in job.cell_passes:
+        assert laser_pass.color is not None
+        outlines = list(burnt_cell_outlines_mm(laser_pass, job.front)[:, ::POINT_STRIDE])
+        lines.append(
+            _pass_group(
+                laser_pass.name, job.layout.palette[COLORS[laser_pass.color]], outlines, low[0], high[1]
+            )
+        )
     return "\n".join([*lines, "</svg>", ""])
 
 

@@ -1,5 +1,4 @@
-"""Jobs that would go wrong are refused before a file is written: each reason with value, limit, unit,
-remedy."""
+"""Checks of a laser job before a file is written: findings with value, limit, unit and remedy."""
 
 from __future__ import annotations
 
@@ -14,28 +13,27 @@ from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.strokes import Strokes
 
-# A cured neighbour may lose a thin skin where cavities meet; half a kerf of it changes what its corners show.
+# Largest depth of the burn into a cured neighbour, in kerfs; a deeper burn changes the neighbour's corners.
 BURN_LIMIT_KERFS = 0.5
-# Two paths whose points all lie this close are one path burnt twice.
+# Paths whose points agree to within this distance count as one path burnt twice.
 SAME_MM = 1e-3
 
 
 def require_no_errors(findings: Iterator[Finding]) -> tuple[Finding, ...]:
-    """The warnings among the findings.
+    """Return the warnings among the findings.
 
     Raises:
-        DesignError: there is an error among them; all of them in one line.
+        DesignError: the findings contain errors; all errors in one line.
     """
-    found = tuple(findings)
-    errors = [str(finding) for finding in found if finding.severity == "error"]
+    collected = tuple(findings)
+    errors = [str(finding) for finding in collected if finding.severity == "error"]
     if errors:
         raise DesignError("the laser job is refused: " + "; and ".join(errors))
-    return tuple(finding for finding in found if finding.severity == "warning")
+    return tuple(finding for finding in collected if finding.severity == "warning")
 
 
 def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
-    """What is wrong before any figure is computed: text, machine limits, a beam that closes, cells that
-    vanish."""
+    """Findings that need no figures: text, limits of the machine, a beam that closes, cells that vanish."""
     setup = job.setup
     texts = [name for name in ("print_ids", "print_scale") if getattr(design, name)]
     if texts:
@@ -57,21 +55,22 @@ def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
         remedy = "lower laser.taper_deg or laser.depth_mm, or widen the kerf: the beam closes before the back"
         yield _error_finding("kerf at the back", 2 * min(job.back.x_mm, job.back.y_mm), 0, "mm", remedy)
     yield from _spacing_findings(job)
-    for one in job.cell_passes:
-        assert one.cavities is not None
-        lost = one.cavities.cell[~one.cavities.exists]
+    for laser_pass in job.cell_passes:
+        assert laser_pass.cavities is not None
+        lost = laser_pass.cavities.cell[~laser_pass.cavities.exists]
         if len(lost):
             remedy = f"cell {int(lost[0])} is among them; make pitch_mm larger or the kerf smaller"
             yield _error_finding(
-                f"cells of {one.name} that the kerf leaves nothing of", len(lost), 0, "", remedy
+                f"cells of {laser_pass.name} that the kerf leaves nothing of", len(lost), 0, "", remedy
             )
 
 
 def path_findings(job: LaserJob) -> Iterator[Finding]:
-    """What is wrong with the paths: off the bed, drawn twice, not closed, crossing themselves."""
-    left, bottom, right, top = job.extent_mm
-    bed = job.setup.machine.bed_width_mm.value, job.setup.machine.bed_height_mm.value
-    for axis, low, high, size in (("width", left, right, bed[0]), ("height", bottom, top, bed[1])):
+    """Findings on the paths: off the bed, drawn twice, not closed, crossing themselves."""
+    extent, machine = job.extent_mm, job.setup.machine
+    width = ("width", extent.left, extent.right, machine.bed_width_mm.value)
+    height = ("height", extent.bottom, extent.top, machine.bed_height_mm.value)
+    for axis, low, high, size in (width, height):
         if high - low > size:
             yield _error_finding(
                 f"{axis} of the job, on the bed",
@@ -82,32 +81,30 @@ def path_findings(job: LaserJob) -> Iterator[Finding]:
             )
         elif low < 0 or high > size:
             name = "laser.x_mm" if axis == "width" else "laser.y_mm"
-            beyond = high if high > size else low
+            edge = high if high > size else low
             yield _error_finding(
-                f"edge of the job beyond the bed's {axis}", beyond, size, "mm", f"move it by {name}"
+                f"edge of the job beyond the bed's {axis}", edge, size, "mm", f"move it by {name}"
             )
-    for one in job.passes:
-        twins, flat = count_duplicate_paths(one.walls), count_open_paths(one.walls)
-        if twins:
-            yield _error_finding(
-                f"paths of {one.name} that are drawn twice", twins, 0, "", "remove the repeated cells"
-            )
-        if flat:
-            yield _error_finding(
-                f"paths of {one.name} that enclose nothing", flat, 0, "", "close them, or remove them"
-            )
-        if one.kind == "outline":
-            yield from _crossing_findings(one)
+    for laser_pass in job.passes:
+        duplicates, open_paths = count_duplicate_paths(laser_pass.walls), count_open_paths(laser_pass.walls)
+        if duplicates:
+            subject = f"paths of {laser_pass.name} that are drawn twice"
+            yield _error_finding(subject, duplicates, 0, "", "remove the repeated cells")
+        if open_paths:
+            subject = f"paths of {laser_pass.name} that enclose nothing"
+            yield _error_finding(subject, open_paths, 0, "", "close them, or remove them")
+        if laser_pass.kind == "outline":
+            yield from _crossing_findings(laser_pass)
 
 
 def as_made_findings(job: LaserJob, figures: tuple[PassFigures, ...]) -> Iterator[Finding]:
-    """What is wrong with what the job leaves: webs too thin, cured neighbours burnt."""
+    """Findings on the resulting geometry: webs too thin, cured neighbours burnt, assumed values."""
     limit = job.setup.minimum_web_mm
-    for one in figures:
-        for where, face, beam in (("front", one.front, job.front), ("back", one.back, job.back)):
+    for one_pass in figures:
+        for side, face, beam in (("front", one_pass.front, job.front), ("back", one_pass.back, job.back)):
             if face is not None:
                 burn_limit = BURN_LIMIT_KERFS * beam.narrow_mm
-                yield from _web_findings(f"{one.name} at the {where}", face, limit, burn_limit)
+                yield from _web_findings(f"{one_pass.name} at the {side}", face, limit, burn_limit)
     if job.setup.options.holes and len(job.fiducials_mm):
         yield from _hole_web_findings(job, limit)
     if job.setup.assumed:
@@ -123,23 +120,23 @@ def as_made_findings(job: LaserJob, figures: tuple[PassFigures, ...]) -> Iterato
 
 
 def count_duplicate_paths(strokes: Strokes) -> int:
-    """How many closed paths repeat another one, wherever they start and whichever way round they run."""
+    """The number of closed paths that repeat another path, regardless of start and direction."""
     counts = np.diff(strokes.first)
-    sums = np.add.reduceat(strokes.xy_mm, strokes.first[:-1]) / counts[:, None]
+    means = np.add.reduceat(strokes.xy_mm, strokes.first[:-1]) / counts[:, None]
     squares = np.add.reduceat(strokes.xy_mm**2, strokes.first[:-1]) / counts[:, None]
-    spread = np.sqrt(np.maximum(squares - sums**2, 0))
-    key = np.round(np.column_stack([sums, spread, counts]) / SAME_MM).astype(np.int64)
+    spread = np.sqrt(np.maximum(squares - means**2, 0))
+    key = np.round(np.column_stack([means, spread, counts]) / SAME_MM).astype(np.int64)
     return len(key) - len(np.unique(key, axis=0))
 
 
 def count_open_paths(strokes: Strokes) -> int:
-    """How many paths are not closed round an area."""
+    """The number of paths that do not enclose an area."""
     if not strokes.closed:
         return len(strokes)
-    after = strokes.opened()
-    step = after.xy_mm[:-1, 0] * after.xy_mm[1:, 1] - after.xy_mm[1:, 0] * after.xy_mm[:-1, 1]
-    step[after.first[1:-1] - 1] = 0
-    area = np.add.reduceat(step, after.first[:-1]) / 2
+    opened = strokes.opened()
+    cross = opened.xy_mm[:-1, 0] * opened.xy_mm[1:, 1] - opened.xy_mm[1:, 0] * opened.xy_mm[:-1, 1]
+    cross[opened.first[1:-1] - 1] = 0
+    area = np.add.reduceat(cross, opened.first[:-1]) / 2
     return int(np.count_nonzero(np.abs(area) < SAME_MM**2))
 
 
@@ -156,14 +153,14 @@ def _spacing_findings(job: LaserJob) -> Iterator[Finding]:
         )
 
 
-def _web_findings(where: str, face: FaceFigures, limit: float, burn_limit: float) -> Iterator[Finding]:
+def _web_findings(subject: str, face: FaceFigures, limit: float, burn_limit: float) -> Iterator[Finding]:
     if face.web_mm is not None and face.web_mm < limit:
         remedy = "make pitch_mm larger, the kerf smaller, or laser.minimum_web_mm if thinner walls hold"
-        yield _error_finding(f"smallest web of {where}", face.web_mm, limit, "mm", remedy)
+        yield _error_finding(f"smallest web of {subject}", face.web_mm, limit, "mm", remedy)
     if face.web_to_filled_mm is not None and -face.web_to_filled_mm > burn_limit:
         remedy = 'choose laser.corner = "plain" or laser.face = "front"'
         yield _error_finding(
-            f"burn of {where} into cured cells", -face.web_to_filled_mm, burn_limit, "mm", remedy
+            f"burn of {subject} into cured cells", -face.web_to_filled_mm, burn_limit, "mm", remedy
         )
 
 
@@ -181,13 +178,13 @@ def _hole_web_findings(job: LaserJob, limit: float) -> Iterator[Finding]:
         )
 
 
-def _crossing_findings(one: LaserPass) -> Iterator[Finding]:
+def _crossing_findings(laser_pass: LaserPass) -> Iterator[Finding]:
     import shapely
 
-    crossed = sum(not shapely.LinearRing(path).is_simple for path in one.walls)
+    crossed = sum(not shapely.LinearRing(path).is_simple for path in laser_pass.walls)
     if crossed:
         yield _error_finding(
-            f"paths of {one.name} that cross themselves", crossed, 0, "", "smooth the clip outline"
+            f"paths of {laser_pass.name} that cross themselves", crossed, 0, "", "smooth the clip outline"
         )
 
 

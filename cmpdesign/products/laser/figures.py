@@ -1,4 +1,4 @@
-"""The job in figures: for the report, the job sheet and whoever reads either."""
+"""The figures of a job, for the report and the job sheet."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from cmpdesign.products.laser.paths.timing import (
 
 @dataclass(frozen=True)
 class PassTiming:
-    """A pass in time and length.
+    """Time and path length of a pass.
 
     Attributes:
-        time_s: from the start at the bed's origin until the head is back there, all repeats.
-        burn_mm, travel_mm: lengths with and without beam, all repeats, without the ways from and to the
-        origin.
-        shortest_pause_s: the shortest time between two neighbouring cells in one repeat; None for lone cells.
+        time_s: time from the bed's origin through all repeats back to the origin.
+        burn_mm, travel_mm: lengths with and without beam, all repeats, without the moves from and to the origin.
+        shortest_pause_s: shortest time between two neighbouring cells in one repeat; None without neighbours.
     """
 
     time_s: float
@@ -35,41 +34,41 @@ class PassTiming:
     shortest_pause_s: float | None
 
 
-def pass_timing(job: LaserJob, one: LaserPass) -> PassTiming:
-    """The time that a pass takes, from speed, travel, acceleration and repeats."""
+def pass_timing(job: LaserJob, laser_pass: LaserPass) -> PassTiming:
+    """Compute the time of a pass from speed, travel speed, acceleration and repeats."""
     machine = job.setup.machine
     travel_speed, accel = machine.travel_mm_s.value, machine.acceleration_mm_s2.value
     time_s = burn_mm = travel_mm = 0.0
     pause: float | None = None
-    # Repeats differ only where a pocket's lines turn.
-    different = one.repeats if one.fills else 1
-    for repeat in range(different):
-        strokes = one.burnt(repeat)
-        begun, ended = begin_times_s(strokes, one.speed_mm_s, travel_speed, accel)
-        back = np.hypot(*(strokes.xy_mm[0] - strokes.xy_mm[-1]))
-        times = one.repeats / different
-        returns = times - (repeat == 0)
-        time_s += times * ended + returns * float(move_times_s(np.array([back]), travel_speed, accel)[0])
-        burn_mm += times * float(stroke_lengths_mm(strokes).sum())
-        travel_mm += times * float(travel_lengths_mm(strokes).sum()) + returns * float(back)
-        if one.cavities is not None and repeat == 0:
-            firsts = np.searchsorted(strokes.owner, np.arange(len(one.cavities.cell)))
-            centres = one.cavities.nominal_mm.mean(axis=1)
-            found = shortest_pause(np.arange(len(centres)), centres, begun[firsts])
-            pause = found if np.isfinite(found) else None
-    ways = np.hypot(*one.burnt(0).xy_mm[0]), np.hypot(*one.burnt(0).xy_mm[-1])
-    time_s += float(move_times_s(np.array(ways), travel_speed, accel).sum())
+    # Repeats differ only in the direction of a pocket's hatch.
+    distinct_repeats = laser_pass.repeats if laser_pass.fills else 1
+    for repeat in range(distinct_repeats):
+        strokes = laser_pass.burn_strokes(repeat)
+        begin_s, end_s = begin_times_s(strokes, laser_pass.speed_mm_s, travel_speed, accel)
+        return_mm = np.hypot(*(strokes.xy_mm[0] - strokes.xy_mm[-1]))
+        count = laser_pass.repeats / distinct_repeats
+        returns = count - (repeat == 0)
+        time_s += count * end_s + returns * float(move_times_s(np.array([return_mm]), travel_speed, accel)[0])
+        burn_mm += count * float(stroke_lengths_mm(strokes).sum())
+        travel_mm += count * float(travel_lengths_mm(strokes).sum()) + returns * float(return_mm)
+        if laser_pass.cavities is not None and repeat == 0:
+            firsts = np.searchsorted(strokes.owner, np.arange(len(laser_pass.cavities.cell)))
+            centres = laser_pass.cavities.nominal_mm.mean(axis=1)
+            shortest = shortest_pause(np.arange(len(centres)), centres, begin_s[firsts])
+            pause = shortest if np.isfinite(shortest) else None
+    first_repeat = laser_pass.burn_strokes(0)
+    to_and_from_origin = np.hypot(*first_repeat.xy_mm[0]), np.hypot(*first_repeat.xy_mm[-1])
+    time_s += float(move_times_s(np.array(to_and_from_origin), travel_speed, accel).sum())
     return PassTiming(
         round(time_s, 3), round(burn_mm, 3), round(travel_mm, 3), None if pause is None else round(pause, 3)
     )
 
 
 def job_figures(
-    job: LaserJob, made: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]
+    job: LaserJob, as_made: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]
 ) -> dict[str, Any]:
-    """The job's member of ``report.json``; lengths in mm, times in s, areas in percent of the nominal
-    cells."""
-    setup, by_name = job.setup, {one.name: one for one in made}
+    """The job's member of ``report.json``; lengths in mm, times in s, areas in percent of the nominal cells."""
+    setup, by_name = job.setup, {figures.name: figures for figures in as_made}
     return {
         "machine": setup.machine.name,
         "material": setup.material.name,
@@ -87,21 +86,24 @@ def job_figures(
         "extent_mm": [round(value, 4) for value in job.extent_mm],
         "layout_origin_mm": job.origin_mm.tolist(),
         "fiducials_mm": job.fiducials_mm.round(6).tolist(),
-        "time_s": round(sum(one.time_s for one in timings), 3),
+        "time_s": round(sum(timing.time_s for timing in timings), 3),
         "passes": [
-            _pass_figures(one, time, by_name.get(one.name))
-            for one, time in zip(job.passes, timings, strict=True)
+            _pass_figures(laser_pass, timing, by_name.get(laser_pass.name))
+            for laser_pass, timing in zip(job.passes, timings, strict=True)
         ],
     }
 
 
-def _pass_figures(one: LaserPass, time: PassTiming, made: PassFigures | None) -> dict[str, Any]:
+def _pass_figures(laser_pass: LaserPass, timing: PassTiming, as_made: PassFigures | None) -> dict[str, Any]:
+    faces = {}
+    if as_made is not None:
+        faces = {"front": asdict(as_made.front), "back": as_made.back and asdict(as_made.back)}
     return {
-        "name": one.name,
-        "paths": len(one.walls),
-        "power_percent": one.power_percent,
-        "speed_mm_s": one.speed_mm_s,
-        "repeats": one.repeats,
-        **asdict(time),
-        **({} if made is None else {"front": asdict(made.front), "back": made.back and asdict(made.back)}),
+        "name": laser_pass.name,
+        "paths": len(laser_pass.walls),
+        "power_percent": laser_pass.power_percent,
+        "speed_mm_s": laser_pass.speed_mm_s,
+        "repeats": laser_pass.repeats,
+        **asdict(timing),
+        **faces,
     }

@@ -1,14 +1,13 @@
-"""A laser job: the passes of a layout, in burning order, in the bed's frame (mm, x right, y up, origin
-lower left).
+"""A laser job: the passes of a layout in burning order, in the bed's frame (mm, x right, y up, origin lower left).
 
-The pattern lies on the bed as it is seen from the front: the beam comes from where it will be filled from.
+The front of the pattern faces the beam. The cavities are filled from the front.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +22,23 @@ from cmpdesign.products.laser.paths.order import order_cells
 from cmpdesign.products.laser.paths.strokes import Strokes, join_strokes, loop_strokes, ragged_strokes
 from cmpdesign.products.laser.setup import LaserSetup
 
+# Points of a circular path.
 CIRCLE_POINTS = 96
 PassKind = Literal["holes", "cells", "outline", "coupon"]
 
 
 @dataclass(frozen=True, eq=False)
 class LaserPass:
-    """What is burnt before the pad is taken out.
+    """The paths that are burnt before the pad is taken off the bed.
 
     Attributes:
-        name: of its files: "1-red".
+        name: name of the pass and of its files: "1-red".
         kind: fiducial holes, cells of one color, the pad's outline, or a coupon's openings.
-        color: index into ``COLORS``, for cells.
-        cavities: the cells in burning order; None for holes and outline.
-        walls: closed paths in burning order, each entered at its first point; a cavity's inner rings
-        precede it.
-        fills: one set of a pocket's lines for every repeat; empty without a hatch.
-        power_percent, speed_mm_s, repeats: how it is burnt.
-        entry_mm: (N, 2) where each closed path's owner is entered.
+        color: index into ``COLORS``; None if the pass carves no cells.
+        cavities: the cells in burning order; None if the pass carves no cells.
+        walls: closed paths in burning order, entered at their first points; inner rings precede their cavity's wall.
+        fills: a pocket's hatch lines for every repeat; empty without a hatch.
+        power_percent, speed_mm_s, repeats: settings.
     """
 
     name: str
@@ -53,10 +51,33 @@ class LaserPass:
     speed_mm_s: float
     repeats: int
 
-    def burnt(self, repeat: int) -> Strokes:
-        """Open strokes of one repeat, exactly as the beam runs them."""
+    def burn_strokes(self, repeat: int) -> Strokes:
+        """The open strokes of one repeat in burning order."""
         walls = self.walls.opened()
         return join_strokes([self.fills[repeat], walls]) if self.fills else walls
+
+
+class Extent(NamedTuple):
+    """A bounding box on the bed, mm."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+
+class CellGroup(NamedTuple):
+    """Cells that are carved in one pass.
+
+    Attributes:
+        color: index into ``COLORS``.
+        part: number of the group among those of its color.
+        cells: (N,) int64, numbers of the layout's cells.
+    """
+
+    color: int
+    part: int
+    cells: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +85,13 @@ class LaserJob:
     """All passes of a layout on a bed.
 
     Attributes:
-        name: the design's.
-        layout: where it comes from.
+        name: name of the design.
+        layout: layout of the design.
         setup: machine, material, settings.
-        origin_mm: (2,) where the layout's origin lies on the bed.
-        passes: in order.
-        fiducials_mm: (F, 2) on the bed.
-        outline_mm: (K, 2), the pad's, on the bed.
+        origin_mm: (2,) place of the layout's origin on the bed.
+        passes: passes in burning order.
+        fiducials_mm: (F, 2) centres of the fiducials on the bed.
+        outline_mm: (K, 2) outline of the pad on the bed.
     """
 
     name: str
@@ -83,31 +104,33 @@ class LaserJob:
 
     @cached_property
     def front(self) -> BeamFootprint:
-        """The footprint where the beam enters."""
+        """The beam's footprint at the front of the sheet."""
         return BeamFootprint.of_kerf(self.setup.kerf_x_mm, self.setup.kerf_y_mm)
 
     @cached_property
     def back(self) -> BeamFootprint:
-        """The footprint at the cavities' bottom."""
+        """The beam's footprint at the bottom of the cavities."""
         return self.front.at_depth(self.setup.depth_mm, self.setup.taper_deg)
 
     @property
     def cell_passes(self) -> tuple[LaserPass, ...]:
-        return tuple(one for one in self.passes if one.kind == "cells")
+        return tuple(laser_pass for laser_pass in self.passes if laser_pass.kind == "cells")
 
     @cached_property
-    def extent_mm(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right, top of everything that the beam's centre runs along, and of the fiducials."""
+    def extent_mm(self) -> Extent:
+        """The bounding box of the paths, the fiducials and the pad's outline."""
         radius = self.layout.fiducial_diameter_mm / 2
         marks = [self.fiducials_mm - radius, self.fiducials_mm + radius]
-        points = np.concatenate([one.walls.xy_mm for one in self.passes] + marks + [self.outline_mm])
+        points = np.concatenate(
+            [laser_pass.walls.xy_mm for laser_pass in self.passes] + marks + [self.outline_mm]
+        )
         left, bottom = points.min(axis=0).tolist()
         right, top = points.max(axis=0).tolist()
-        return left, bottom, right, top
+        return Extent(left, bottom, right, top)
 
 
 def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
-    """The passes of a layout: holes, each color's cells, the outline. Nothing is checked yet."""
+    """Make the passes of a layout: holes, cells color by color, outline. The job is not checked here."""
     origin_mm = _job_origin_mm(layout, setup)
     front = BeamFootprint.of_kerf(setup.kerf_x_mm, setup.kerf_y_mm)
     share = {"front": 0.0, "middle": 0.5, "back": 1.0}[setup.options.face]
@@ -118,19 +141,16 @@ def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
         passes.append(
             _cut_pass("0-holes", "holes", _hole_strokes(circles, layout.fiducial_diameter_mm, front), setup)
         )
-    for number, (color, part, cells) in enumerate(cell_groups(layout), start=1):
-        polygons_mm = layout.marker_xy_mm[layout.cell_corners[cells]] + origin_mm
-        suffix = f"-{part + 1}" if part else ""
-        made = make_cavities(cells, polygons_mm, beam, setup.options.corner)
-        passes.append(_cell_pass(f"{number}-{COLORS[color]}{suffix}", color, made, setup))
+    for number, group in enumerate(cell_groups(layout), start=1):
+        polygons_mm = layout.marker_xy_mm[layout.cell_corners[group.cells]] + origin_mm
+        suffix = f"-{group.part + 1}" if group.part else ""
+        cavities = make_cavities(group.cells, polygons_mm, beam, setup.options.corner)
+        passes.append(_cell_pass(f"{number}-{COLORS[group.color]}{suffix}", group.color, cavities, setup))
     if setup.options.outline:
         paths = outset_outline(layout.outline_mm + origin_mm, front)
         strokes = ragged_strokes(paths, range(len(paths)), closed=True)
-        passes.append(
-            _cut_pass(
-                f"{len(passes) + 1 - bool(passes[0].kind == 'holes')}-outline", "outline", strokes, setup
-            )
-        )
+        number = len(passes) + 1 - bool(passes[0].kind == "holes")
+        passes.append(_cut_pass(f"{number}-outline", "outline", strokes, setup))
     return LaserJob(
         name=name,
         layout=layout,
@@ -142,39 +162,38 @@ def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
     )
 
 
-def cell_groups(layout: Layout) -> list[tuple[int, int, NDArray[np.int64]]]:
-    """Cells that are carved together: (color, part, cells), in the order of the passes; black is the ground.
+def cell_groups(layout: Layout) -> list[CellGroup]:
+    """Group the colored cells into passes, in burning order; black cells are the ground.
 
-    Cells of one color that touch at a corner (the square pattern's) come apart into parts, so that every pass
-    leaves whole walls between its cavities.
+    Cells of one color that touch at a corner (square pattern) get different parts, so that every pass leaves whole
+    walls between its cavities.
     """
-    groups: list[tuple[int, int, NDArray[np.int64]]] = []
+    groups: list[CellGroup] = []
     for color in range(len(COLORS)):
         cells = np.flatnonzero(layout.cell_color == color)
         if color == BLACK or not len(cells):
             continue
         part = _contact_free_groups(layout.cell_corners[cells])
-        groups += [(color, p, cells[part == p]) for p in range(int(part.max()) + 1)]
+        groups += [CellGroup(color, p, cells[part == p]) for p in range(int(part.max()) + 1)]
     return groups
 
 
 def _contact_free_groups(corners: NDArray[np.int32]) -> NDArray[np.int64]:
-    """(N,) the smallest part for each cell that none of its corners' earlier cells has."""
-    taken: dict[int, set[int]] = {}
+    """(N,) for each cell the smallest part number that no earlier cell with a common corner has."""
+    parts_at: dict[int, set[int]] = {}
     part = np.zeros(len(corners), dtype=np.int64)
     if len(np.unique(corners)) == corners.size:
         return part
     for cell, markers in enumerate(corners.tolist()):
-        used = set().union(*(taken.get(marker, set()) for marker in markers))
+        used = set().union(*(parts_at.get(marker, set()) for marker in markers))
         part[cell] = next(p for p in range(len(corners)) if p not in used)
         for marker in markers:
-            taken.setdefault(marker, set()).add(int(part[cell]))
+            parts_at.setdefault(marker, set()).add(int(part[cell]))
     return part
 
 
 def _job_origin_mm(layout: Layout, setup: LaserSetup) -> Points:
-    """Where the layout's origin comes to lie: the job's box is centred on the bed, or put where the
-    options say."""
+    """(2,) place of the layout's origin: the job's box is centred on the bed unless options place its corner."""
     radius = layout.fiducial_diameter_mm / 2
     marks = [layout.fiducials_mm - radius, layout.fiducials_mm + radius]
     box = np.concatenate([layout.outline_mm, *marks])
@@ -187,54 +206,63 @@ def _job_origin_mm(layout: Layout, setup: LaserSetup) -> Points:
     return np.asarray(np.round(corner - low, 3))
 
 
-def _cell_pass(name: str, color: int, made: Cavities, setup: LaserSetup) -> LaserPass:
-    order, entry = order_cells(made.entries_mm, setup.options.order)
-    made = made.selected(order)
-    paths = made.loops_mm
+def _cell_pass(name: str, color: int, cavities: Cavities, setup: LaserSetup) -> LaserPass:
+    order, entry = order_cells(cavities.entries_mm, setup.options.order)
+    cavities = cavities.selected(order)
+    paths = cavities.loops_mm
     points = paths.shape[1]
-    turned = (made.entry_step * entry[:, None] + np.arange(points)) % points
-    walls = loop_strokes(np.take_along_axis(paths, turned[..., None], axis=1), np.arange(len(paths)))
+    from_entry = (cavities.entry_stride * entry[:, None] + np.arange(points)) % points
+    walls = loop_strokes(np.take_along_axis(paths, from_entry[..., None], axis=1), np.arange(len(paths)))
     fills: tuple[Strokes, ...] = ()
     if setup.options.mode == "pocket" and setup.options.fill == "hatch":
         turn = setup.options.hatch_turn_deg
         angles = [setup.options.hatch_deg + turn * repeat for repeat in range(setup.repeats)]
-        fills = tuple(hatch_strokes(made.path_mm, setup.hatch_mm, angle) for angle in angles)
+        fills = tuple(hatch_strokes(cavities.path_mm, setup.hatch_mm, angle) for angle in angles)
     elif setup.options.mode == "pocket":
-        walls = _walls_with_rings(made, walls, setup.hatch_mm)
+        walls = _walls_with_rings(cavities, walls, setup.hatch_mm)
     return LaserPass(
-        name, "cells", color, made, walls, fills, setup.power_percent, setup.speed_mm_s, setup.repeats
+        name=name,
+        kind="cells",
+        color=color,
+        cavities=cavities,
+        walls=walls,
+        fills=fills,
+        power_percent=setup.power_percent,
+        speed_mm_s=setup.speed_mm_s,
+        repeats=setup.repeats,
     )
 
 
-def _walls_with_rings(made: Cavities, walls: Strokes, spacing_mm: float) -> Strokes:
-    inner = ring_strokes(made.path_mm, spacing_mm)
+def _walls_with_rings(cavities: Cavities, walls: Strokes, spacing_mm: float) -> Strokes:
+    """The walls, each preceded by the rings inside it, the innermost ring first."""
+    inner = ring_strokes(cavities.path_mm, spacing_mm)
     first = np.concatenate([inner.first, walls.first[1:] + inner.first[-1]])
-    together = Strokes(
+    joined = Strokes(
         np.concatenate([inner.xy_mm, walls.xy_mm]), first, np.concatenate([inner.owner, walls.owner]), True
     )
-    return together.taken(np.argsort(together.owner, kind="stable"))
+    return joined.selected(np.argsort(joined.owner, kind="stable"))
 
 
 def _cut_pass(name: str, kind: PassKind, strokes: Strokes, setup: LaserSetup) -> LaserPass:
+    """A pass that cuts through the sheet along the strokes."""
     return LaserPass(
-        name,
-        kind,
-        None,
-        None,
-        strokes,
-        (),
-        setup.cut_power_percent,
-        setup.cut_speed_mm_s,
-        setup.cut_repeats,
+        name=name,
+        kind=kind,
+        color=None,
+        cavities=None,
+        walls=strokes,
+        fills=(),
+        power_percent=setup.cut_power_percent,
+        speed_mm_s=setup.cut_speed_mm_s,
+        repeats=setup.cut_repeats,
     )
 
 
 def _hole_strokes(centres_mm: Points, diameter_mm: float, beam: BeamFootprint) -> Strokes:
-    """Paths along which an elliptic beam burns round holes: the circle less the footprint's extent,
-    exactly."""
+    """Paths along which an elliptic beam burns round holes: the circle less the footprint's extent, exact."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     squares = np.array([beam.x_mm**2, beam.y_mm**2])
-    touching = normal * squares / np.sqrt((normal**2 * squares).sum(axis=1))[:, None]
-    circle = diameter_mm / 2 * normal - touching
+    contact = normal * squares / np.sqrt((normal**2 * squares).sum(axis=1))[:, None]
+    circle = diameter_mm / 2 * normal - contact
     return loop_strokes(centres_mm[:, None] + circle, np.arange(len(centres_mm)))

@@ -1,4 +1,4 @@
-"""The job sheet: one HTML page to print and take to the machine. No scripts, no fonts, no files besides itself."""
+"""The job sheet of a laser job: one HTML page without scripts, fonts or other files."""
 
 from __future__ import annotations
 
@@ -34,8 +34,14 @@ _CORNERS = {
 
 
 def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]) -> str:
-    """The page's HTML."""
-    parts = [
+    """Format the page.
+
+    Args:
+        job: the job.
+        figures: figures of every pass of cells.
+        timings: time of every pass, in burning order.
+    """
+    lines = [
         "<!doctype html>",
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(job.name)}: laser job</title>',
         f"<style>{_STYLE}</style></head><body>",
@@ -43,7 +49,7 @@ def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tup
         _warning_html(job),
         _facts_html(job, timings),
         "<h2>Order of work</h2>",
-        _steps_html(job, timings),
+        _passes_html(job, timings),
         "<h2>Passes</h2>",
         _pictures_html(job),
         "<h2>As made</h2>",
@@ -55,11 +61,11 @@ def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tup
         "</body></html>",
         "",
     ]
-    return "\n".join(parts)
+    return "\n".join(lines)
 
 
 def format_duration(seconds: float) -> str:
-    """Seconds as people say them: 48 s, 3 min 20 s, 2 h 05 min."""
+    """Format a duration: 48 s, 3 min 20 s, 2 h 05 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -79,7 +85,7 @@ def _warning_html(job: LaserJob) -> str:
 
 
 def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
-    setup, (left, bottom, right, top) = job.setup, job.extent_mm
+    setup, extent = job.setup, job.extent_mm
     bed = f"{setup.machine.bed_width_mm.value:g} x {setup.machine.bed_height_mm.value:g} mm"
     rows = {
         "Machine": f"{setup.machine.name}, bed {bed}, full power S{setup.machine.s_max.value:g}",
@@ -89,25 +95,27 @@ def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
         "Kerf": f"front {_format_kerf(job.front.kerf_mm)}, back {_format_kerf(job.back.kerf_mm)} (cuts "
         f"along y, along x); "
         f"walls lean by {setup.taper_deg:g}°",
-        "On the bed": f"{right - left:.2f} x {top - bottom:.2f} mm, lower left corner at X{left:.2f} Y{bottom:.2f}",
-        "Laser time": format_duration(sum(one.time_s for one in timings)) + f", order: {setup.options.order}",
+        "On the bed": f"{extent.right - extent.left:.2f} x {extent.top - extent.bottom:.2f} mm, "
+        f"lower left corner at X{extent.left:.2f} Y{extent.bottom:.2f}",
+        "Laser time": format_duration(sum(timing.time_s for timing in timings))
+        + f", order: {setup.options.order}",
     }
-    cells = [f"<tr><td>{name}</td><td>{escape(text)}</td></tr>" for name, text in rows.items()]
-    return f'<table class="facts">{"".join(cells)}</table>'
+    lines = [f"<tr><td>{name}</td><td>{escape(text)}</td></tr>" for name, text in rows.items()]
+    return f'<table class="facts">{"".join(lines)}</table>'
 
 
-def _steps_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
+def _passes_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
     head = (
         "<tr><th></th><th>Pass</th><th class=n>Paths</th><th class=n>Power</th><th class=n>Speed</th>"
         "<th class=n>Times over</th><th class=n>Laser time</th><th>Then</th></tr>"
     )
     rows = []
-    for one, time in zip(job.passes, timings, strict=True):
+    for laser_pass, timing in zip(job.passes, timings, strict=True):
         rows.append(
-            f"<tr><td class=box>☐</td><td><b>{one.name}</b></td>"
-            f"<td class=n>{len(one.walls)}</td><td class=n>{one.power_percent:g} %</td>"
-            f"<td class=n>{one.speed_mm_s:g} mm/s</td><td class=n>{one.repeats}</td>"
-            f"<td class=n>{format_duration(time.time_s)}</td><td>{_after_pass_text(one)}</td></tr>"
+            f"<tr><td class=box>☐</td><td><b>{laser_pass.name}</b></td>"
+            f"<td class=n>{len(laser_pass.walls)}</td><td class=n>{laser_pass.power_percent:g} %</td>"
+            f"<td class=n>{laser_pass.speed_mm_s:g} mm/s</td><td class=n>{laser_pass.repeats}</td>"
+            f"<td class=n>{format_duration(timing.time_s)}</td><td>{_after_pass_text(laser_pass)}</td></tr>"
         )
     setup = job.setup
     return (
@@ -119,13 +127,13 @@ def _steps_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
     )
 
 
-def _after_pass_text(one: LaserPass) -> str:
-    if one.kind == "holes":
+def _after_pass_text(laser_pass: LaserPass) -> str:
+    if laser_pass.kind == "holes":
         return "put pins in; they stay to the end"
-    if one.kind == "outline":
+    if laser_pass.kind == "outline":
         return "take the pad out, done"
-    assert one.color is not None
-    return f"take out, fill <b>{COLORS[one.color]}</b>, cure, put back on the pins"
+    assert laser_pass.color is not None
+    return f"take out, fill <b>{COLORS[laser_pass.color]}</b>, cure, put back on the pins"
 
 
 def _pocket_html(job: LaserJob) -> str:
@@ -140,44 +148,43 @@ def _pocket_html(job: LaserJob) -> str:
 
 
 def _pictures_html(job: LaserJob) -> str:
-    return f'<div class="passes">{"".join(_pass_picture_svg(job, one) for one in job.passes)}</div>'
+    return f'<div class="passes">{"".join(_pass_picture_svg(job, laser_pass) for laser_pass in job.passes)}</div>'
 
 
-def _pass_picture_svg(job: LaserJob, one: LaserPass) -> str:
-    """The pad as it lies there during this pass: cured cells full, this pass' paths in red outlines over its ink."""
-    left, bottom, right, top = job.extent_mm
-    margin = 1.0
-    box = f"{format_mm(left - margin)} {format_mm(-margin)} {format_mm(right - left + 2 * margin)} "
-    box += format_mm(top - bottom + 2 * margin)
+def _pass_picture_svg(job: LaserJob, laser_pass: LaserPass) -> str:
+    """The pad during a pass: cells of earlier passes pale, cells of this pass in full color under their paths."""
+    extent = job.extent_mm
+    width, height, margin = extent.right - extent.left, extent.top - extent.bottom, 1.0
+    box = f"{format_mm(extent.left - margin)} {format_mm(-margin)} {format_mm(width + 2 * margin)} "
+    box += format_mm(height + 2 * margin)
     inks = job.layout.palette
-    shapes = [_polygons_svg([job.outline_mm], top, inks[COLORS[BLACK]], "")]
-    for other in job.passes:
-        drawn = other.color is not None and other.cavities is not None
-        if drawn and job.passes.index(other) <= job.passes.index(one):
-            assert other.cavities is not None and other.color is not None
-            strength = "" if other is one else ' opacity="0.45"'
-            shapes.append(
-                _polygons_svg(list(other.cavities.nominal_mm), top, inks[COLORS[other.color]], strength)
-            )
-    line = 0.004 * max(right - left, top - bottom)
+    shapes = [_polygons_svg([job.outline_mm], extent.top, inks[COLORS[BLACK]], "")]
+    for other in job.passes[: job.passes.index(laser_pass) + 1]:
+        if other.cavities is None or other.color is None:
+            continue
+        opacity = "" if other is laser_pass else ' opacity="0.45"'
+        ink = inks[COLORS[other.color]]
+        shapes.append(_polygons_svg(list(other.cavities.nominal_mm), extent.top, ink, opacity))
+    line = 0.004 * max(width, height)
     style = f'fill="none" stroke="#e0a100" stroke-width="{format_mm(line / 2)}"'
-    shapes.append(f'<path {style} d="{"".join(path_data(one.walls, top))}"/>')
+    shapes.append(f'<path {style} d="{"".join(path_data(laser_pass.walls, extent.top))}"/>')
     radius = format_mm(job.layout.fiducial_diameter_mm / 2)
     for x, y in job.fiducials_mm.tolist():
-        place = f'cx="{format_mm(x)}" cy="{format_mm(top - y)}" r="{radius}"'
+        place = f'cx="{format_mm(x)}" cy="{format_mm(extent.top - y)}" r="{radius}"'
         shapes.append(f'<circle {place} fill="none" stroke="#1c1a18" stroke-width="{format_mm(line)}"/>')
     return (
-        f'<div class="pass"><h3>{one.name}</h3><svg viewBox="{box}" role="img" '
-        f'aria-label="{one.name}">{"".join(shapes)}</svg></div>'
+        f'<div class="pass"><h3>{laser_pass.name}</h3><svg viewBox="{box}" role="img" '
+        f'aria-label="{laser_pass.name}">{"".join(shapes)}</svg></div>'
     )
 
 
-def _polygons_svg(polygons: list, top: float, fill: str, extra: str) -> str:  # type: ignore[type-arg]
+def _polygons_svg(polygons: list, top: float, fill: str, attributes: str) -> str:  # type: ignore[type-arg]
+    """One path of all polygons, y down from ``top``."""
     data = []
     for polygon in polygons:
         points = [f"{x:.2f} {top - y:.2f}" for x, y in polygon.tolist()]
         data.append(f"M{'L'.join(points)}Z")
-    return f'<path fill="{fill}"{extra} d="{"".join(data)}"/>'
+    return f'<path fill="{fill}"{attributes} d="{"".join(data)}"/>'
 
 
 def _as_made_html(figures: tuple[PassFigures, ...]) -> str:
@@ -186,21 +193,21 @@ def _as_made_html(figures: tuple[PassFigures, ...]) -> str:
         "<th class=n>Burnt beside</th><th class=n>Web in the pass</th><th class=n>Web to filled cells</th></tr>"
     )
     rows = []
-    for one in figures:
-        faces = [("front", one.front)] + ([("back", one.back)] if one.back else [])
-        rows += [_as_made_row(one.name if name == "front" else "", name, face) for name, face in faces]
+    for one_pass in figures:
+        faces = [("front", one_pass.front)] + ([("back", one_pass.back)] if one_pass.back else [])
+        rows += [_as_made_row(one_pass.name if side == "front" else "", side, face) for side, face in faces]
     return (
         f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to "
         "filled cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
     )
 
 
-def _as_made_row(name: str, where: str, face: FaceFigures) -> str:
+def _as_made_row(name: str, side: str, face: FaceFigures) -> str:
     lengths = [face.corner_loss_mm, face.burnt_beside_mm, face.web_mm, face.web_to_filled_mm]
     texts = ["-" if value is None else f"{value:.3f}" for value in lengths]
     areas = [f"{face.area_error_percent:+.2f} %", f"{face.area_error_worst_percent:+.2f} %"]
-    cells = "".join(f"<td class=n>{text}</td>" for text in [*areas, *texts])
-    return f"<tr><td>{name}</td><td>{where}</td>{cells}</tr>"
+    fields = "".join(f"<td class=n>{text}</td>" for text in [*areas, *texts])
+    return f"<tr><td>{name}</td><td>{side}</td>{fields}</tr>"
 
 
 def _registration_html(job: LaserJob) -> str:

@@ -1,4 +1,4 @@
-"""Machines and materials: TOML files in which every value has its source, or the word "assumed"."""
+"""Machines and materials: TOML files in which every value has a source, or the word "assumed"."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class _StrictModel(BaseModel):
 
 
 class Sourced(_StrictModel, Generic[Value]):
-    """A value and where it comes from: a reference, a measurement, or "assumed"."""
+    """A value with its source: a reference, a measurement, or "assumed"."""
 
     value: Value
     source: str = Field(min_length=3)
 
 
 class Machine(_StrictModel):
-    """A laser. Speeds in mm/s; ``s_max`` is the S word of full power (GRBL's $30)."""
+    """A laser machine; ``s_max`` is the S word of full power (GRBL's $30)."""
 
     name: str
     kind: Literal["co2", "diode", "fibre", "uv"]
@@ -49,8 +49,10 @@ class Machine(_StrictModel):
 
 
 class Settings(_StrictModel):
-    """How one machine carves one material. Kerf: full width at the front, of cuts that run in y (x) and in
-    x (y)."""
+    """The settings of one machine for one material.
+
+    Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x.
+    """
 
     kerf_x_mm: Sourced[Length]
     kerf_y_mm: Sourced[Length]
@@ -64,7 +66,7 @@ class Settings(_StrictModel):
 
 
 class Material(_StrictModel):
-    """A sheet of silicone, and its settings on each machine that can carve it."""
+    """A silicone sheet, with the settings of each machine that can carve it."""
 
     name: str
     thickness_mm: Sourced[Length]
@@ -76,38 +78,38 @@ class Material(_StrictModel):
 
 
 def machines() -> dict[str, Path]:
-    """Every shipped machine by name."""
+    """The TOML file of every shipped machine, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "machines").glob("*.toml"))}
 
 
 def materials() -> dict[str, Path]:
-    """Every shipped material by name."""
+    """The TOML file of every shipped material, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "materials").glob("*.toml"))}
 
 
 def load_machine(name_or_path: str) -> Machine:
-    """A shipped machine, or one from a TOML file.
+    """Load a shipped machine by name, or a machine from a TOML file.
 
     Raises:
-        DesignError: no such machine, or a file that does not describe one.
+        DesignError: unknown machine, or a file that does not describe a machine.
     """
     return _load_file(Machine, name_or_path, machines(), "machine")
 
 
 def load_material(name_or_path: str) -> Material:
-    """A shipped material, or one from a TOML file.
+    """Load a shipped material by name, or a material from a TOML file.
 
     Raises:
-        DesignError: no such material, or a file that does not describe one.
+        DesignError: unknown material, or a file that does not describe a material.
     """
     return _load_file(Material, name_or_path, materials(), "material")
 
 
 def settings_on(material: Material, machine_name: str) -> Settings:
-    """The material's settings on a machine; a machine's file goes by its stem.
+    """The material's settings on a machine; a machine's TOML file counts by its stem.
 
     Raises:
-        DesignError: this machine does not carve this material.
+        DesignError: the material has no settings for this machine.
     """
     name = Path(machine_name).stem if machine_name.endswith(".toml") else machine_name
     if name not in material.on:
@@ -136,7 +138,7 @@ def _load_file(model: type[Model], name_or_path: str, known: Mapping[str, Path],
 
 
 def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first thing wrong, in one line."""
+    """The first validation error in one line."""
     item = error.errors()[0]
     where = ".".join(str(part) for part in item["loc"])
     if item["type"] == "extra_forbidden":

@@ -1,5 +1,4 @@
-"""The folder laser/: one job a pass in four formats, all passes in one file, the sheet, the coupon, as
-made."""
+"""The product "laser": a file per pass and one of all passes in four formats, job sheet, coupon, as-made.svg."""
 
 from __future__ import annotations
 
@@ -32,20 +31,21 @@ FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
 
 
 def make_laser(design: Design, layout: Layout) -> ProductFiles:
-    """Everything that a shop needs to carve the design's cells.
+    """Make the folder ``laser/``.
 
     Raises:
-        DesignError: the machine or material is unknown, or the job would go wrong; every reason in one line.
+        DesignError: the machine or material is unknown, or a check of the job fails; every reason in one line.
     """
     job = make_job(design.name, layout, complete_setup(design.laser))
     require_no_errors(setup_findings(design, job))
     require_no_errors(path_findings(job))
     figures = measure_as_made(job)
     warnings = require_no_errors(as_made_findings(job, figures))
-    timings = tuple(pass_timing(job, one) for one in job.passes)
+    timings = tuple(pass_timing(job, laser_pass) for laser_pass in job.passes)
     files: dict[str, str | bytes] = {}
-    whole = job_drawing(job)
-    drawings = {one.name: whole.with_one_pass(one) for one in job.passes} | {"job": whole}
+    all_passes = job_drawing(job)
+    drawings = {laser_pass.name: all_passes.with_one_pass(laser_pass) for laser_pass in job.passes}
+    drawings["job"] = all_passes
     drawings["coupon"], files[f"{FOLDER}/coupon.json"] = coupon_job(job.setup)
     for name, drawing in drawings.items():
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}

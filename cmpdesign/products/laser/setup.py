@@ -1,4 +1,4 @@
-"""What a job is made with: the options, completed from the machine's and the material's files."""
+"""The setup of a job: the design's options, completed from the files of machine and material."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from cmpdesign.products.laser.library import (
     settings_on,
 )
 
-# Without a spacing of their own, lines and rings lie half of the bottom's kerf apart, so that no ridge can
-# stay.
+# Default spacing of lines and rings, as a share of the kerf at the bottom: no ridge can stay.
 HATCH_SHARE = 0.5
+# Least kerf at the bottom for the default spacing.
 SMALLEST_MM = 0.001
 
 
 @dataclass(frozen=True)
 class LaserSetup:
-    """Everything about machine, material and way of carving; lengths in mm.
+    """Machine, material and settings of a job; lengths in mm.
 
     Attributes:
-        options: as the design gives them.
-        machine, material: from their files.
-        kerf_x_mm, kerf_y_mm: at the front, of cuts that run in y and in x.
-        taper_deg: lean of each wall.
-        depth_mm: of the cavities.
-        power_percent, speed_mm_s, repeats: of the cells' passes.
-        cut_power_percent, cut_speed_mm_s, cut_repeats: of holes and outline, which always go through.
+        options: options of the design.
+        machine, material: contents of their files.
+        kerf_x_mm, kerf_y_mm: kerf at the front, of cuts along y and along x.
+        taper_deg: angle of each wall against the beam.
+        depth_mm: depth of the cavities.
+        power_percent, speed_mm_s, repeats: settings of the passes of cells.
+        cut_power_percent, cut_speed_mm_s, cut_repeats: settings of holes and outline, which go through the sheet.
         hatch_mm: spacing of a pocket's lines or rings.
         minimum_web_mm: the narrowest wall that holds.
         assumed: names of the values in use whose source begins with "assumed".
@@ -57,20 +57,20 @@ class LaserSetup:
 
 
 def complete_setup(options: LaserOptions) -> LaserSetup:
-    """The options with what the machine's and the material's files add.
+    """Complete the options from the files of machine and material.
 
     Raises:
-        DesignError: an unknown machine or material, or one that does not carve the other.
+        DesignError: an unknown machine or material, or a material without settings for the machine.
     """
     machine, material = load_machine(options.machine), load_material(options.material)
-    found = settings_on(material, options.machine)
-    kerf_x_mm = options.kerf_mm or options.kerf_x_mm or found.kerf_x_mm.value
-    kerf_y_mm = options.kerf_mm or options.kerf_y_mm or found.kerf_y_mm.value
+    settings = settings_on(material, options.machine)
+    kerf_x_mm = options.kerf_mm or options.kerf_x_mm or settings.kerf_x_mm.value
+    kerf_y_mm = options.kerf_mm or options.kerf_y_mm or settings.kerf_y_mm.value
     depth_mm = options.depth_mm or material.thickness_mm.value
-    taper_deg = found.taper_deg.value if options.taper_deg is None else options.taper_deg
+    taper_deg = settings.taper_deg.value if options.taper_deg is None else options.taper_deg
     bottom_mm = min(kerf_x_mm, kerf_y_mm) - 2 * depth_mm * math.tan(math.radians(taper_deg))
     pocket = options.mode == "pocket"
-    layers = math.ceil(depth_mm / found.pocket_depth_per_pass_mm.value - 1e-9)
+    depth_passes = math.ceil(depth_mm / settings.pocket_depth_per_pass_mm.value - 1e-9)
     web_mm = options.minimum_web_mm
     return LaserSetup(
         options=options,
@@ -81,34 +81,35 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
         taper_deg=taper_deg,
         depth_mm=depth_mm,
         power_percent=options.power_percent
-        or (found.pocket_power_percent if pocket else found.cut_power_percent).value,
-        speed_mm_s=options.speed_mm_s or (found.pocket_speed_mm_s if pocket else found.cut_speed_mm_s).value,
-        repeats=options.passes or (layers if pocket else found.cut_passes.value),
-        cut_power_percent=found.cut_power_percent.value,
-        cut_speed_mm_s=found.cut_speed_mm_s.value,
-        cut_repeats=found.cut_passes.value,
+        or (settings.pocket_power_percent if pocket else settings.cut_power_percent).value,
+        speed_mm_s=options.speed_mm_s
+        or (settings.pocket_speed_mm_s if pocket else settings.cut_speed_mm_s).value,
+        repeats=options.passes or (depth_passes if pocket else settings.cut_passes.value),
+        cut_power_percent=settings.cut_power_percent.value,
+        cut_speed_mm_s=settings.cut_speed_mm_s.value,
+        cut_repeats=settings.cut_passes.value,
         hatch_mm=options.hatch_mm or math.floor(1e4 * HATCH_SHARE * max(bottom_mm, SMALLEST_MM)) / 1e4,
         minimum_web_mm=material.minimum_web_mm.value if web_mm is None else web_mm,
-        assumed=_assumed_values(options, material, found),
+        assumed=_assumed_values(options, material, settings),
     )
 
 
-def _assumed_values(options: LaserOptions, material: Material, found: Settings) -> tuple[str, ...]:
-    """Values from the files that nobody measured and no option overrides."""
+def _assumed_values(options: LaserOptions, material: Material, settings: Settings) -> tuple[str, ...]:
+    """Names of the files' values with an assumed source that no option overrides."""
     kind = "pocket" if options.mode == "pocket" else "cut"
-    steps = "pocket_depth_per_pass_mm" if options.mode == "pocket" else "cut_passes"
+    passes = "pocket_depth_per_pass_mm" if options.mode == "pocket" else "cut_passes"
     given = {
         "kerf_x_mm": options.kerf_mm or options.kerf_x_mm,
         "kerf_y_mm": options.kerf_mm or options.kerf_y_mm,
         "taper_deg": options.taper_deg,
         f"{kind}_power_percent": options.power_percent,
         f"{kind}_speed_mm_s": options.speed_mm_s,
-        steps: options.passes,
+        passes: options.passes,
     }
     names = [
         name
         for name, value in given.items()
-        if value is None and getattr(found, name).source.startswith("assumed")
+        if value is None and getattr(settings, name).source.startswith("assumed")
     ]
     if options.minimum_web_mm is None and material.minimum_web_mm.source.startswith("assumed"):
         names.append("minimum_web_mm")

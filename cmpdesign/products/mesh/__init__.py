@@ -1,4 +1,4 @@
-"""Triangle meshes: STL, GLB and 3MF, and pictures of them.
+"""Triangle meshes as STL, GLB and 3MF files, and pictures of triangle meshes.
 
-In: named, colored meshes in mm. Out: the bytes of files.
+In: ``TriangleMesh`` values in mm. Out: bytes of files, (H, W, 3) pictures.
 """

@@ -1,4 +1,4 @@
-"""The depth buffer's loop over triangles and pixels."""
+"""The compiled depth buffer: a loop over triangles and pixels."""
 
 from __future__ import annotations
 
@@ -8,14 +8,20 @@ import numpy as np
 
 @numba.njit(cache=True)
 def fill_depth_buffer(corners, depth, number):  # type: ignore[no-untyped-def]
-    """Draw triangles (T, 3, 3: x, y in pixels, z towards the viewer) into depth and triangle number."""
+    """Draw triangles into a depth buffer.
+
+    Args:
+        corners: (T, 3, 3) float64, per corner x and y in px (y down) and z towards the viewer.
+        depth: (H, W) float64, largest z per pixel; updated.
+        number: (H, W) int64, number of the triangle with that z; updated.
+    """
     height, width = depth.shape
     for t in range(corners.shape[0]):
         ax, ay, az = corners[t, 0]
         bx, by, bz = corners[t, 1]
         cx, cy, cz = corners[t, 2]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        # With y down, what faces the viewer runs clockwise.
+        # With y down, the corners of a triangle that faces the viewer run clockwise: a negative area.
         if area >= 0.0:
             continue
         top = max(int(np.ceil(min(ay, by, cy))), 0)

@@ -1,4 +1,4 @@
-"""GLB (binary glTF 2.0): named, colored meshes in metres, y up, as the format wants them."""
+"""GLB (binary glTF 2.0): named, colored triangle meshes in metres, y up, as the format demands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,15 @@ _METRES = 1e-3
 
 
 def meshes_to_glb(meshes: Sequence[TriangleMesh], opacity: dict[str, float] | None = None) -> bytes:
-    """One node, mesh and material for each; ``opacity`` (name -> 0 to 1) for clear layers."""
+    """Format triangle meshes as GLB, each with its own node, mesh and material.
+
+    Args:
+        meshes: in mm.
+        opacity: mesh name -> 0 (clear) to 1 (opaque, the default).
+
+    Returns:
+        The bytes of the file.
+    """
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "cmpdesign"},
         "scene": 0,
@@ -39,6 +47,7 @@ def meshes_to_glb(meshes: Sequence[TriangleMesh], opacity: dict[str, float] | No
 
 
 def _add_mesh(document: dict[str, Any], number: int, mesh: TriangleMesh, offset: int) -> bytes:
+    """Add a mesh to the document; the mesh's binary data, which begin at ``offset`` bytes."""
     points = (mesh.points[:, [0, 2, 1]] * (_METRES, _METRES, -_METRES)).astype("<f4")
     indices = mesh.triangles.astype("<u4")
     view, sizes = 2 * number, (points.nbytes, indices.nbytes)

@@ -1,4 +1,4 @@
-"""Binary STL, mm: one mesh a file."""
+"""Binary STL, mm: one triangle mesh per file."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ _HEADER_BYTES = 80
 
 
 def mesh_to_stl(mesh: TriangleMesh) -> bytes:
-    """The file's bytes; the header holds the name."""
+    """Format a triangle mesh as binary STL; the header holds the mesh's name."""
     corners = mesh.points[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     facets = np.zeros(len(corners), dtype=_FACET)
     facets["normal"] = normals / np.where(lengths > 0, lengths, 1)
     facets["corners"] = corners
-    # A header that starts with "solid" would be taken for the text format.
+    # Programs read a file that starts with "solid" as the text format.
     header = f"cmpdesign {mesh.name}, mm".encode("ascii", "replace")[:_HEADER_BYTES].ljust(
         _HEADER_BYTES, b"\0"
     )

@@ -1,4 +1,4 @@
-"""3MF through the consortium's lib3mf: one object a mesh, each with its own base material, in mm."""
+"""3MF by the consortium's lib3mf, in mm: one object with its own base material per triangle mesh."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import io
 import uuid
 import zipfile
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 
-# The library's identifiers and the package's dates are random by default; these follow from the names.
+# The library's identifiers and the package's dates differ from run to run by default. These follow from names.
 _NAMESPACE = uuid.UUID("6f9a3c1e-6f0e-5f5b-9d54-6d6f6c64cafe")
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def meshes_to_3mf(meshes: Sequence[TriangleMesh], title: str) -> bytes:
-    """The package's bytes, the same for the same meshes.
+    """Format triangle meshes as a 3MF package; the same bytes for the same meshes.
 
     Raises:
-        RuntimeError: lib3mf finds a mesh that is not closed and consistently wound.
+        RuntimeError: lib3mf reports a mesh that is not closed or not consistently wound.
     """
     import lib3mf
 
@@ -63,7 +63,7 @@ def _name_uuid(name: str) -> str:
 
 
 def _canonical_package(package: bytes) -> bytes:
-    """The same entries in the same order with a fixed date."""
+    """The package with the same entries in the same order and a fixed date."""
     result = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(package)) as old, zipfile.ZipFile(result, "w") as new:
         for name in old.namelist():
@@ -73,11 +73,19 @@ def _canonical_package(package: bytes) -> bytes:
     return result.getvalue()
 
 
-def read_3mf(package: bytes) -> list[tuple[str, int, int]]:
-    """Name, vertices and triangles of every object, read by lib3mf in strict mode.
+class ObjectCounts(NamedTuple):
+    """The size of one object of a 3MF package."""
+
+    name: str
+    vertices: int
+    triangles: int
+
+
+def read_3mf(package: bytes) -> list[ObjectCounts]:
+    """Read the objects of a package with lib3mf in strict mode.
 
     Raises:
-        RuntimeError: strict mode has a complaint.
+        RuntimeError: strict mode gives a warning.
     """
     import lib3mf
 
@@ -90,5 +98,5 @@ def read_3mf(package: bytes) -> list[tuple[str, int, int]]:
     objects, found = model.GetMeshObjects(), []
     while objects.MoveNext():
         part = objects.GetCurrentMeshObject()
-        found.append((part.GetName(), part.GetVertexCount(), part.GetTriangleCount()))
+        found.append(ObjectCounts(part.GetName(), part.GetVertexCount(), part.GetTriangleCount()))
     return found

@@ -1,4 +1,4 @@
-"""What of a mold cannot be made or cast: found from numbers alone, before any solid is built."""
+"""Checks of a mold from its dimensions, before a solid is built: findings on making and casting."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crow
 
 @dataclass(frozen=True)
 class ToolLimits:
-    """What a way of making parts allows: smallest boss or slot, and thinnest sheet, in mm."""
+    """Limits of a tool: smallest boss or slot, and thinnest sheet, mm."""
 
     feature_mm: float
     sheet_mm: float
 
 
-# Usual values of makers' design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm a nozzle's
-# line, 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
+# Usual values of design guides: 0.2 mm is four pixels of a desktop resin printer, 0.4 mm the line of a nozzle,
+# 0.5 and 0.3 mm the smallest common end mill and eroding wire with its gap.
 TOOL_LIMITS = {
     "sla-resin": ToolLimits(0.2, 0.4),
     "fdm-pla": ToolLimits(0.4, 0.6),
@@ -34,53 +34,59 @@ TOOL_LIMITS = {
     "aluminium": ToolLimits(0.5, 0.3),
     "steel": ToolLimits(0.3, 0.1),
 }
-# Printed pins break when pulled above three times their width, and bend above 1.5.
+# Height over width of bosses: printed bosses break above the first value and bend above the second.
 SLENDER_ERROR, SLENDER_WARNING = 3.0, 1.5
 DRAFT_MAX_DEG = 15.0
 DRAFT_WARNING_DEG = 0.5
 # Thinner webs of soft silicone tear when the plate is lifted.
 WEB_WARNING_MM = 0.05
-# Layers that differ more than this at the pad's edge wrinkle.
+# Silicone layers whose sizes differ by more than this at the pad's edge wrinkle.
 MISMATCH_WARNING_MM = 0.1
-# Flat tips of bosses press the crowned base layer by this share of the black layer at most, before it bulges.
+# Largest height of the crown over flat tips of bosses, as a share of the black layer, before the base layer bulges.
 SAG_WARNING = 0.1
-# A dome's layers, measured across, may thin to this share of their thickness at the apex.
+# Least thickness of a dome's silicone layers at the foot, measured across, as a share of that at the apex.
 THIN_WARNING = 0.85
+# Least wall between the moat and a pin hole.
 LEAST_WALL_MM = 0.3
 
 
 def check_mold(stack: MoldStack) -> list[Finding]:
-    """Findings, errors first."""
-    found = [
+    """Check the dimensions of a mold; the findings, errors first."""
+    findings = [
         *_boss_findings(stack),
         *_draft_findings(stack),
         *_sheet_findings(stack),
         *_curing_findings(stack),
         *_shape_findings(stack),
+        *_unused_option_findings(stack),
     ]
-    found += _unused_option_findings(stack)
-    return sorted(found, key=lambda finding: finding.severity)
+    return sorted(findings, key=lambda finding: finding.severity)
 
 
 def require_no_errors(findings: list[Finding]) -> None:
-    """Raise ``DesignError`` for the first finding that is an error."""
+    """Check that no finding is an error.
+
+    Raises:
+        DesignError: the first error among the findings.
+    """
     for finding in findings:
         if finding.severity == "error":
             raise DesignError(f"mold: {finding}")
 
 
 def min_feature_mm(stack: MoldStack) -> float:
-    """The nozzle, beam or cutter."""
+    """The smallest feature that the tool can make: the design's value or the tool's limit."""
     return stack.options.minimum_feature_mm or TOOL_LIMITS[stack.options.tool].feature_mm
 
 
 def tip_width_mm(stack: MoldStack) -> float:
-    """Diameter of the circle inside the narrowest boss's tip; negative when nothing is left."""
+    """Diameter of the inscribed circle of the narrowest boss's tip; negative if the tip vanishes."""
     inset = stack.options.gap_mm / 2 + stack.lean * stack.thickness_mm[1]
     return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
 def _inscribed_diameter_mm(cells: Points) -> float:
+    """Least 4 area / perimeter of (N, k, 2) cells: the diameter of the inscribed circle."""
     side = np.roll(cells, -1, axis=1) - cells
     area = (
         np.abs(
@@ -131,7 +137,7 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
 
 
 def stencil_width_mm(stack: MoldStack) -> float:
-    """Diameter of the circle inside the narrowest stencil hole's lower face."""
+    """Diameter of the inscribed circle of the narrowest stencil hole at the lower face."""
     inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
     return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
@@ -145,7 +151,7 @@ def _slenderness_findings(ratio: float) -> Iterator[Finding]:
 
 
 def plate_web_mm(stack: MoldStack) -> tuple[float, str]:
-    """The least distance between bosses of one plate, at their roots, and the plate's color."""
+    """The least distance between bosses of one plate at their roots, and the name of the plate's color."""
     import shapely
 
     least, name = float("inf"), ""
@@ -172,10 +178,15 @@ def _draft_findings(stack: MoldStack) -> Iterator[Finding]:
 
 
 def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
+    """Findings on the thickness of parts and walls, and on vents."""
     option = stack.options
     limit = TOOL_LIMITS[option.tool].sheet_mm
-    sheets = {"frame": stack.thickness_mm[1], "cover": stack.thickness_mm[2], "stencils": option.stencil_mm}
-    for name, thickness in sheets.items():
+    thicknesses = {
+        "frame": stack.thickness_mm[1],
+        "cover": stack.thickness_mm[2],
+        "stencils": option.stencil_mm,
+    }
+    for name, thickness in thicknesses.items():
         if thickness < limit:
             remedy = "cut it from shim stock instead: its shape is plain"
             yield Finding(f"thickness of {name} as {option.tool}", thickness, limit, "mm", remedy, "warning")
@@ -196,6 +207,7 @@ def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
 
 
 def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
+    """Findings on inhibition, chemistry and shrinkage of the silicone layers."""
     tool = stack.options.tool
     by_remedy: dict[str, list[str]] = {}
     for name, silicone in zip(SILICONE_LAYERS, stack.silicones, strict=True):
@@ -204,13 +216,13 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
     for remedy, names in by_remedy.items():
         subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
         yield Finding(subject, len(names), 0, "", remedy, "warning")
-    layers = list(zip(SILICONE_LAYERS, stack.silicones, strict=True))
-    for (below, under), (above, over) in pairwise(layers):
-        # Neither cures against the other, the makers say.
-        if under.cure != over.cure:
+    silicone_layers = list(zip(SILICONE_LAYERS, stack.silicones, strict=True))
+    for (lower_name, lower), (upper_name, upper) in pairwise(silicone_layers):
+        # According to the makers, silicones of different chemistry do not cure against each other.
+        if lower.cure != upper.cure:
             subject = (
-                f"{under.cure}-cured layers ({below}: {under.name}) under a {over.cure}-cured one "
-                f"({above}: {over.name})"
+                f"{lower.cure}-cured layers ({lower_name}: {lower.name}) under a {upper.cure}-cured one "
+                f"({upper_name}: {upper.name})"
             )
             yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
     scales = [silicone.scale for silicone in stack.silicones]
@@ -258,7 +270,7 @@ def _crown_findings(stack: MoldStack, crown: Crown) -> Iterator[Finding]:
 
 
 def _unused_option_findings(stack: MoldStack) -> Iterator[Finding]:
-    """What was asked for and has no effect, or another one than it says."""
+    """Findings on options without effect, and on options with another effect than stated."""
     option, layout = stack.options, stack.layout
     if stack.crown is None:
         remedy = 'not used on a flat pad: set mold.crown = "sphere" or "cylinder", or leave it out'
@@ -282,16 +294,15 @@ def moat_to_pin_mm(stack: MoldStack) -> float:
 
     pad = shapely.Polygon(stack.edges(0)[1].points)
     pins = shapely.points(stack.pins_mm)
-    away = stack.options.parting_mm + stack.options.moat_mm + stack.pin_diameter_mm / 2
-    return float(shapely.distance(pad, pins).min()) - away
+    occupied = stack.options.parting_mm + stack.options.moat_mm + stack.pin_diameter_mm / 2
+    return float(shapely.distance(pad, pins).min()) - occupied
 
 
 def facet_sag_mm(stack: MoldStack) -> float:
-    """How far the crown rises over the flat facets of plates, at most; 0 on a flat pad.
+    """Largest height of the crown over the flat facets of plates, along z; 0 for a flat pad.
 
-    Over a chord between points of a sphere or cylinder of radius R, the circle rises by R - sqrt(R^2 - a^2), a
-    being half the chord; over a triangle, by the same of its circumcircle's radius. Along z it is the more by
-    the slope.
+    A circle of radius R rises over a chord of half length a by R - sqrt(R^2 - a^2). For a triangle, a is the radius of
+    the circumcircle. The height along z is this divided by the cosine of the slope.
     """
     if stack.crown is None:
         return 0.0
@@ -299,13 +310,13 @@ def facet_sag_mm(stack: MoldStack) -> float:
     points = np.concatenate([corners, stack.crown.z_mm(corners.reshape(-1, 2)).reshape(-1, 3, 1)], axis=-1)
     sides = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=-1)
     double_area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=-1)
-    reach = float((sides.prod(axis=1) / (2 * double_area)).max())
+    circumradius = float((sides.prod(axis=1) / (2 * double_area)).max())
     radius = stack.crown.radius_mm
-    rise = radius - np.sqrt(max(radius**2 - reach**2, 0.0))
+    rise = radius - np.sqrt(max(radius**2 - circumradius**2, 0.0))
     return float(rise / np.cos(np.radians(stack.crown.slope_deg)))
 
 
 def boss_volume_mm3(stack: MoldStack, color: int) -> float:
-    """Silicone that fills a color's cavities: for the job sheet."""
+    """Volume of the silicone that fills a color's cavities."""
     pairs = [(feature.root, feature.tip) for feature in boss_features(stack, stack.cells(color))]
     return frusta_volume_mm3(pairs, stack.thickness_mm[1])

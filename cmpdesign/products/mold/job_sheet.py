@@ -1,4 +1,4 @@
-"""The job sheet of a mold: what to mix, the steps in order, every part from two sides. Plain HTML."""
+"""The job sheet of a mold: pours, operations in order, and every part from two sides, as plain HTML."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cmpdesign.products.mold.make import mold_figures
 from cmpdesign.products.mold.parts import Part
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
 
-# Silicone that stays in cups and syringes, in percent of what is cast.
+# Silicone that stays in cups and syringes, in percent of the cast silicone.
 LOSS_PERCENT = 30
 # Less than a gram of either part cannot be weighed to a percent on a scale of 0.01 g.
 LEAST_MIX_G = 2.0
@@ -25,7 +25,7 @@ _STYLE = (
 
 
 def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings: Sequence[Finding]) -> str:
-    """The page; it refers to ``pictures/`` beside it."""
+    """Format the page, which refers to the folder ``pictures/``."""
     body = [
         f"<h1>Casting {escape(name)}</h1>",
         *(f'<p class="warning">{escape(str(finding))}</p>' for finding in findings),
@@ -33,7 +33,7 @@ def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings:
         "<h2>Mix</h2>",
         _pours_html(stack),
         "<h2>Steps</h2>",
-        "<ol>" + "".join(f"<li>{step}</li>" for step in _operation_texts(stack)) + "</ol>",
+        "<ol>" + "".join(f"<li>{text}</li>" for text in _operation_texts(stack)) + "</ol>",
         "<h2>Parts</h2>",
         *(_part_html(part) for part in parts),
     ]
@@ -44,31 +44,31 @@ def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings:
 
 
 def _pours_html(stack: MoldStack) -> str:
-    """Volume and mass of each pour, with what stays in the cup."""
+    """The table of pours: volume, mass, and the mass to mix, which includes the losses."""
     rows = []
     base, marker, cover = stack.silicones
     for name, volume in mold_figures(stack)["pour_mm3"].items():
         silicone = base if name == SILICONE_LAYERS[0] else cover if name == SILICONE_LAYERS[2] else marker
         grams = volume * silicone.density_g_cm3.value / 1000
-        cells = (
+        fields = (
             f"<td>{escape(name)}</td><td>{escape(silicone.name)}</td><td class=n>{volume:.1f} mm³</td>"
             f"<td class=n>{grams:.4f} g</td>"
             f"<td class=n>{max(grams * (1 + LOSS_PERCENT / 100), LEAST_MIX_G):.2f} g</td>"
             f"<td class=n>{silicone.pot_life_min.value:g} min</td><td "
             f"class=n>{silicone.cure_h.value:g} h</td>"
         )
-        rows.append(f"<tr>{cells}</tr>")
+        rows.append(f"<tr>{fields}</tr>")
     mix = f"mix (+{LOSS_PERCENT} %, at least {LEAST_MIX_G:g} g)"
     head = f"<tr><th>layer<th>silicone<th>cast<th>cast<th>{mix}<th>pot life<th>cure</tr>"
     return f"<table>{head}{''.join(rows)}</table>"
 
 
 def _operation_texts(stack: MoldStack) -> list[str]:
-    """The way of working that the parts are made for."""
+    """The texts of the operations in order."""
     domed = stack.crown is not None
     spread = "spread it over the dome; the plates shape it" if domed else "draw it off flush with the frame"
-    even = "wipe along the dome with a soft card" if domed else "draw off flush"
-    steps = [
+    level = "wipe along the dome with a soft card" if domed else "draw off flush"
+    texts = [
         "Degrease all parts; try whether a drop of each silicone cures on them; spray release agent "
         "on everything "
         "but the pins. Press the four pins into the base: they stand so that no part fits turned.",
@@ -81,21 +81,21 @@ def _operation_texts(stack: MoldStack) -> list[str]:
     ]
     for color in stack.colors:
         name = COLORS[color]
-        steps.append(
+        texts.append(
             f"<b>{name}</b>: press the plate <i>boss-{name}</i> down until it lies on the frame; its "
             "bosses then "
             f"stand on the base layer. Let the dough set, lift the plate straight up by its jack screws. Lay "
             f"<i>stencil-{name}</i> on, wipe {name} silicone through it, vacuum until bubbles have "
             "left, wipe again, "
-            f"lift the stencil, {even}."
+            f"lift the stencil, {level}."
         )
-    steps += [
+    texts += [
         "Cure the marker layer fully, wipe it with isopropanol.",
         "Lay the cover frame on, pour the protective layer, close with the lid, cure.",
         "Take lid, cover and frame off; peel the pad from the base, starting at a corner; cut the "
         "vents' plugs off.",
     ]
-    return steps
+    return texts
 
 
 def _part_html(part: Part) -> str:

@@ -1,9 +1,9 @@
-"""The product "mesh": STL of every part and layer, GLB and 3MF of mold and pad, pictures, job sheet."""
+"""The product "mesh": STL of every part and silicone layer, GLB and 3MF of mold and pad, pictures, job sheet."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,18 +27,20 @@ from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.registry import ProductFiles
 
 FOLDER = "mesh"
-# A flat-sided mesh has its volume in closed form; smooth crowns and pins are met within the chords' error.
+# Tolerance of a mesh's volume, as a share: of flat-sided solids, and of smooth crowns and pins (error of chords).
 EXACT_TOLERANCE, SMOOTH_TOLERANCE = 1e-9, 5e-3
+# Gap between parts in the files of the whole mold.
 APART_MM = 5.0
+# Opacity of the clear silicone layers.
 OPACITY = {"base": 0.35, "cover": 0.35}
 
 
 def make_meshes(design: Design, layout: Layout) -> ProductFiles:
-    """Meshes of the mold's parts (as they are printed) and of the pad's layers.
+    """Make the triangle meshes of the mold's parts (as printed) and of the pad's silicone layers.
 
     Raises:
-        DesignError: what cannot be made.
-        MoldError: a mesh that is open, twisted or of another volume than computed.
+        DesignError: the mold cannot be made.
+        MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
     stack = make_stack(design, layout)
     findings = check_mold(stack)
@@ -47,8 +49,8 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     parts = make_parts(stack)
     mold = [_add_checked_figures(f"mold/{part.name}", *make_part_mesh(part), figures) for part in parts]
     pad = [
-        _add_checked_figures(f"pad/{mesh.name}", mesh, volume, EXACT_TOLERANCE, figures)
-        for mesh, volume in pad_meshes(stack)
+        _add_checked_figures(f"pad/{mesh.name}", mesh, volume_mm3, EXACT_TOLERANCE, figures)
+        for mesh, volume_mm3 in pad_meshes(stack)
     ]
     files: dict[str, str | bytes] = {f"{FOLDER}/mold-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in mold}
     files |= {f"{FOLDER}/pad-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in pad}
@@ -63,10 +65,20 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     return ProductFiles(files, figures, tuple(findings), pictures)
 
 
-def make_part_mesh(part: Part) -> tuple[TriangleMesh, float, float]:
-    """A part's mesh, the volume that it must have, and how nearly."""
+class PartMesh(NamedTuple):
+    """A triangle mesh, its volume in closed form, and the tolerance of the mesh's volume as a share."""
+
+    mesh: TriangleMesh
+    volume_mm3: float
+    tolerance: float
+
+
+def make_part_mesh(part: Part) -> PartMesh:
+    """The triangle mesh of a part in the part's own frame."""
     if part.slab is None or part.crown in ("raised", "hollow"):
-        return tessellate_solid(part.name, part.color, part.solid), part.volume_mm3, SMOOTH_TOLERANCE
+        return PartMesh(
+            tessellate_solid(part.name, part.color, part.solid), part.volume_mm3, SMOOTH_TOLERANCE
+        )
     slab = chorded_slab(part.slab)
     if part.crown:
         from cmpdesign.products.mold.shapes.dished_solids import (
@@ -77,22 +89,25 @@ def make_part_mesh(part: Part) -> tuple[TriangleMesh, float, float]:
 
         build = dished_plate_solid if part.crown == "plate" else dished_sheet_solid
         volume = dished_volume_mm3(slab, part.dish, part.crown)
-        return tessellate_solid(part.name, part.color, build(slab, part.dish)), volume, EXACT_TOLERANCE
-    return (
-        tessellate_solid(part.name, part.color, make_slab_solid(slab)),
-        slab_volume_mm3(slab),
-        EXACT_TOLERANCE,
-    )
+        return PartMesh(
+            tessellate_solid(part.name, part.color, build(slab, part.dish)), volume, EXACT_TOLERANCE
+        )
+    solid = make_slab_solid(slab)
+    return PartMesh(tessellate_solid(part.name, part.color, solid), slab_volume_mm3(slab), EXACT_TOLERANCE)
 
 
 def _add_checked_figures(
-    name: str, mesh: TriangleMesh, volume: float, tolerance: float, figures: dict[str, Any]
+    name: str, mesh: TriangleMesh, volume_mm3: float, tolerance: float, figures: dict[str, Any]
 ) -> TriangleMesh:
-    """The mesh, checked by trimesh; its figures are added."""
+    """Check a mesh with trimesh, and add its figures to ``figures``; the mesh.
+
+    Raises:
+        MoldError: see ``make_meshes``.
+    """
     import trimesh
 
     body = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
-    error = abs(float(mesh.volume_mm3()) / volume - 1)
+    error = abs(float(mesh.volume_mm3()) / volume_mm3 - 1)
     if not body.is_watertight or not body.is_winding_consistent or error > tolerance:
         raise MoldError(
             f"mesh: {name}: watertight {body.is_watertight}, winding consistent "
@@ -102,18 +117,18 @@ def _add_checked_figures(
     figures[name] = {
         "triangles": len(mesh.triangles),
         "volume_mm3": round(mesh.volume_mm3(), 6),
-        "analytic_mm3": round(volume, 6),
+        "analytic_mm3": round(volume_mm3, 6),
     }
     return mesh
 
 
 def place_side_by_side(stack: MoldStack, meshes: Sequence[TriangleMesh]) -> list[TriangleMesh]:
-    """The parts on a plate, four in a row, each standing on z = 0."""
+    """The meshes four in a row, each standing on z = 0."""
     low, high = bounding_boxes([stack.block])[0]
-    step = high - low + APART_MM
+    spacing = high - low + APART_MM
     placed = []
     for number, mesh in enumerate(meshes):
         row, column = divmod(number, 4)
-        at = np.array([column, -row]) * step
-        placed.append(mesh.moved(float(at[0]), float(at[1]), -float(mesh.points[:, 2].min())))
+        place = np.array([column, -row]) * spacing
+        placed.append(mesh.moved(float(place[0]), float(place[1]), -float(mesh.points[:, 2].min())))
     return placed

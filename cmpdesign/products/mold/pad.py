@@ -1,4 +1,4 @@
-"""The finished pad as meshes: base, black layer, fillings by color, protective layer; at its cured size."""
+"""Triangle meshes of the finished pad at cured size: base, black layer, fillings by color, protective layer."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from cmpdesign.products.mold.shapes.dish import Dish, make_bare_dish, make_dish
 from cmpdesign.products.mold.shapes.dished_solids import dished_sheet_solid, dished_volume_mm3
 from cmpdesign.products.mold.solids.loops import Loop, chorded_pair, frustum_volume_mm3
 from cmpdesign.products.mold.solids.slab_shells import Slab, make_slab_solid, slab_volume_mm3
-from cmpdesign.products.mold.solids.tessellate import frusta_mesh, tessellate_solid
+from cmpdesign.products.mold.solids.tessellate import Frustum, frusta_mesh, tessellate_solid
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
 
 CLEAR_COLOR, SKIN_COLOR = "#d8e8f0", "#e8e4dc"
 
 
 def cured_stack(stack: MoldStack) -> MoldStack:
-    """The same stack without shrinkage: what is left when the silicone has cured."""
+    """The stack without shrinkage: the dimensions of the cured silicone."""
     base, marker, cover = (
         s.model_copy(update={"shrinkage_percent": s.shrinkage_percent.model_copy(update={"value": 0.0})})
         for s in stack.silicones
@@ -39,56 +39,65 @@ def cured_stack(stack: MoldStack) -> MoldStack:
 
 
 def pad_meshes(stack: MoldStack) -> Iterator[tuple[TriangleMesh, float]]:
-    """Every layer's and color's mesh with its volume in closed form, at cured size, z = 0 at the back."""
+    """The mesh of every silicone layer and filling with its volume in closed form (mm3), z = 0 at the pad's back."""
     pad = cured_stack(stack)
     heights = (0.0, pad.z_base_mm, pad.z_marker_mm, pad.z_cover_mm)
-    for layer, color in ((0, CLEAR_COLOR), (1, pad.layout.palette[COLORS[BLACK]]), (2, SKIN_COLOR)):
-        name = "black" if layer == 1 else SILICONE_LAYERS[layer]
-        yield _layer_mesh(pad, layer, name, color, heights[layer])
-        if layer == 1:
+    colors = (CLEAR_COLOR, pad.layout.palette[COLORS[BLACK]], SKIN_COLOR)
+    for silicone_layer, color in enumerate(colors):
+        yield _silicone_layer_mesh(pad, silicone_layer, color, heights[silicone_layer])
+        if silicone_layer == 1:
             for number in pad.colors:
                 yield _filling_mesh(pad, number, heights[1])
 
 
-def _layer_mesh(pad: MoldStack, layer: int, name: str, color: str, z: float) -> tuple[TriangleMesh, float]:
-    edges, thickness = pad.edges(layer), pad.thickness_mm[layer]
+def _silicone_layer_mesh(
+    pad: MoldStack, silicone_layer: int, color: str, z: float
+) -> tuple[TriangleMesh, float]:
+    """The mesh of a silicone layer at height z, and its volume."""
+    edges, thickness = pad.edges(silicone_layer), pad.thickness_mm[silicone_layer]
+    name = "black" if silicone_layer == 1 else SILICONE_LAYERS[silicone_layer]
     if pad.crown is not None:
         slab = Slab(edges[0], 0.0, thickness, outer_top=edges[1])
-        dish = make_bare_dish(pad) if layer != 1 else _cavity_dish(pad)
+        dish = make_bare_dish(pad) if silicone_layer != 1 else _cavity_dish(pad)
         mesh = tessellate_solid(name, color, dished_sheet_solid(slab, dish)).moved(0, 0, z)
         return mesh, dished_volume_mm3(slab, dish, "sheet")
-    if layer != 1:
-        m = len(edges[0].points)
-        mesh = frusta_mesh(name, color, [(edges[0], np.full(m, z), edges[1], np.full(m, z + thickness))])
-        return mesh, frustum_volume_mm3(*edges, thickness)
+    if silicone_layer != 1:
+        return frusta_mesh(name, color, [_upright_frustum(*edges, z, thickness)]), frustum_volume_mm3(
+            *edges, thickness
+        )
     through = [pair for number in pad.colors for pair in _cavity_outlines(pad, number)]
     slab = Slab(edges[0], 0.0, thickness, many_through=through, outer_top=edges[1])
     return tessellate_solid(name, color, make_slab_solid(slab)).moved(0, 0, z), slab_volume_mm3(slab)
 
 
 def _cavity_outlines(pad: MoldStack, color: int) -> list[tuple[Loop, Loop]]:
-    """Each cavity's outline at the base and at its open side."""
+    """The outlines of each cavity at the base and at its open side."""
     return [chorded_pair(part.tip, part.root) for part in boss_features(pad, pad.cells(color))]
 
 
 def _cavity_dish(pad: MoldStack) -> Dish:
-    """A dish with all colors' cavities, from the base to the open side."""
+    """The dish with the cavities of all colors, from the base to the open side."""
     dishes = [make_dish(pad, color, through=False) for color in pad.colors]
     outlines = {cell: (tip, root) for dish in dishes for cell, (root, tip) in dish.outlines.items()}
     return replace(dishes[0], outlines=outlines)
 
 
 def _filling_mesh(pad: MoldStack, color: int, z: float) -> tuple[TriangleMesh, float]:
+    """The mesh of a color's fillings, whose base is at height z, and its volume."""
     name, thickness = COLORS[color], pad.thickness_mm[1]
     if pad.crown is None:
-        pairs = _cavity_outlines(pad, color)
-        frusta = [(a, np.full(len(a.points), z), b, np.full(len(b.points), z + thickness)) for a, b in pairs]
+        frusta = [_upright_frustum(*pair, z, thickness) for pair in _cavity_outlines(pad, color)]
     else:
         dish = make_dish(pad, color, through=False)
         frusta = [
-            (tip, z + dish.z_at(cell, tip.points), root, z + thickness + dish.z_at(cell, root.points))
+            Frustum(tip, z + dish.z_at(cell, tip.points), root, z + thickness + dish.z_at(cell, root.points))
             for cell, (root, tip) in dish.outlines.items()
         ]
-        pairs = [(tip, root) for root, tip in dish.outlines.values()]
     mesh = frusta_mesh(name, pad.layout.palette[name], frusta)
-    return mesh, sum(frustum_volume_mm3(a, b, thickness) for a, b in pairs)
+    return mesh, sum(frustum_volume_mm3(one.lower, one.upper, thickness) for one in frusta)
+
+
+def _upright_frustum(lower: Loop, upper: Loop, z: float, thickness: float) -> Frustum:
+    """The frustum from z to z + thickness."""
+    m = len(lower.points)
+    return Frustum(lower, np.full(m, z), upper, np.full(m, z + thickness))

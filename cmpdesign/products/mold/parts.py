@@ -1,7 +1,7 @@
 """The parts of a mold: base, frame, boss plates, stencils, cover, lid, pins.
 
-Each is described first (a ``Slab`` and, on a domed pad, its curved faces), then built. Boss plates are
-described with their bosses up, as they are printed or milled, and are turned over where they are used.
+A part is described first (a ``Slab`` and, for a domed pad, curved faces) and built on demand. Boss plates are described
+with their bosses up, as they are printed or milled, and are turned over for use.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from cmpdesign.products.mold.solids.pins import pin_solid, pin_volume_mm3
 from cmpdesign.products.mold.solids.slab_shells import Feature, Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.stack.stack import MoldStack
 
-# A vent widens towards the outside, so that its plug is torn off at the pad.
+# Tangent of a vent's lean: a vent widens towards the outside, so that its plug tears off at the pad.
 VENT_LEAN = float(np.tan(np.radians(5.0)))
-# Tapped M3, for screws that push a plate off: 2.5 mm core.
+# Core diameter of the M3 holes for jack screws, which push a plate off.
 JACK_MM = 2.5
 PIN_CHAMFER_MM = 0.3
-# The base keeps this much under its blind pin holes.
+# Thickness of the base under its blind pin holes.
 PIN_FLOOR_MM = 1.0
-# A pad's outline with more corners is a circle in disguise: offset with mitres instead of arcs.
+# An outline with more corners approximates a curve and is offset with mitres instead of arcs.
 MANY_CORNERS = 24
 STEEL_COLOR, TRAY_COLOR, FRAME_COLOR, COVER_COLOR, LID_COLOR = (
     "#b4b8bd",
@@ -49,14 +49,14 @@ class Part:
 
     Attributes:
         name: "base", "boss-red", ...
-        use: what it is for, in a few words.
-        color: "#rrggbb" in the files and pictures.
-        slab: its plain shape; None for a pin.
-        z_mm: height of its origin where it is used.
-        turned: it is used upside down: turned about the x axis.
-        crown: "" or how the crown shapes it: "raised" (base), "hollow" (lid), "plate" or "sheet" (dished).
-        stack: the mold that it belongs to.
-        color_number: of a boss plate or stencil.
+        use: purpose of the part, in a few words.
+        color: "#rrggbb" in files and pictures.
+        slab: shape without the crown; None for a pin.
+        z_mm: height of the part's origin in use.
+        stack: dimensions of the mold.
+        turned: the part is used upside down (turned about the x axis).
+        crown: "" or the effect of the crown: "raised" (base), "hollow" (lid), "plate" or "sheet" (dished).
+        color_number: index into ``COLORS`` of a boss plate or stencil; else -1.
     """
 
     name: str
@@ -71,8 +71,8 @@ class Part:
 
     @property
     def pull_box_mm(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """The box, in the part's own frame, in which its walls are pulled from silicone."""
-        # Layers that shrink differently differ in size.
+        """Low and high corner of the box, in the part's own frame, whose walls are pulled from silicone."""
+        # Silicone layers that shrink differently differ in size.
         edges = np.concatenate([self.stack.edges(layer)[1].points for layer in range(3)])
         (left, bottom), (right, top) = edges.min(axis=0), edges.max(axis=0)
         if self.turned:
@@ -88,11 +88,12 @@ class Part:
 
     @cached_property
     def dish(self) -> Dish:
+        """The dish of a boss plate or stencil of a domed pad."""
         return make_dish(self.stack, self.color_number, through=self.crown == "sheet")
 
     @cached_property
     def volume_mm3(self) -> float:
-        """In closed form."""
+        """Volume in closed form."""
         if self.slab is None:
             return pin_volume_mm3(self.stack.pin_diameter_mm, pin_length_mm(self.stack), PIN_CHAMFER_MM)
         volume = slab_volume_mm3(self.slab)
@@ -121,7 +122,7 @@ class Part:
 
 
 def make_parts(stack: MoldStack) -> list[Part]:
-    """Every part once, in the order of use; nothing is built yet."""
+    """Describe every part once, in the order of use; solids are built on demand."""
     plates = [
         part
         for color in stack.colors
@@ -138,13 +139,13 @@ def make_parts(stack: MoldStack) -> list[Part]:
 
 
 def pin_length_mm(stack: MoldStack) -> float:
-    """From the bottom of its hole to 1 mm below the lid's back."""
+    """Length of a pin: from the bottom of its hole to 1 mm below the lid's back."""
     height = 0.0 if stack.crown is None else stack.crown.height_mm
     return pin_depth_mm(stack) + stack.z_cover_mm - stack.z_base_mm + stack.options.plate_mm + height - 1.0
 
 
 def pin_depth_mm(stack: MoldStack) -> float:
-    """Of the blind holes in the base."""
+    """Depth of the blind pin holes in the base."""
     return stack.z_base_mm + stack.options.floor_mm - PIN_FLOOR_MM
 
 
@@ -155,7 +156,7 @@ def _base_part(stack: MoldStack) -> Part:
     inner = _offset_outline(high, option.parting_mm)
     outer = _offset_outline(high, option.parting_mm + option.moat_mm)
     depth = option.moat_depth_mm
-    moat = Feature(outer, outer.moved(-lean * depth), -depth, (inner, inner.moved(lean * depth)))
+    moat = Feature(outer, outer.offset(-lean * depth), -depth, (inner, inner.offset(lean * depth)))
     sockets = [Feature(hole, hole, -pin_depth_mm(stack)) for hole in stack.holes(clearance=False)]
     slab = Slab(stack.block, -option.floor_mm, stack.z_base_mm, (), (pad, moat, *sockets))
     crown = "raised" if stack.crown else ""
@@ -164,7 +165,7 @@ def _base_part(stack: MoldStack) -> Part:
 
 def _offset_outline(edge: Loop, offset_mm: float) -> Loop:
     return (
-        rounded_offset(edge.points, offset_mm) if len(edge.points) <= MANY_CORNERS else edge.moved(offset_mm)
+        rounded_offset(edge.points, offset_mm) if len(edge.points) <= MANY_CORNERS else edge.offset(offset_mm)
     )
 
 
@@ -178,21 +179,28 @@ def _cover_part(stack: MoldStack) -> Part:
     return Part("cover", "frame of the protective layer", COVER_COLOR, slab, stack.z_marker_mm, stack)
 
 
-def _ring_slab(stack: MoldStack, layer: int) -> Slab:
-    holes = [stack.edges(layer), *((hole, hole) for hole in stack.holes())]
-    return Slab(stack.block, 0.0, stack.thickness_mm[layer], holes)
+def _ring_slab(stack: MoldStack, silicone_layer: int) -> Slab:
+    """A frame of the thickness of a silicone layer."""
+    holes = [stack.edges(silicone_layer), *((hole, hole) for hole in stack.holes())]
+    return Slab(stack.block, 0.0, stack.thickness_mm[silicone_layer], holes)
 
 
 def _boss_plate_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    standing = () if stack.crown else boss_features(stack, mirror_cells(stack.cells(color)))
-    holes = [hole for loop in (*stack.holes(), *_jack_holes(stack)) for hole in [_mirror_loop(loop)]]
+    bosses = () if stack.crown else boss_features(stack, mirror_cells(stack.cells(color)))
+    holes = [_mirror_loop(loop) for loop in (*stack.holes(), *_jack_holes(stack))]
     depth = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
-    slab = Slab(_mirror_loop(stack.block), -depth, 0.0, [(h, h) for h in holes], (), standing)
-    use = f"bosses that leave the {name} cavities in the black layer"
-    crown = "plate" if stack.crown else ""
+    slab = Slab(_mirror_loop(stack.block), -depth, 0.0, [(h, h) for h in holes], many=bosses)
     return Part(
-        f"boss-{name}", use, stack.layout.palette[name], slab, stack.z_marker_mm, stack, True, crown, color
+        name=f"boss-{name}",
+        use=f"bosses that leave the {name} cavities in the black layer",
+        color=stack.layout.palette[name],
+        slab=slab,
+        z_mm=stack.z_marker_mm,
+        stack=stack,
+        turned=True,
+        crown="plate" if stack.crown else "",
+        color_number=color,
     )
 
 
@@ -201,18 +209,15 @@ def _stencil_part(stack: MoldStack, color: int) -> Part:
     through = () if stack.crown else stencil_hole_outlines(stack, stack.cells(color))
     holes = [(hole, hole) for hole in stack.holes()]
     slab = Slab(stack.block, 0.0, stack.options.stencil_mm, holes, many_through=through)
-    use = f"mask for filling the {name} cavities"
-    crown = "sheet" if stack.crown else ""
     return Part(
-        f"stencil-{name}",
-        use,
-        stack.layout.palette[name],
-        slab,
-        stack.z_marker_mm,
-        stack,
-        False,
-        crown,
-        color,
+        name=f"stencil-{name}",
+        use=f"mask for filling the {name} cavities",
+        color=stack.layout.palette[name],
+        slab=slab,
+        z_mm=stack.z_marker_mm,
+        stack=stack,
+        crown="sheet" if stack.crown else "",
+        color_number=color,
     )
 
 
@@ -232,34 +237,36 @@ def _pin_part(stack: MoldStack) -> Part:
 
 
 def vent_places(stack: MoldStack) -> Points:
-    """(V, 2) inside the pad's edge, at equal distances along it from its first corner."""
+    """(V, 2) places of the vents: inside the pad's edge, at equal distances along the edge from its first corner."""
     count = stack.options.vents
     inset = stack.options.vent_mm / 2 + 0.1
-    low = min((stack.edges(layer)[0] for layer in (0, 2)), key=lambda loop: loop.area_mm2())
-    path = polygon_loop(low.points).moved(-inset).points
+    smaller = min(
+        (stack.edges(silicone_layer)[0] for silicone_layer in (0, 2)), key=lambda loop: loop.area_mm2()
+    )
+    path = polygon_loop(smaller.points).offset(-inset).points
     sides = np.hypot(*(np.roll(path, -1, axis=0) - path).T)
     along = np.concatenate([[0.0], np.cumsum(sides)])
     closed = np.concatenate([path, path[:1]])
-    at = np.arange(count) * along[-1] / max(count, 1)
-    return np.stack([np.interp(at, along, closed[:, axis]) for axis in (0, 1)], axis=-1)
+    vent_along = np.arange(count) * along[-1] / max(count, 1)
+    return np.stack([np.interp(vent_along, along, closed[:, axis]) for axis in (0, 1)], axis=-1)
 
 
 def _jack_holes(stack: MoldStack) -> list[Loop]:
     """Two tapped holes over the base's solid rim, a quarter of the height from opposite corners."""
-    (left, bottom), _, (_, top) = stack.pins_mm[0], stack.pins_mm[1], stack.pins_mm[2]
-    right = stack.pins_mm[1][0]
+    left, bottom = stack.pins_mm[0]
+    right, top = stack.pins_mm[1][0], stack.pins_mm[2][1]
     quarter = (top - bottom) / 4
     return [circle_loop(np.array(p), JACK_MM) for p in ((left, bottom + quarter), (right, top - quarter))]
 
 
 def mirror_cells(cells: Points) -> Points:
-    """Cells as on a plate that lies on its back: y mirrored, still counter-clockwise."""
-    turned: Points = cells[:, ::-1] * np.array([1.0, -1.0])
-    return turned
+    """(N, k, 2) cells on a plate with its bosses up: y mirrored, still counter-clockwise."""
+    mirrored: Points = cells[:, ::-1] * np.array([1.0, -1.0])
+    return mirrored
 
 
 def _mirror_loop(loop: Loop) -> Loop:
-    """A loop as seen on a plate that lies on its back."""
-    flip = np.array([1.0, -1.0])
-    # Side i runs from point i to i + 1; backwards, the centre of side i belongs to the point before.
-    return Loop(np.roll(loop.points[::-1], 1, axis=0) * flip, loop.centres[::-1] * flip)
+    """A loop on a plate with its bosses up: y mirrored, still counter-clockwise."""
+    mirror = np.array([1.0, -1.0])
+    # Side i runs from point i to i + 1. In reverse order the centre of side i belongs to point i + 1.
+    return Loop(np.roll(loop.points[::-1], 1, axis=0) * mirror, loop.centres[::-1] * mirror)

@@ -15,31 +15,31 @@ Image = NDArray[np.uint8]
 
 SIZE_PX = (560, 400)
 EXPLODED_PX = (860, 1200)
-# Free at the right of the exploded parts, for their names.
+# Width right of the exploded parts, for their names.
 NAMES_PX = 170
 EXPLODED_VIEW = ViewDirection(-60.0, 22.0)
-# Free between exploded parts, as a share of their width.
+# Gap between exploded parts, as a share of their width.
 EXPLODED_GAP_SHARE = 0.2
 EXPLODED_NAME = "exploded"
 
 
 def mold_pictures(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> dict[str, Image]:
-    """``exploded_meshes``, and ``part-above`` and ``part-below`` of every part; BGR."""
+    """The exploded picture, and "<part>-above" and "<part>-below" of every part: (H, W, 3) uint8 BGR."""
     return {EXPLODED_NAME: exploded_picture(parts, meshes), **part_pictures(meshes)}
 
 
 def part_pictures(meshes: Sequence[TriangleMesh]) -> dict[str, Image]:
-    """Every part from two sides."""
-    views = {"above": ABOVE, "below": BELOW}
+    """Pictures of every part from two sides."""
+    directions = {"above": ABOVE, "below": BELOW}
     return {
-        f"{mesh.name}-{side}": draw_meshes([mesh], view, SIZE_PX)
+        f"{mesh.name}-{side}": draw_meshes([mesh], direction, SIZE_PX)
         for mesh in meshes
-        for side, view in views.items()
+        for side, direction in directions.items()
     }
 
 
 def exploded_picture(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> Image:
-    """The parts above each other with their names."""
+    """The picture of the parts above each other, with their names."""
     groups = exploded_meshes(parts, meshes)
     size = (EXPLODED_PX[0] - NAMES_PX, EXPLODED_PX[1])
     placed = [mesh for group in groups.values() for mesh in group]
@@ -57,21 +57,28 @@ def exploded_picture(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> I
 def exploded_meshes(
     parts: Sequence[Part], meshes: Sequence[TriangleMesh]
 ) -> Mapping[str, list[TriangleMesh]]:
-    """The parts above each other in the order of use, turned as they are used, the pins over the base."""
+    """The meshes above each other in the order of use, turned as in use, the pins over the base.
+
+    Args:
+        parts, meshes: the parts and their meshes, in the same order.
+
+    Returns:
+        Part name -> its meshes (several for the pins).
+    """
     placed: dict[str, list[TriangleMesh]] = {}
-    apart = EXPLODED_GAP_SHARE * float(np.ptp(meshes[0].points[:, :2], axis=0).max())
+    gap = EXPLODED_GAP_SHARE * float(np.ptp(meshes[0].points[:, :2], axis=0).max())
     top = 0.0
     for part, mesh in _parts_in_order(parts, meshes):
         turned = mesh.moved(0.0, 0.0, 0.0, part.turned)
         low, high = float(turned.points[:, 2].min()), float(turned.points[:, 2].max())
         places = part.stack.pins_mm.tolist() if part.name == "pin" else [(0.0, 0.0)]
         placed[part.name] = [turned.moved(x, y, top - low) for x, y in places]
-        top += high - low + apart
+        top += high - low + gap
     return placed
 
 
 def _parts_in_order(parts: Sequence[Part], meshes: Sequence[TriangleMesh]) -> list[tuple[Part, TriangleMesh]]:
-    """Base, pins, then the others."""
+    """Parts with their meshes: base, pins, then the others."""
     pairs = list(zip(parts, meshes, strict=True))
     pins = [pair for pair in pairs if pair[0].name == "pin"]
     others = [pair for pair in pairs if pair[0].name != "pin"]

@@ -1,4 +1,4 @@
-"""Print sheets: pads on a page, and the page read back from a scan.
+"""Print sheets: pads on a page as SVG and PDF, and the verdict on a scan of the printed page.
 
-In: a ``Layout`` and page options, or a scan. Out: SVG and PDF, or the verdict on the scan.
+In: a ``Layout`` and page options, or a scan. Out: SVG and PDF, or a ``SheetVerdict``.
 """

@@ -1,4 +1,4 @@
-"""The key of a print sheet: a QR code and two scale bars at fixed places, by which a scan is read.
+"""The key of a print sheet: a QR code and two scale bars at fixed places relative to the code.
 
         |            y bar, 50 mm
         |
@@ -7,7 +7,7 @@
     |       |  -----------------   x bar, 50 mm
     +-------+
 
-Places are in mm from the code's upper left corner, x right, y down. One definition for writer and reader.
+Places are in mm from the upper left corner of the code, x right, y down. Writer and reader share this definition.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 BAR_MM = 50.0
 THICK_MM = 1.2
 CODE_MM = 24.0
-# First and last end of each bar's middle line.
+# First and last end of each bar's middle line, mm.
 X_BAR = ((30.0, 20.0), (30.0 + BAR_MM, 20.0))
 Y_BAR = ((4.0, -6.0), (4.0, -6.0 - BAR_MM))
 KEY_PREFIX = "CMP1"
@@ -25,14 +25,14 @@ KEY_PREFIX = "CMP1"
 
 @dataclass(frozen=True)
 class SheetKey:
-    """What the code says.
+    """The content of the QR code.
 
     Attributes:
-        digest: the layout's, 64 hexadecimal digits.
-        name: the design's.
-        pattern: the pattern's name.
-        layers: their number.
-        pitch_mm: the pitch.
+        digest: digest of the layout, 64 hexadecimal digits.
+        name: name of the design.
+        pattern: name of the pattern.
+        layers: number of marker layers.
+        pitch_mm: pitch of the pattern.
     """
 
     digest: str
@@ -42,12 +42,12 @@ class SheetKey:
     pitch_mm: float
 
     def text(self) -> str:
-        """The code's text; the name comes last, since it may hold anything."""
+        """The text of the code; the name comes last, because a name may contain the separator."""
         return f"{KEY_PREFIX}|{self.digest}|{self.pattern}|{self.layers}|{self.pitch_mm!r}|{self.name}"
 
 
 def parse_key(text: str) -> SheetKey | None:
-    """The key in a code's text; None when it is some other code."""
+    """Parse the text of a QR code; None if the text is not the key of a print sheet."""
     parts = text.split("|", 5)
     if len(parts) != 6 or parts[0] != KEY_PREFIX:
         return None

@@ -1,4 +1,4 @@
-"""A printed page as a list of shapes in mm (y down), and its two formats: SVG and PDF."""
+"""A printed page as a list of shapes in mm (x right, y down), and the page as SVG and PDF."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ POINTS_PER_MM = 72 / 25.4
 
 @dataclass(frozen=True, eq=False)
 class FilledPolygons:
-    """Filled polygons of one color."""
+    """Filled polygons of one color ("#rrggbb"), each (N, 2) in mm; ``name`` is the id of the SVG group."""
 
     polygons: Sequence[NDArray[np.float64]]
     color: str
@@ -25,7 +25,7 @@ class FilledPolygons:
 
 @dataclass(frozen=True)
 class TextLine:
-    """One line of text, its left end on the base line; ``turned``: it runs upwards."""
+    """One line of text; x and y give the left end of the base line; a ``turned`` text runs upwards."""
 
     text: str
     x_mm: float
@@ -36,7 +36,7 @@ class TextLine:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page and what is on it, in the order of drawing."""
+    """A page and its shapes in the order of drawing."""
 
     width_mm: float
     height_mm: float
@@ -45,13 +45,13 @@ class Page:
 
 
 def rectangle_points(left: float, top: float, width: float, height: float) -> NDArray[np.float64]:
-    """An upright rectangle's corners."""
+    """(4, 2) corners of an upright rectangle, clockwise on the page from the upper left one."""
     right, bottom = left + width, top + height
     return np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
 
 
 def page_to_svg(page: Page) -> str:
-    """The page with width, height and viewBox in mm."""
+    """Format the page as SVG with width, height and viewBox in mm."""
     import svgwrite
 
     drawing = svgwrite.Drawing(
@@ -80,7 +80,7 @@ def _svg_text(drawing: Any, item: TextLine) -> Any:
 
 
 def page_to_pdf(page: Page) -> bytes:
-    """The page as PDF, true to size; no date, the same bytes for the same page."""
+    """Format the page as PDF at true size, without a date: the same bytes for the same page."""
     from reportlab.lib.colors import HexColor
     from reportlab.pdfgen.canvas import Canvas
 
@@ -88,7 +88,7 @@ def page_to_pdf(page: Page) -> bytes:
     size = (page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM)
     canvas = Canvas(result, pagesize=size, invariant=1)
     canvas.setTitle(page.title)
-    # From here on in mm, y still up.
+    # From here on coordinates are in mm, y up.
     canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
     for item in page.items:
         if isinstance(item, TextLine):

@@ -1,4 +1,4 @@
-"""The product "print": several pads on a page, with all that tells how true the print is."""
+"""The product "print": several pads on a page, with crop marks, scale bars, color patches and a QR code."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from cmpdesign.products.sheet.page import (
 
 FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
-# Free for the printer's grip, and for the key at the left and the bottom.
+# Free for the printer's grip; also free at the left and the bottom, for the key.
 MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
 CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
-# Corners that turn by less than 30 degrees (or more than 150) have no marks of their own.
+# Sine of the least turn of a corner with crop marks: 30 to 150 degrees.
 SHARP = 0.5 - 1e-9
 PATCH_MM, FRAME_MM = 6.0, 0.2
 Points = NDArray[np.float64]
 
 
 def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
-    """``print/sheet.svg`` and ``print/sheet.pdf``.
+    """Make ``print/sheet.svg`` and ``print/sheet.pdf``.
 
     Raises:
-        DesignError: not one pad fits on the page.
+        DesignError: no pad fits on the page, or fewer pads fit than the design asks for.
     """
     page, pads = make_print_page(design, layout)
     files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
@@ -46,10 +46,10 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
 
 
 def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
-    """The page, and how many pads are on it."""
+    """The page, and the number of pads on the page."""
     width, height = PAGES_MM[design.sheet.page]
     places = _pad_places(design.sheet, layout, width, height)
-    # A transparent page becomes black in many a viewer, and its code unreadable.
+    # Many viewers show a transparent page black, which makes the code unreadable.
     items: list[FilledPolygons | TextLine] = [
         FilledPolygons([rectangle_points(0, 0, width, height)], PAPER, "paper")
     ]
@@ -62,27 +62,26 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
     )
     items += _key_items(layout, height)
     items += _color_patch_items(layout, width, height)
-    return Page(width, height, f"{layout.parameters.get('name') or layout.pattern}, print sheet", items), len(
-        places
-    )
+    title = f"{layout.parameters.get('name') or layout.pattern}, print sheet"
+    return Page(width, height, title, items), len(places)
 
 
 def _pad_places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
-    """Upper left corner of each pad's bounding box, row by row."""
+    """(2,) upper left corner of each pad's bounding box on the page, row by row, mm."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     printed = np.concatenate(
         [_bleed_outline(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)]
     )
-    around = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
-    step = np.array(layout.size_mm) + 2 * around
+    margin = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
+    spacing = np.array(layout.size_mm) + 2 * margin
     left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM
-    room = np.array([width - left - MARGIN_MM, height - MARGIN_MM - bottom])
-    columns, rows = (int(n) for n in np.floor(room / step + 1e-9))
+    usable = np.array([width - left - MARGIN_MM, height - MARGIN_MM - bottom])
+    columns, rows = (int(n) for n in np.floor(usable / spacing + 1e-9))
     if columns < 1 or rows < 1:
         raise DesignError(
             f"a pad of {layout.size_mm[0]:.4g} x {layout.size_mm[1]:.4g} mm with bleed and crop marks "
             "does not fit into "
-            f"{room[0]:.4g} x {room[1]:.4g} mm on {option.page}; choose a larger sheet.page or a "
+            f"{usable[0]:.4g} x {usable[1]:.4g} mm on {option.page}; choose a larger sheet.page or a "
             "smaller pattern"
         )
     wanted = option.pads or columns * rows
@@ -91,12 +90,13 @@ def _pad_places(option: SheetOptions, layout: Layout, width: float, height: floa
             f"sheet.pads = {wanted}: only {columns * rows} fit on {option.page}; ask for fewer or "
             "choose a larger page"
         )
-    # In the middle of the room across.
-    corner = np.array([left + (room[0] - columns * step[0]) / 2, MARGIN_MM]) + around
-    return [corner + step * (n % columns, n // columns) for n in range(wanted)]
+    # The columns are centred in the usable width.
+    corner = np.array([left + (usable[0] - columns * spacing[0]) / 2, MARGIN_MM]) + margin
+    return [corner + spacing * (n % columns, n // columns) for n in range(wanted)]
 
 
 def _pad_items(layout: Layout, place: Points, design: Design) -> list[FilledPolygons | TextLine]:
+    """The ground with bleed, then the cells color by color."""
     ground = _page_from_layout(_bleed_outline(layout, design.sheet), layout, place, design)
     items: list[FilledPolygons | TextLine] = [FilledPolygons([ground], layout.palette[COLORS[BLACK]])]
     for color, name in enumerate(COLORS):
@@ -108,8 +108,9 @@ def _pad_items(layout: Layout, place: Points, design: Design) -> list[FilledPoly
 
 
 def _bleed_outline(layout: Layout, option: SheetOptions) -> Points:
-    bleed: Points = layout.outline_mm + option.bleed_mm * corner_offsets(layout.outline_mm)
-    return bleed
+    """(K, 2) the pad's outline, ``bleed_mm`` further out."""
+    outline: Points = layout.outline_mm + option.bleed_mm * corner_offsets(layout.outline_mm)
+    return outline
 
 
 def _fiducial_polygons(layout: Layout, place: Points, design: Design) -> list[Points]:
@@ -118,23 +119,23 @@ def _fiducial_polygons(layout: Layout, place: Points, design: Design) -> list[Po
 
 
 def _page_from_layout(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
-    """From the layout to the page, the upper left corner of the pad's bounding box at ``place``."""
+    """(..., 2) points from the layout's frame to the page; ``place``: corner of the pad, see ``_pad_places``."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     x = high[0] - xy[..., 0] if design.print_mirror else xy[..., 0] - low[0]
     return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
 
 
 def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
-    """Hairlines that continue the pad's sides beyond its corners: a ruler laid on two of them shows the cut.
+    """Hairlines that continue the pad's sides beyond the corners; a ruler laid on two hairlines shows the cut.
 
-    An outline that is round or not convex has no such sides: it gets the marks of its bounding box.
+    The marks of a round or non-convex outline are those of its bounding box.
 
     Args:
         outline_mm: (N, 2) counter-clockwise.
-        bleed_mm: the marks begin ``CROP_APART_MM`` outside it.
+        bleed_mm: width of the bleed; the marks begin ``CROP_APART_MM`` outside the bleed.
 
     Returns:
-        Two (4, 2) outlines for each corner.
+        Two (4, 2) outlines per corner.
     """
     corners, sine = outline_mm, _turn_sines(outline_mm)
     if (sine < SHARP).any():
@@ -146,31 +147,31 @@ def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
         _unit_directions(np.roll(corners, -1, axis=0), corners),
     )
     marks = []
-    for corner, away, *ways in zip(corners, (bleed_mm + CROP_APART_MM) / sine, before, after, strict=True):
-        # Where a side goes on, it leaves the next one's bleed at this distance from the corner.
-        marks += [_hairline_polygon(corner + away * way, way) for way in ways]
+    # A continued side leaves the bleed of the next side at this distance from the corner.
+    distances = (bleed_mm + CROP_APART_MM) / sine
+    for corner, distance, *directions in zip(corners, distances, before, after, strict=True):
+        marks += [_hairline_polygon(corner + distance * direction, direction) for direction in directions]
     return marks
 
 
 def _turn_sines(outline: Points) -> Points:
     """(N,) sine of the angle by which the outline turns to the left at each corner."""
-    first, then = (
-        _unit_directions(np.roll(outline, 1, axis=0), outline),
-        _unit_directions(outline, np.roll(outline, -1, axis=0)),
-    )
-    turns: Points = first[:, 0] * then[:, 1] - first[:, 1] * then[:, 0]
-    return turns
+    before = _unit_directions(np.roll(outline, 1, axis=0), outline)
+    after = _unit_directions(outline, np.roll(outline, -1, axis=0))
+    sines: Points = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return sines
 
 
 def _unit_directions(start: Points, end: Points) -> Points:
-    """(N, 2) directions of length one."""
-    way: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
-    return way
+    """(N, 2) unit vectors from start to end."""
+    direction: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
+    return direction
 
 
-def _hairline_polygon(start: Points, way: Points) -> Points:
-    half = HAIRLINE_MM / 2 * np.array([-way[1], way[0]])
-    end = start + CROP_MM * way
+def _hairline_polygon(start: Points, direction: Points) -> Points:
+    """(4, 2) corners of a hairline of length ``CROP_MM``."""
+    half = HAIRLINE_MM / 2 * np.array([-direction[1], direction[0]])
+    end = start + CROP_MM * direction
     return np.array([start - half, end - half, end + half, start + half])
 
 
@@ -194,10 +195,11 @@ def _key_items(layout: Layout, height: float) -> list[FilledPolygons | TextLine]
     x_bar = rectangle_points(left + X_BAR[0][0], top + X_BAR[0][1] - half, BAR_MM, THICK_MM)
     y_bar = rectangle_points(left + Y_BAR[1][0] - half, top + Y_BAR[1][1], THICK_MM, BAR_MM)
     text_x = left + X_BAR[0][0]
-    width, tall = layout.size_mm
+    pad_width, pad_height = layout.size_mm
     lines = (
         name,
-        f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, {width:.4g} x {tall:.4g} mm",
+        f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, "
+        f"{pad_width:.4g} x {pad_height:.4g} mm",
         f"digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
         "print at 100 %, not fitted to the page",
@@ -213,7 +215,7 @@ def _key_items(layout: Layout, height: float) -> list[FilledPolygons | TextLine]
 
 
 def _color_patch_items(layout: Layout, width: float, height: float) -> list[FilledPolygons | TextLine]:
-    """One patch a color, with its name and value, in the lower right corner."""
+    """One patch per color with the color's name and value, in the lower right corner."""
     names = [name for number, name in enumerate(COLORS) if (layout.cell_color == number).any()]
     items: list[FilledPolygons | TextLine] = []
     for number, name in enumerate(names):

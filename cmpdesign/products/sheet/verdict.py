@@ -1,4 +1,4 @@
-"""Is this picture a print sheet of the layout, and is it printed true?"""
+"""The verdict on a picture of a print sheet: the sheet's layout, and the scales and skew of the print."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from cmpdesign.products.sheet.scan import NO_CODE, SheetBars, SheetReading, find
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
 
-# A print off by more than this, or bars this far from a right angle, is not the design any more.
+# Largest deviation of a scale from 1, and of the bars' angle from 90 degrees.
 SCALE_TOLERANCE, SKEW_TOLERANCE_DEG = 0.005, 0.2
-# A camera that leans by four degrees 400 mm away moves a bar's end by this.
+# A camera that leans by four degrees at a distance of 400 mm moves a bar's end by this.
 PERSPECTIVE_TOLERANCE_MM = 0.1
-# No printer fits a page by more than from A3 to A5: beyond, a file's resolution is not its picture's.
+# Printers scale by at most A3 to A5. Outside this range the stated resolution is not the picture's.
 PLAUSIBLE_SCALES = 0.45, 2.2
 
 
 @dataclass(frozen=True)
 class SheetVerdict:
-    """What was found on one sheet.
+    """The verdict on one sheet.
 
     Attributes:
-        verified: it is the layout's, and nothing that could be measured is off.
-        reason: one sentence that says why not; None when verified.
-        note: what could not be measured and why; None when all was.
-        reading: the measures; None when there is no sheet.
+        verified: the sheet shows the layout, and every measured value is within its tolerance.
+        reason: one sentence on the failure; None when verified.
+        note: values that could not be measured, and the cause; None when all were measured.
+        reading: the measures; None without a sheet.
     """
 
     verified: bool
@@ -39,7 +39,7 @@ class SheetVerdict:
 
     @property
     def is_sheet(self) -> bool:
-        """False when the picture shows no sheet's code."""
+        """False when no code of a print sheet was found in the picture."""
         return self.reason != NO_CODE
 
     def to_json(self) -> dict[str, Any]:
@@ -51,23 +51,23 @@ class SheetVerdict:
         head = "verified" if self.verified else f"not verified: {self.reason}"
         if self.reading is None:
             return head
-        found = self.reading
-        scale = f"scale x / y {found.ratio:.4f}"
-        if found.scale_x is not None and found.dpi is not None:
-            dpi = " x ".join(dict.fromkeys(f"{value:.4g}" for value in found.dpi))
-            scale = f"scale x {found.scale_x:.4f}, y {found.scale_y:.4f} at {dpi} dpi"
+        reading = self.reading
+        scale = f"scale x / y {reading.ratio:.4f}"
+        if reading.scale_x is not None and reading.dpi is not None:
+            dpi = " x ".join(dict.fromkeys(f"{value:.4g}" for value in reading.dpi))
+            scale = f"scale x {reading.scale_x:.4f}, y {reading.scale_y:.4f} at {dpi} dpi"
         note = f"; {self.note}" if self.note else ""
-        return f"{head} (print sheet {found.key.name}, {scale}, skew {found.skew_deg:+.3f} deg{note})"
+        return f"{head} (print sheet {reading.key.name}, {scale}, skew {reading.skew_deg:+.3f} deg{note})"
 
 
 def judge_sheet(image: Image, path: Path, digest: str, dpi: float | None = None) -> SheetVerdict:
-    """The verdict on a picture of a sheet.
+    """Judge a picture of a print sheet.
 
     Args:
-        image: (H, W, 3) BGR.
-        path: its file, which may state the picture's resolution.
-        digest: the layout's.
-        dpi: the resolution, if it is known better; 0 when it is not known at all.
+        image: (H, W, 3) BGR, uint8 or uint16.
+        path: the picture's file, which may state the resolution.
+        digest: digest of the layout.
+        dpi: resolution in place of the file's; 0: unknown, the file's resolution is ignored.
     """
     bars = find_sheet_bars(image)
     if isinstance(bars, str):
@@ -80,25 +80,25 @@ def judge_sheet(image: Image, path: Path, digest: str, dpi: float | None = None)
 def _measure_with_resolution(
     bars: SheetBars, path: Path, dpi: float | None
 ) -> tuple[SheetReading, str | None]:
-    """The reading, and why the scales themselves are not known, if they are not."""
+    """The reading, and the reason for unknown scales (None if the scales are known)."""
     if dpi:
         return measure_sheet(bars, (dpi, dpi)), None
-    stated = "no resolution is given" if dpi == 0 else resolution_dpi(path)
-    if not isinstance(stated, str):
-        reading = measure_sheet(bars, stated)
+    resolution = "no resolution is given" if dpi == 0 else resolution_dpi(path)
+    if not isinstance(resolution, str):
+        reading = measure_sheet(bars, resolution)
         assert reading.scale_x is not None and reading.scale_y is not None
         low, high = PLAUSIBLE_SCALES
         if low < reading.scale_x < high and low < reading.scale_y < high:
             return reading, None
-        stated = (
-            f"the file states {stated[0]:.4g} dpi, by which the bars are "
+        resolution = (
+            f"the file states {resolution[0]:.4g} dpi, by which the bars are "
             f"{BAR_MM * reading.scale_x:.3g} x {BAR_MM * reading.scale_y:.3g} mm"
         )
-    return measure_sheet(bars), f"scales not known, only their ratio: {stated}"
+    return measure_sheet(bars), f"scales not known, only their ratio: {resolution}"
 
 
 def _failure_reason(reading: SheetReading, digest: str) -> str | None:
-    """Why the sheet is not the layout, true to size; None when nothing speaks against it."""
+    """One sentence on the first failed test; None if the sheet passes all tests."""
     if reading.key.digest != digest:
         return f"the sheet is of another layout ({reading.key.name}, digest {reading.key.digest[:12]})"
     if reading.perspective_mm > PERSPECTIVE_TOLERANCE_MM:

@@ -1,13 +1,12 @@
-"""The coupon: a test piece whose openings tell the kerf.
+"""The coupon: a test piece with openings from whose width the kerf is measured.
 
 o                 o        o: fiducials, cut round; their centres do not depend on the kerf
-  [] |   [] |   [] |       []: a square, |, -: narrow slots; the beam's centre runs along their nominal
-  outline,
-   -      -      -         so each opening is wider than nominal by just one kerf
-  [] |   [] |   [] |       columns: power; rows: times over
+  [] |   [] |   [] |       []: square; |, -: narrow slots; the beam's centre runs along the nominal outlines,
+   -      -      -         so each opening is one kerf wider than nominal
+  [] |   [] |   [] |       columns: power; rows: repeats
    -      -      -
-  v v v v v v              v: triangles of 1.5 mm, compensated for a range of kerfs: the right one looks right
-o o               o        the fifth mark tells how the piece lies
+  v v v v v v              v: triangles of 1.5 mm, compensated for a range of kerfs, to compare by eye
+o o               o        the fifth fiducial shows the orientation of the piece
 """
 
 from __future__ import annotations
@@ -22,8 +21,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.products.laser.setup import LaserSetup
 
+# Powers (columns) and repeats (rows), relative to the settings of the job.
 POWER_SHARES = (0.8, 1.0, 1.2)
 REPEAT_FACTORS = (1, 2)
+# Kerfs for which the triangles are compensated.
 KERFS_MM = (0.05, 0.09, 0.13, 0.17, 0.21, 0.25)
 SQUARE_MM, SLOT_MM, SLOT_LENGTH_MM = 3.0, 0.3, 4.0
 PATCH_MM, MARGIN_MM = (11.0, 10.0), 5.0
@@ -34,7 +35,7 @@ _MAX_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Opening:
-    """A rectangle, by its centre and the nominal width and height of the beam's path."""
+    """A rectangle: its centre, and the width and height of the path of the beam's centre."""
 
     x_mm: float
     y_mm: float
@@ -44,7 +45,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class Patch:
-    """Openings cut with the same settings."""
+    """Openings that are cut with the same settings."""
 
     name: str
     power_percent: float
@@ -55,9 +56,14 @@ class Patch:
 
 @dataclass(frozen=True)
 class Coupon:
-    """A coupon in its own frame: mm, x right, y up, origin at its lower left fiducial.
+    """A coupon in its own frame: mm, x right, y up, origin at the lower left fiducial.
 
-    ``fiducials_mm``: lower left, lower right, upper left, upper right, and the fifth, right of the first.
+    Attributes:
+        machine, material: names of machine and material.
+        fiducial_diameter_mm: diameter of the fiducials.
+        fiducials_mm: (x, y) of the lower left, lower right, upper left and upper right fiducial, and of the fifth,
+            right of the first.
+        patches: the patches.
     """
 
     machine: str
@@ -68,11 +74,11 @@ class Coupon:
 
 
 class CouponError(CmpDesignError, ValueError):
-    """A file that is no coupon."""
+    """A file that does not describe a coupon."""
 
 
 def design_coupon(setup: LaserSetup) -> Coupon:
-    """The coupon for a machine and material: power and repeats around the settings that the job uses."""
+    """Design the coupon of a machine and material: power and repeats around the settings of the job."""
     width, height = PATCH_MM[0] * len(POWER_SHARES), PATCH_MM[1] * len(REPEAT_FACTORS) + 4 * TRIANGLE_MM
     right, top = width + 2 * MARGIN_MM, height + 2 * MARGIN_MM
     patches = []
@@ -98,16 +104,16 @@ def design_coupon(setup: LaserSetup) -> Coupon:
 
 
 def coupon_to_json(coupon: Coupon) -> str:
-    """coupon.json's text."""
+    """Format ``coupon.json``."""
     document = {"format": "cmp-coupon", "version": 1, "units": "mm", **asdict(coupon)}
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
 def load_coupon(path: str | Path) -> Coupon:
-    """Read a coupon.json.
+    """Read a ``coupon.json``.
 
     Raises:
-        CouponError: the file cannot be read or is none; one line that names the field.
+        CouponError: the file cannot be read or does not describe a coupon; one line that names the field.
     """
     try:
         with Path(path).open("rb") as file:

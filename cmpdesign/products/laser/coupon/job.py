@@ -1,4 +1,4 @@
-"""The coupon's job: its openings, one pass for each setting, on the machine's bed."""
+"""The coupon's job: one pass for each patch, for the fiducials and for the row of triangles, on the machine's bed."""
 
 from __future__ import annotations
 
@@ -26,45 +26,55 @@ from cmpdesign.products.laser.setup import LaserSetup
 
 
 def coupon_job(setup: LaserSetup) -> tuple[LaserDrawing, str]:
-    """The coupon as a drawing, and the text of coupon.json."""
-    piece = design_coupon(setup)
+    """The coupon's drawing, and the text of ``coupon.json``."""
+    coupon = design_coupon(setup)
     passes = [
         _make_pass(f"patch-{patch.name}", _opening_strokes(patch), setup, patch.power_percent, patch.passes)
-        for patch in piece.patches
+        for patch in coupon.patches
     ]
     passes.insert(
         0,
-        _make_pass("fiducials", _fiducial_strokes(piece), setup, setup.cut_power_percent, setup.cut_repeats),
+        _make_pass("fiducials", _fiducial_strokes(coupon), setup, setup.cut_power_percent, setup.cut_repeats),
     )
     passes.append(
-        _make_pass("kerf-row", _triangle_strokes(piece), setup, setup.cut_power_percent, setup.cut_repeats)
+        _make_pass("kerf-row", _triangle_strokes(coupon), setup, setup.cut_power_percent, setup.cut_repeats)
     )
-    origin = _coupon_origin_mm(piece, setup)
-    moved = tuple(replace(one, walls=one.walls.moved(origin)) for one in passes)
+    origin = _coupon_origin_mm(coupon, setup)
+    moved = tuple(replace(laser_pass, walls=laser_pass.walls.moved(origin)) for laser_pass in passes)
     drawing = LaserDrawing(
         name=f"coupon for {setup.material.name}",
         setup=setup,
         passes=moved,
-        layers={one.name: layer for one, layer in zip(moved, LASER_LAYERS, strict=True)},
-        fiducials_mm=np.array(piece.fiducials_mm) + origin,
-        fiducial_diameter_mm=piece.fiducial_diameter_mm,
+        laser_layers={laser_pass.name: layer for laser_pass, layer in zip(moved, LASER_LAYERS, strict=True)},
+        fiducials_mm=np.array(coupon.fiducials_mm) + origin,
+        fiducial_diameter_mm=coupon.fiducial_diameter_mm,
     )
-    return drawing, coupon_to_json(piece)
+    return drawing, coupon_to_json(coupon)
 
 
-def _coupon_origin_mm(piece: Coupon, setup: LaserSetup) -> Points:
-    """Centred on the bed."""
-    marks = np.array(piece.fiducials_mm)
+def _coupon_origin_mm(coupon: Coupon, setup: LaserSetup) -> Points:
+    """(2,) the coupon's origin for which the coupon is centred on the bed."""
+    marks = np.array(coupon.fiducials_mm)
     bed = np.array([setup.machine.bed_width_mm.value, setup.machine.bed_height_mm.value])
     return np.asarray(np.round((bed - marks.max(axis=0)) / 2, 3))
 
 
 def _make_pass(name: str, walls: Strokes, setup: LaserSetup, power_percent: float, repeats: int) -> LaserPass:
-    return LaserPass(name, "coupon", None, None, walls, (), power_percent, setup.cut_speed_mm_s, repeats)
+    return LaserPass(
+        name=name,
+        kind="coupon",
+        color=None,
+        cavities=None,
+        walls=walls,
+        fills=(),
+        power_percent=power_percent,
+        speed_mm_s=setup.cut_speed_mm_s,
+        repeats=repeats,
+    )
 
 
 def _opening_strokes(patch: Patch) -> Strokes:
-    """The rectangles themselves, not compensated: that is what the coupon is for."""
+    """The nominal rectangles, without kerf compensation."""
     unit = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
     rows = [
         (opening.x_mm, opening.y_mm) + unit * (opening.width_mm, opening.height_mm)
@@ -73,22 +83,23 @@ def _opening_strokes(patch: Patch) -> Strokes:
     return loop_strokes(np.array(rows), np.arange(len(rows)))
 
 
-def _fiducial_strokes(piece: Coupon) -> Strokes:
+def _fiducial_strokes(coupon: Coupon) -> Strokes:
+    """Circles without kerf compensation."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
-    circle = piece.fiducial_diameter_mm / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    centres = np.array(piece.fiducials_mm)
+    circle = coupon.fiducial_diameter_mm / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    centres = np.array(coupon.fiducials_mm)
     return loop_strokes(centres[:, None] + circle, np.arange(len(centres)))
 
 
-def _triangle_strokes(piece: Coupon) -> Strokes:
-    """The row of compensated cells, each for its kerf, from the left."""
+def _triangle_strokes(coupon: Coupon) -> Strokes:
+    """The row of triangles, compensated for ``KERFS_MM`` from left to right."""
     triangle = TRIANGLE_MM * np.array([(-0.5, 0), (0.5, 0), (0, np.sqrt(0.75))])
-    columns = {opening.x_mm for patch in piece.patches for opening in patch.openings}
-    step = (max(columns) - min(columns) + PATCH_MM[0] / 2) / len(KERFS_MM)
+    columns = {opening.x_mm for patch in coupon.patches for opening in patch.openings}
+    spacing = (max(columns) - min(columns) + PATCH_MM[0] / 2) / len(KERFS_MM)
     paths = [
         make_cavities(
             np.arange(1),
-            (triangle + (MARGIN_MM + (number + 0.5) * step, MARGIN_MM))[None],
+            (triangle + (MARGIN_MM + (number + 0.5) * spacing, MARGIN_MM))[None],
             BeamFootprint.of_kerf(kerf_mm, kerf_mm),
             "overcut",
         ).loops_mm

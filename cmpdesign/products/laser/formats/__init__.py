@@ -1,4 +1,4 @@
-"""File formats of laser programs. A format knows no layout.
+"""File formats of laser programs. The formats do not depend on layouts.
 
-In: a drawing of passes on layers. Out: SVG, DXF, LightBurn and G-code as text.
+In: a ``LaserDrawing``: passes on laser layers. Out: SVG, DXF, LightBurn and G-code as text.
 """

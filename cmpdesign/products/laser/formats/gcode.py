@@ -1,8 +1,7 @@
-"""G-code for GRBL 1.1: what the beam does, move by move.
+"""G-code for GRBL 1.1.
 
-M4 (dynamic power) scales S with the actual speed, so corners are not burnt deeper than sides; with laser
-mode on
-($32=1) G0 never burns. G1 moves carry the speed once and the power at each change.
+M4 (dynamic power) scales S with the actual speed, so corners are not burnt deeper than sides. With laser mode on
+($32=1), G0 does not burn. The speed is written once per pass, the power at each change.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ PAUSE = "M0 ; take the pad out, fill, cure, put it back on its pins"
 
 
 def drawing_to_gcode(drawing: LaserDrawing) -> str:
-    """The passes' program; where there are several, it waits after each pass of cells but the last."""
+    """Format the program of the passes; the program pauses after each pass of cells but the last pass."""
     machine = drawing.setup.machine
     lines = [
         f"; cmpdesign {__version__}: {_plain_comment(drawing.name)}",
@@ -31,20 +30,21 @@ def drawing_to_gcode(drawing: LaserDrawing) -> str:
         "G17",
         "M5",
     ]
-    for place, one in enumerate(drawing.passes):
-        lines += _pass_program(one, machine.s_max.value)
-        if place + 1 < len(drawing.passes) and one.kind == "cells":
+    for index, laser_pass in enumerate(drawing.passes):
+        lines += _pass_program(laser_pass, machine.s_max.value)
+        if index + 1 < len(drawing.passes) and laser_pass.kind == "cells":
             lines.append(PAUSE)
     return "\n".join([*lines, "G0 X0 Y0 S0", "M2", ""])
 
 
-def _pass_program(one: LaserPass, s_max: float) -> list[str]:
-    power = f"S{format_mm(one.power_percent / 100 * s_max)}"
-    lines = [f"; {one.name}: {one.power_percent:g} %, {one.speed_mm_s:g} mm/s, {one.repeats} times"]
-    lines += ["M4 S0", f"G1 F{format_mm(60 * one.speed_mm_s)}"]
-    same = None if one.fills else _move_lines(one.burnt(0), power)
-    for repeat in range(one.repeats):
-        lines += same or _move_lines(one.burnt(repeat), power)
+def _pass_program(laser_pass: LaserPass, s_max: float) -> list[str]:
+    power = f"S{format_mm(laser_pass.power_percent / 100 * s_max)}"
+    settings = f"{laser_pass.power_percent:g} %, {laser_pass.speed_mm_s:g} mm/s, {laser_pass.repeats} times"
+    lines = [f"; {laser_pass.name}: {settings}"]
+    lines += ["M4 S0", f"G1 F{format_mm(60 * laser_pass.speed_mm_s)}"]
+    repeated = None if laser_pass.fills else _move_lines(laser_pass.burn_strokes(0), power)
+    for repeat in range(laser_pass.repeats):
+        lines += repeated or _move_lines(laser_pass.burn_strokes(repeat), power)
     return [*lines, "M5"]
 
 
@@ -59,5 +59,5 @@ def _move_lines(strokes: Strokes, power: str) -> list[str]:
 
 
 def _plain_comment(text: str) -> str:
-    """A comment that no controller can take for code: printable ASCII without brackets."""
+    """A comment in printable ASCII without the characters that end or begin a comment."""
     return "".join(c if c.isascii() and c.isprintable() and c not in "();%" else "_" for c in text)

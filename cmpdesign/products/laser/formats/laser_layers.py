@@ -1,4 +1,4 @@
-"""Layers of laser programs: LightBurn's numbers and colors, which it matches by exact value only."""
+"""Laser layers: LightBurn's numbers and colors. LightBurn matches colors by exact value only."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cmpdesign.products.laser.paths.strokes import DECIMALS
 
 @dataclass(frozen=True)
 class LaserLayer:
-    """A layer: LightBurn's index and color, and the AutoCAD color index for programs that read no other."""
+    """A laser layer: LightBurn's index and color (0xRRGGBB), and the AutoCAD color index."""
 
     index: int
     rgb: int
@@ -37,22 +37,27 @@ _SPARE_LAYERS = (6, 7)
 
 
 def job_layers(job: LaserJob) -> Mapping[str, LaserLayer]:
-    """The layer of every pass, by the pass' name; a color's second part takes a spare one."""
+    """The laser layer of every pass, by the pass' name; the second pass of a color gets a spare laser layer."""
     chosen: dict[str, LaserLayer] = {}
     spare = iter(_SPARE_LAYERS)
-    for one in job.passes:
-        number = _LAYER_OF_KIND.get(one.kind) if one.color is None else _LAYER_OF_COLOR[COLORS[one.color]]
+    for laser_pass in job.passes:
+        number = (
+            _LAYER_OF_KIND.get(laser_pass.kind)
+            if laser_pass.color is None
+            else _LAYER_OF_COLOR[COLORS[laser_pass.color]]
+        )
         assert number is not None
         taken = LASER_LAYERS[number] in chosen.values()
-        chosen[one.name] = LASER_LAYERS[next(spare)] if taken else LASER_LAYERS[number]
+        chosen[laser_pass.name] = LASER_LAYERS[next(spare)] if taken else LASER_LAYERS[number]
     return chosen
 
 
-def hex_color(layer: LaserLayer) -> str:
-    return f"#{layer.rgb:06X}"
+def hex_color(laser_layer: LaserLayer) -> str:
+    """The color as "#RRGGBB"."""
+    return f"#{laser_layer.rgb:06X}"
 
 
 def format_mm(value: float) -> str:
-    """A coordinate in mm, to a tenth of a micrometre, without trailing zeros."""
+    """Format a coordinate in mm, to 0.1 micrometre, without trailing zeros."""
     text = f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

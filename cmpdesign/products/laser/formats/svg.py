@@ -1,5 +1,4 @@
-"""SVG for laser programs: the page is the bed, 1 user unit is 1 mm, one group a pass, closed paths without
-fill.
+"""SVG for laser programs: the page is the bed, 1 user unit is 1 mm, one group per pass, closed paths without fill.
 
 Coordinates are final (no transform), so every program puts every pass at the same place.
 """
@@ -14,7 +13,7 @@ from cmpdesign.products.laser.paths.strokes import Strokes
 
 
 def drawing_to_svg(drawing: LaserDrawing) -> str:
-    """The walls of the passes; y runs down from the bed's upper edge."""
+    """Format the walls of the passes; y runs down from the bed's upper edge."""
     machine = drawing.setup.machine
     width, height = machine.bed_width_mm.value, machine.bed_height_mm.value
     lines = [
@@ -22,10 +21,10 @@ def drawing_to_svg(drawing: LaserDrawing) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width:g}mm" height="{height:g}mm" '
         f'viewBox="0 0 {width:g} {height:g}">',
     ]
-    for one in drawing.passes:
-        stroke = hex_color(drawing.layers[one.name])
-        lines.append(f'<g id="{one.name}" fill="none" stroke="{stroke}" stroke-width="0.05">')
-        lines += [f'<path d="{data}"/>' for data in path_data(one.walls, height)]
+    for laser_pass in drawing.passes:
+        stroke = hex_color(drawing.laser_layers[laser_pass.name])
+        lines.append(f'<g id="{laser_pass.name}" fill="none" stroke="{stroke}" stroke-width="0.05">')
+        lines += [f'<path d="{data}"/>' for data in path_data(laser_pass.walls, height)]
         lines.append("</g>")
     return "\n".join([*lines, "</svg>", ""])
 

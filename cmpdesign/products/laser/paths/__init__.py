@@ -1,4 +1,4 @@
-"""Tool paths: kerf, corners, fill, order, and the cavities that the beam leaves.
+"""Tool paths: kerf compensation, corners, fill, burning order, and the cavities that the beam leaves.
 
-In: outlines of cells in mm and a beam. Out: strokes in burning order, cavities, webs, times.
+In: outlines of cells in mm and a ``BeamFootprint``. Out: strokes in burning order, cavities, webs, times.
 """

@@ -1,9 +1,8 @@
-"""The beam's footprint: an ellipse, because kerf differs between cuts along x and along y.
+"""The beam's footprint: an ellipse, because the kerf of cuts along x differs from the kerf of cuts along y.
 
-Everything about kerf is done in *beam units*, where x is divided by the ellipse's half-axis in x, y by the
-one
-in y: there the footprint is the unit disc, a sweep is a dilation by one, and areas shrink by the constant
-factor ``x_mm * y_mm``. Straight sides stay straight and polygons stay convex.
+Kerf compensation is computed in beam units: x is divided by the ellipse's half-axis in x, and y by the half-axis
+in y. In beam units the footprint is the unit disc, a sweep of the beam is a dilation by one, and areas are smaller by
+the factor ``x_mm * y_mm``. Straight sides stay straight and polygons stay convex.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BeamFootprint:
-    """Half-axes of the footprint in mm: half the kerf of cuts that run in y (x) and in x (y)."""
+    """Half-axes of the footprint, mm: ``x_mm`` is half the kerf of cuts along y, ``y_mm`` of cuts along x."""
 
     x_mm: float
     y_mm: float
@@ -30,12 +29,12 @@ class BeamFootprint:
 
     @property
     def kerf_mm(self) -> tuple[float, float]:
-        """Full widths of a cut that runs in y and of one that runs in x."""
+        """Full widths of a cut along y and of a cut along x."""
         return 2 * self.x_mm, 2 * self.y_mm
 
     @property
     def narrow_mm(self) -> float:
-        """The narrowest width of a cut in any direction."""
+        """The least width of a cut over all directions."""
         return 2 * min(self.x_mm, self.y_mm)
 
     @property
@@ -43,18 +42,18 @@ class BeamFootprint:
         """Square millimetres in a square beam unit."""
         return self.x_mm * self.y_mm
 
-    def units(self, xy_mm: Points) -> Points:
-        """(..., 2) millimetres to beam units."""
+    def to_beam_units(self, xy_mm: Points) -> Points:
+        """(..., 2) points from millimetres to beam units."""
         return np.asarray(xy_mm / (self.x_mm, self.y_mm))
 
-    def millimetres(self, xy: Points) -> Points:
-        """(..., 2) beam units to millimetres."""
+    def to_millimetres(self, xy: Points) -> Points:
+        """(..., 2) points from beam units to millimetres."""
         return np.asarray(xy * (self.x_mm, self.y_mm))
 
     def at_depth(self, depth_mm: float, taper_deg: float) -> BeamFootprint:
-        """The footprint at a depth below the front; each wall leans inward by the taper.
+        """The footprint at a depth below the front, if each wall leans inward by the taper.
 
-        The half-axes may come out zero or negative: then the cut does not reach that deep.
+        Half-axes of zero or less mean that the cut does not reach this depth.
         """
         narrowing = depth_mm * math.tan(math.radians(taper_deg))
         return BeamFootprint(self.x_mm - narrowing, self.y_mm - narrowing)

@@ -1,10 +1,9 @@
-"""Cavities: the paths that carve convex cells, and the holes that the beam leaves when it has run along
-them."""
+"""Cavities: the paths that carve convex cells, and the holes that the beam leaves along these paths."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +19,20 @@ from cmpdesign.products.laser.paths.corners import (
 from cmpdesign.products.laser.paths.kerf import inset_polygons
 
 CornerMode = Literal["plain", "overcut"]
+# Points of the arc around a corner or a spur's tip.
 ARC_POINTS = 25
 
 
 @dataclass(frozen=True, eq=False)
 class Cavities:
-    """Cells with their paths.
+    """Cells with the paths that carve them.
 
     Attributes:
         cell: (N,) int64, numbers of the layout's cells.
-        nominal_mm: (N, K, 2), the cells, counter-clockwise.
-        path_mm: (N, K, 2), where the beam's centre turns.
-        tip_mm: (N, K, 2), ends of the corners' spurs; the path's corners themselves where there are none.
-        corner: "plain" or "overcut".
+        nominal_mm: (N, K, 2) corners of the cells, counter-clockwise.
+        path_mm: (N, K, 2) corners of the path of the beam's centre.
+        tip_mm: (N, K, 2) tips of the corners' spurs; corners of the path without spurs.
+        corner: "plain" or "overcut" (with spurs).
         exists: (N,) True where the beam fits into the cell.
     """
 
@@ -45,21 +45,21 @@ class Cavities:
 
     @property
     def loops_mm(self) -> Points:
-        """(N, K or 3K, 2) closed paths as the beam runs; they can be entered at every ``entry_step``-th
-        point."""
+        """(N, K or 3K, 2) closed paths of the beam's centre; every ``entry_stride``-th point is an entry point."""
         return with_spurs(self.path_mm, self.tip_mm) if self.corner == "overcut" else self.path_mm
 
     @property
-    def entry_step(self) -> int:
+    def entry_stride(self) -> int:
+        """Points of ``loops_mm`` from one entry point to the next."""
         return 3 if self.corner == "overcut" else 1
 
     @property
     def entries_mm(self) -> Points:
-        """(N, K, 2) points where a loop can be entered."""
+        """(N, K, 2) entry points of the loops."""
         return self.tip_mm
 
     def selected(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Cavities:
-        """Some of them, or all of them in another order."""
+        """The cavities of an index or a mask, in that order."""
         return Cavities(
             self.cell[which],
             self.nominal_mm[which],
@@ -73,54 +73,53 @@ class Cavities:
 def make_cavities(
     cell: NDArray[np.int64], polygons_mm: Points, beam: BeamFootprint, corner: CornerMode
 ) -> Cavities:
-    """Paths whose burn meets the cells' sides, plain or with balanced spurs.
+    """Compute paths whose burn meets the cells' sides, plain or with balanced spurs.
 
     Args:
-        cell: (N,) their numbers.
+        cell: (N,) numbers of the cells.
         polygons_mm: (N, K, 2) convex cells, counter-clockwise.
-        beam: the footprint at the face where the cells are to have their nominal size.
-        corner: how corners are treated.
+        beam: the footprint at the face where the cells get their nominal size.
+        corner: "plain", or "overcut" for balanced spurs.
     """
     path_mm, exists = inset_polygons(polygons_mm, beam)
     tip_mm = path_mm
     if corner == "overcut":
-        outward = beam.units(polygons_mm - path_mm)
+        outward = beam.to_beam_units(polygons_mm - path_mm)
         with np.errstate(divide="ignore", invalid="ignore"):
             outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
-        half, _ = half_angles(beam.units(path_mm), outward)
+        half, _ = half_angles(beam.to_beam_units(path_mm), outward)
         half = np.where(exists[:, None], half, np.pi / 6)
-        tip_mm = path_mm + beam.millimetres(outward * balanced_spur_length(half)[..., None])
+        tip_mm = path_mm + beam.to_millimetres(outward * balanced_spur_length(half)[..., None])
     return Cavities(cell, polygons_mm, path_mm, tip_mm, corner, exists)
 
 
-def burnt_areas_mm2(made: Cavities, beam: BeamFootprint) -> NDArray[np.float64]:
-    """(N,) areas of the holes, exact: area + perimeter + pi (Steiner's formula) + the spurs' gain, in beam
-    units."""
-    path, toward, length = _spur_geometry(made, beam)
-    after = np.roll(path, -1, axis=1)
-    area = (path[..., 0] * after[..., 1] - after[..., 0] * path[..., 1]).sum(axis=1) / 2
-    side = after - path
+def burnt_areas_mm2(cavities: Cavities, beam: BeamFootprint) -> NDArray[np.float64]:
+    """(N,) areas of the holes, exact: in beam units area + perimeter + pi (Steiner's formula) + the spurs' gain."""
+    spurs = _spur_geometry(cavities, beam)
+    path = spurs.path
+    next_corner = np.roll(path, -1, axis=1)
+    area = (path[..., 0] * next_corner[..., 1] - next_corner[..., 0] * path[..., 1]).sum(axis=1) / 2
+    side = next_corner - path
     perimeter = np.hypot(side[..., 0], side[..., 1]).sum(axis=1)
-    first, second = half_angles(path, toward)
-    gain = (spur_area(first, length) + spur_area(second, length)).sum(axis=1)
+    after, before = half_angles(path, spurs.direction)
+    gain = (spur_area(after, spurs.length) + spur_area(before, spurs.length)).sum(axis=1)
     return np.asarray(beam.area_factor * (area + perimeter + np.pi + gain))
 
 
-def burnt_outlines_mm(made: Cavities, beam: BeamFootprint) -> Points:
-    """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true
-    curve."""
-    path, toward, length = _spur_geometry(made, beam)
-    left = np.stack([-toward[..., 1], toward[..., 0]], axis=-1)
-    after, before = half_angles(path, toward)
-    # Counter-clockwise, the side that arrives lies on the spur's right, the one that leaves on its left.
-    along_in, beside_in = spur_start(before, length)
-    along_out, beside_out = spur_start(after, length)
-    from_angle = -np.minimum(np.arctan2(beside_in, along_in - length), np.pi / 2)
-    to_angle = np.minimum(np.arctan2(beside_out, along_out - length), np.pi / 2)
+def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
+    """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true curve."""
+    path, direction, length = _spur_geometry(cavities, beam)
+    left = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+    after, before = half_angles(path, direction)
+    # Counter-clockwise, the incoming side lies right of the spur, the outgoing side left of it.
+    along_in, across_in = spur_start(before, length)
+    along_out, across_out = spur_start(after, length)
+    from_angle = -np.minimum(np.arctan2(across_in, along_in - length), np.pi / 2)
+    to_angle = np.minimum(np.arctan2(across_out, along_out - length), np.pi / 2)
     share = np.linspace(0, 1, ARC_POINTS)
     angle = from_angle[..., None] + share * (to_angle - from_angle)[..., None]
-    arc_along, arc_beside = length[..., None] + np.cos(angle), np.sin(angle)
-    # Where the burn leaves the corner on the disc itself, that point is the arc's own end, to the last bit.
+    arc_along, arc_across = length[..., None] + np.cos(angle), np.sin(angle)
+    # A burn that leaves the corner on the disc itself leaves it at the arc's own end, to the last bit.
     first, last = along_in < length, along_out < length
     along = np.concatenate(
         [
@@ -130,23 +129,38 @@ def burnt_outlines_mm(made: Cavities, beam: BeamFootprint) -> Points:
         ],
         axis=-1,
     )
-    beside = np.concatenate(
+    across = np.concatenate(
         [
-            np.where(first, -beside_in, arc_beside[..., 0])[..., None],
-            arc_beside,
-            np.where(last, beside_out, arc_beside[..., -1])[..., None],
+            np.where(first, -across_in, arc_across[..., 0])[..., None],
+            arc_across,
+            np.where(last, across_out, arc_across[..., -1])[..., None],
         ],
         axis=-1,
     )
-    points = path[:, :, None] + along[..., None] * toward[:, :, None] + beside[..., None] * left[:, :, None]
-    return beam.millimetres(points.reshape(len(path), -1, 2))
+    points = (
+        path[:, :, None] + along[..., None] * direction[:, :, None] + across[..., None] * left[:, :, None]
+    )
+    return beam.to_millimetres(points.reshape(len(path), -1, 2))
 
 
-def _spur_geometry(made: Cavities, beam: BeamFootprint) -> tuple[Points, Points, NDArray[np.float64]]:
-    """Path corners, spur directions (unit) and spur lengths, in beam units."""
-    path = beam.units(made.path_mm)
-    spur = beam.units(made.tip_mm) - path
+class _SpurGeometry(NamedTuple):
+    """Corners of the paths and their spurs, in beam units.
+
+    Attributes:
+        path: (N, K, 2) corners of the paths.
+        direction: (N, K, 2) unit vectors along the spurs, outward.
+        length: (N, K) lengths of the spurs; 0 without a spur.
+    """
+
+    path: Points
+    direction: Points
+    length: NDArray[np.float64]
+
+
+def _spur_geometry(cavities: Cavities, beam: BeamFootprint) -> _SpurGeometry:
+    path = beam.to_beam_units(cavities.path_mm)
+    spur = beam.to_beam_units(cavities.tip_mm) - path
     length = np.hypot(spur[..., 0], spur[..., 1])
-    outward = beam.units(made.nominal_mm) - path
+    outward = beam.to_beam_units(cavities.nominal_mm) - path
     direction = np.where(length[..., None] > 0, spur, outward)
-    return path, direction / np.linalg.norm(direction, axis=-1, keepdims=True), length
+    return _SpurGeometry(path, direction / np.linalg.norm(direction, axis=-1, keepdims=True), length)

@@ -1,17 +1,14 @@
-"""Corners: what a round beam leaves of them, and the spur that makes up for it.
+"""Corners: the residue that a round beam leaves, and the spur that compensates the residue.
 
                  V  nominal corner            Half of a corner, in beam units (footprint = unit disc):
                 / \\                           the path turns at P, one unit from both sides, with the half
-               / T \\   tip of the spur        angle b; V lies 1 / sin b from P. A plain path leaves the
-               sliver
-              /  |  \\                         between V and the disc around P, up to 1 / sin b - 1 (one unit,
-             /   P   \\  corner of the path    that is half the kerf, at 60 degrees). A spur P-T takes the
-             beam
-            /   / \\   \\                       further in; what it burns beside the cell grows, too.
+               / T \\   tip of the spur        angle b; V lies 1 / sin b from P. A plain path leaves the sliver
+              /  |  \\                         between V and the disc around P, up to 1 / sin b - 1 long (one
+             /   P   \\  corner of the path    unit, half the kerf, at 60 degrees). A spur P-T moves the beam
+            /   / \\   \\                       further in and also burns area beside the cell.
 
-The balanced spur burns beside the cell just as much area as it leaves of the corner. Both sides of the
-spur are
-treated apart, because a spur that halves a corner at one face does not quite halve it at the other.
+The balanced spur burns as much area beside the cell as it leaves of the corner. The two sides of a spur are computed
+separately, because a spur that bisects a corner at one face does not exactly bisect the corner at the other face.
 """
 
 from __future__ import annotations
@@ -24,15 +21,18 @@ from cmpdesign.products.laser.paths.beam import Points
 Values = NDArray[np.float64]
 
 
-def half_angles(path: Points, toward: Points) -> tuple[Values, Values]:
-    """(N, K) angles in rad between the spur's line and the path's side after and before each corner.
+def half_angles(path: Points, direction: Points) -> tuple[Values, Values]:
+    """Angles between the spur and the path's side after and before each corner.
 
     Args:
         path: (N, K, 2) corners in beam units, counter-clockwise.
-        toward: (N, K, 2) unit vectors along the spurs, outward.
+        direction: (N, K, 2) unit vectors along the spurs, outward.
+
+    Returns:
+        (N, K) angles to the side after, and (N, K) angles to the side before each corner, rad.
     """
     after, before = np.roll(path, -1, axis=1) - path, np.roll(path, 1, axis=1) - path
-    return _angle_between(after, -toward), _angle_between(before, -toward)
+    return _angle_between(after, -direction), _angle_between(before, -direction)
 
 
 def corner_residue_area(half_angle: Values) -> Values:
@@ -54,29 +54,32 @@ def spur_area(half_angle: Values, length: Values) -> Values:
 
 
 def spur_start(half_angle: Values, length: Values) -> tuple[Values, Values]:
-    """Where a spur's burn leaves the rounded corner: (along, beside) from P, in beam units."""
+    """The point where a spur's burn leaves the rounded corner: coordinates along and across the spur from P.
+
+    Both are in beam units.
+    """
     flat_from = np.tan(half_angle / 2)
     depth = np.clip(1 - length * np.sin(half_angle), -1, 1)
     chord = np.sqrt(1 - depth**2)
     along = length + depth * np.sin(half_angle) - chord * np.cos(half_angle)
-    beside = depth * np.cos(half_angle) + chord * np.sin(half_angle)
+    across = depth * np.cos(half_angle) + chord * np.sin(half_angle)
     is_flat = length >= flat_from
-    return np.where(is_flat, flat_from, along), np.where(is_flat, 1.0, beside)
+    return np.where(is_flat, flat_from, along), np.where(is_flat, 1.0, across)
 
 
 def balanced_spur_length(half_angle: Values) -> Values:
-    """Length in beam units of the spur that burns beside a corner just what it leaves of it; by bisection."""
-    wanted = corner_residue_area(half_angle)
+    """Length of the spur whose area equals the residue of the corner, in beam units; by bisection."""
+    residue = corner_residue_area(half_angle)
     low, high = np.zeros_like(half_angle), 1 / np.sin(half_angle) - 1
     for _ in range(60):
         middle = (low + high) / 2
-        short = spur_area(half_angle, middle) < wanted
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
+        too_short = spur_area(half_angle, middle) < residue
+        low, high = np.where(too_short, middle, low), np.where(too_short, high, middle)
     return np.asarray((low + high) / 2)
 
 
 def with_spurs(path: Points, tips: Points) -> Points:
-    """(N, 3K, 2) closed paths that enter at a tip: T0 P0 P1 T1 P1 P2 T2 P2 P0 for triangles."""
+    """(N, 3K, 2) closed paths from the first tip: T0 P0 P1 T1 P1 P2 T2 P2 P0 for triangles."""
     return np.asarray(
         np.stack([tips, path, np.roll(path, -1, axis=1)], axis=2).reshape(len(path), -1, 2), dtype=np.float64
     )

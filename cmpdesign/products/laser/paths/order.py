@@ -1,4 +1,4 @@
-"""The order in which the cells of a pass are carved, and where each is entered."""
+"""The burning order of a pass' cells, and the entry point of each cell."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from cmpdesign.products.laser.paths.beam import Points
 
 BurnOrder = Literal["travel", "heat", "given"]
 Ints = NDArray[np.int64]
-# Cells this many mean distances apart count as neighbours for the heat that they give each other.
+# Cells up to this many nearest distances apart (median) count as neighbours that heat each other.
 NEIGHBOURHOOD = 2.2
 
 
 def order_cells(entries_mm: Points, order: BurnOrder) -> tuple[Ints, Ints]:
-    """The cells in burning order, and the entry point of each.
+    """Find the burning order of cells and the entry point of each cell.
 
     Args:
-        entries_mm: (N, K, 2) points where each cell can be entered.
-        order: "travel" is short; "heat" lets every neighbourhood cool before it is burnt in again; "given"
-            is the layout's.
+        entries_mm: (N, K, 2) possible entry points of each cell.
+        order: "travel": short moves; "heat": neighbours are burnt far apart in time; "given": order of the layout.
 
     Returns:
-        (N,) cells, and (N,) the number (0 to K - 1) of each one's entry point, in that order.
+        (N,) cells in burning order, and (N,) the entry points (0 to K - 1) of the cells in this order.
     """
     from cmpdesign.products.laser.paths.tour import best_entries, find_short_tour
 
@@ -39,9 +38,8 @@ def order_cells(entries_mm: Points, order: BurnOrder) -> tuple[Ints, Ints]:
 def spread_order(centre_mm: Points) -> Ints:
     """(N,) an order in which neighbours are burnt far apart in time.
 
-    Cells are colored so that no two in a neighbourhood share a color, and burnt color by color. Within a
-    color they
-    run in the same rows, so that two neighbours lie about a whole color's cells apart in the order.
+    The cells form groups such that no two cells of a neighbourhood share a group. The groups are burnt one after the
+    other, each in the same rows, so that two neighbours are about a whole group apart in the order.
     """
     from scipy.spatial import cKDTree
 
@@ -51,17 +49,17 @@ def spread_order(centre_mm: Points) -> Ints:
     nearest = tree.query(centre_mm, k=2)[0][:, 1]
     reach = NEIGHBOURHOOD * float(np.median(nearest))
     rows = _row_order(centre_mm, float(np.median(nearest)))
-    color = _greedy_coloring(tree.query_ball_point(centre_mm, reach), rows)
-    return rows[np.argsort(color[rows], kind="stable")]
+    group = _greedy_groups(tree.query_ball_point(centre_mm, reach), rows)
+    return rows[np.argsort(group[rows], kind="stable")]
 
 
 def shortest_pause(order: Ints, centre_mm: Points, times_s: NDArray[np.float64]) -> float:
-    """The shortest time in s between two neighbouring cells.
+    """The shortest time in s between the starts of two neighbouring cells; infinite without neighbours.
 
     Args:
         order: (N,) cells in burning order.
-        centre_mm: (N, 2) of each cell.
-        times_s: (N,) when each is begun, in burning order.
+        centre_mm: (N, 2) centre of each cell.
+        times_s: (N,) start time of each cell, in burning order.
     """
     from scipy.spatial import cKDTree
 
@@ -70,9 +68,9 @@ def shortest_pause(order: Ints, centre_mm: Points, times_s: NDArray[np.float64])
     tree = cKDTree(centre_mm)
     reach = 1.2 * float(np.median(tree.query(centre_mm, k=2)[0][:, 1]))
     pairs = tree.query_pairs(reach, output_type="ndarray")
-    begun = np.empty(len(order))
-    begun[order] = times_s
-    return float(np.abs(begun[pairs[:, 0]] - begun[pairs[:, 1]]).min()) if len(pairs) else float("inf")
+    begin_s = np.empty(len(order))
+    begin_s[order] = times_s
+    return float(np.abs(begin_s[pairs[:, 0]] - begin_s[pairs[:, 1]]).min()) if len(pairs) else float("inf")
 
 
 def _row_order(centre_mm: Points, height_mm: float) -> Ints:
@@ -82,10 +80,10 @@ def _row_order(centre_mm: Points, height_mm: float) -> Ints:
     return np.lexsort([x, row])
 
 
-def _greedy_coloring(near: list[list[int]], sequence: Ints) -> Ints:
-    """The smallest color that no neighbour has, cell by cell in the given sequence."""
-    color = np.full(len(near), -1)
+def _greedy_groups(neighbours: list[list[int]], sequence: Ints) -> Ints:
+    """(N,) the smallest group that no neighbour has, assigned cell by cell in the given sequence."""
+    group = np.full(len(neighbours), -1)
     for cell in sequence.tolist():
-        taken = set(color[near[cell]].tolist())
-        color[cell] = next(shade for shade in range(len(near)) if shade not in taken)
-    return color
+        used = set(group[neighbours[cell]].tolist())
+        group[cell] = next(number for number in range(len(neighbours)) if number not in used)
+    return group

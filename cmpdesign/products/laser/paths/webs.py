@@ -1,4 +1,4 @@
-"""Webs: the walls left between cavities. Only pairs that can hold the smallest one are measured exactly."""
+"""Webs: the walls left between cavities. Only pairs that can have the smallest web are measured exactly."""
 
 from __future__ import annotations
 
@@ -10,33 +10,35 @@ from numpy.typing import NDArray
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import Cavities
 
-# Pairs that are copies of each other to a nanometre are measured once.
+# Decimals in mm to which pairs of cavities are compared: copies are measured once.
 SAME_DECIMALS = 6
 
 
 def smallest_web_mm(
-    made: Sequence[Cavities],
+    groups: Sequence[Cavities],
     outlines: Sequence[Points],
     beam: BeamFootprint,
     reach_mm: float,
     across: bool = False,
 ) -> float | None:
-    """The smallest distance between two burnt outlines; 0 where they meet, None where none lies within reach.
+    """The smallest distance between two burnt outlines.
 
-    The distance of two paths, less the footprint's largest and smallest width, bounds the web between
-    them; the
-    outlines themselves are compared only for pairs whose lower bound lies below every upper bound.
+    The distance of two paths, less the footprint's largest and smallest width, bounds the web between them. Outlines
+    are compared only for pairs whose lower bound lies below every upper bound.
 
     Args:
-        made, outlines: groups of cavities and their burnt outlines.
-        beam: the footprint at the face in question.
+        groups, outlines: groups of cavities and their burnt outlines.
+        beam: the footprint at the face.
         reach_mm: centres further apart than this, plus twice a cell's size, are not compared.
-        across: only pairs of the first group with any other group; otherwise all pairs of the one group.
+        across: True: pairs of the first group with every other group; False: pairs within the single group.
+
+    Returns:
+        The distance in mm; 0 where outlines meet, None without a pair within reach.
     """
     import shapely
 
-    lines = np.concatenate([_cavity_lines(group) for group in made])
-    pairs = _neighbour_pairs(made, reach_mm, across)
+    lines = np.concatenate([_cavity_lines(group) for group in groups])
+    pairs = _neighbour_pairs(groups, reach_mm, across)
     if not len(pairs):
         return None
     gap = shapely.distance(lines[pairs[:, 0]], lines[pairs[:, 1]])
@@ -52,8 +54,7 @@ def smallest_web_mm(
 
 
 def burn_depth_mm(outlines: Points, filled: Points) -> float:
-    """How deep one group of outlines runs into another: the farthest burnt point from the filled one's
-    rim."""
+    """Largest depth of burnt outlines in filled outlines: the distance of a burnt point from the filled one's rim."""
     import shapely
 
     burnt, cured = shapely.polygons(outlines), shapely.polygons(filled)
@@ -74,28 +75,32 @@ def _cavity_lines(group: Cavities) -> NDArray[np.object_]:
     return np.asarray(shapely.linearrings(group.loops_mm), dtype=np.object_)
 
 
-def _neighbour_pairs(made: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
+def _neighbour_pairs(groups: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
+    """(P, 2) int64 indices of cavities, counted through all groups, whose centres lie within reach."""
     from scipy.spatial import cKDTree
 
-    centres = [group.nominal_mm.mean(axis=1) for group in made]
+    centres = [group.nominal_mm.mean(axis=1) for group in groups]
     size = max(
         float(np.linalg.norm(group.nominal_mm - centre[:, None], axis=-1).max())
-        for group, centre in zip(made, centres, strict=True)
+        for group, centre in zip(groups, centres, strict=True)
     )
     if not across:
-        found = cKDTree(centres[0]).query_pairs(reach_mm + size, output_type="ndarray")
-        return np.asarray(found, dtype=np.int64)
+        within = cKDTree(centres[0]).query_pairs(reach_mm + size, output_type="ndarray")
+        return np.asarray(within, dtype=np.int64)
     others = np.concatenate(centres[1:])
-    near = cKDTree(centres[0]).sparse_distance_matrix(cKDTree(others), reach_mm + size, output_type="ndarray")
-    return np.column_stack([near["i"], near["j"] + len(centres[0])]).astype(np.int64)
+    pairs = cKDTree(centres[0]).sparse_distance_matrix(
+        cKDTree(others), reach_mm + size, output_type="ndarray"
+    )
+    return np.column_stack([pairs["i"], pairs["j"] + len(centres[0])]).astype(np.int64)
 
 
 def _distinct_pairs(pairs: NDArray[np.int64], burnt: Points) -> NDArray[np.int64]:
-    """One pair of each shape: relative to the first cavity's first point, all points the same."""
+    """(P, 2) one pair of each shape; the shape is all points relative to the first cavity's first point."""
     first = burnt[pairs[:, 0]]
     origin = first[:, :1]
-    thin = slice(None, None, 4)
-    shape = np.concatenate([first[:, thin] - origin, burnt[pairs[:, 1]][:, thin] - origin], axis=1)
+    every_fourth = slice(None, None, 4)
+    second = burnt[pairs[:, 1]]
+    shape = np.concatenate([first[:, every_fourth] - origin, second[:, every_fourth] - origin], axis=1)
     key = np.round(shape.reshape(len(pairs), -1), SAME_DECIMALS) + 0.0
     packed = np.ascontiguousarray(key).view([("", key.dtype)] * key.shape[1]).ravel()
     return pairs[np.unique(packed, return_index=True)[1]]

@@ -1,4 +1,4 @@
-"""Bosses, holes, dishes and crowns: what the parts of a mold are shaped by.
+"""Bosses, holes, dishes and crowns of the parts of a mold.
 
-In: a ``Stack``. Out: features and solids.
+In: a ``MoldStack``. Out: features and solids.
 """

@@ -1,4 +1,4 @@
-"""The smooth crown of base and lid: the one place where solids are united or cut."""
+"""The smooth crown of base and lid. Only this module uses boolean operations of solids."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cmpdesign.products.mold.stack.crown import END_SLOPE, Crown
 
 
 def solid_with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
-    """The solid with the crown's cap standing on z = 0 (raised), or with its shape cut out from z = 0 up."""
+    """Unite a solid with the crown's cap over z = 0 (``raised``), or cut the cap out of the solid."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
@@ -20,7 +20,7 @@ def solid_with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
 
 
 def cap_solid(crown: Crown) -> Any:
-    """The cap over its foot at z = 0."""
+    """The cap as a solid, its foot at z = 0."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
     from OCP.GC import GC_MakeArcOfCircle
@@ -29,10 +29,10 @@ def cap_solid(crown: Crown) -> Any:
     sphere = crown.shape == "sphere"
     y = 0.0 if sphere else -crown.length_mm
     foot, apex = gp_Pnt(crown.reach_mm, y, 0.0), gp_Pnt(0.0, y, crown.height_mm)
-    on_the_way = gp_Pnt(*_arc_midpoint(crown, y))
+    middle = gp_Pnt(*_arc_middle(crown, y))
     if sphere:
         origin = gp_Pnt(0.0, 0.0, 0.0)
-        arc = GC_MakeArcOfCircle(foot, on_the_way, apex).Value()
+        arc = GC_MakeArcOfCircle(foot, middle, apex).Value()
         edges = [BRepBuilderAPI_MakeEdge(origin, foot), BRepBuilderAPI_MakeEdge(arc)]
         edges.append(BRepBuilderAPI_MakeEdge(apex, origin))
     else:
@@ -51,25 +51,26 @@ def cap_solid(crown: Crown) -> Any:
 
 
 def _cut_cylinder_ends(bar: Any, crown: Crown) -> Any:
-    """A cylinder's cap, cut off by its leaning ends."""
+    """A cylindrical cap, cut off by the leaning planes of its ends."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.gp import gp_Pnt, gp_Vec
 
-    # A trapezium across the bar, a little wider and higher than it.
-    aside, top, end = crown.reach_mm + 1.0, crown.height_mm + 1.0, crown.length_mm
-    narrower = end - top / END_SLOPE
+    # A prism of trapezoidal section along x, 1 mm wider and higher than the cap.
+    half_width, top, end = crown.reach_mm + 1.0, crown.height_mm + 1.0, crown.length_mm
+    end_at_top = end - top / END_SLOPE
     outline = BRepBuilderAPI_MakePolygon()
-    for y, z in ((-end, 0.0), (end, 0.0), (narrower, top), (-narrower, top)):
-        outline.Add(gp_Pnt(-aside, y, z))
+    for y, z in ((-end, 0.0), (end, 0.0), (end_at_top, top), (-end_at_top, top)):
+        outline.Add(gp_Pnt(-half_width, y, z))
     outline.Close()
     face = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
-    return BRepAlgoAPI_Common(bar, BRepPrimAPI_MakePrism(face, gp_Vec(2 * aside, 0.0, 0.0)).Shape()).Shape()
+    prism = BRepPrimAPI_MakePrism(face, gp_Vec(2 * half_width, 0.0, 0.0)).Shape()
+    return BRepAlgoAPI_Common(bar, prism).Shape()
 
 
-def _arc_midpoint(crown: Crown, y: float) -> tuple[float, float, float]:
-    """A point of the arc between foot and apex."""
+def _arc_middle(crown: Crown, y: float) -> tuple[float, float, float]:
+    """(x, y, z) of a point on the arc between foot and apex, mm."""
     x = crown.reach_mm / 2
     z = (crown.radius_mm**2 - x**2) ** 0.5 - (crown.radius_mm - crown.height_mm)
     return x, y, z

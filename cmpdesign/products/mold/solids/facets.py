@@ -1,4 +1,4 @@
-"""Flat faces with shared edges, added to a shell whose rims they may start from."""
+"""Flat faces with shared edges, added to a shell; the faces may start from rims of the shell."""
 
 from __future__ import annotations
 
@@ -17,24 +17,29 @@ from cmpdesign.products.mold.solids.slab_shells import (
 
 
 class FacetBuilder:
-    """Polygons in space over numbered points; neighbouring polygons share their edges."""
+    """Adds polygons over numbered points to a shell; neighbouring polygons share their edges.
+
+    Args:
+        builder: the shell.
+        points: (P, 3) mm.
+    """
 
     def __init__(self, builder: ShellBuilder, points: Points) -> None:
         self._builder, self._points = builder, points
         self._vertices: dict[int, Any] = {}
-        # (from, to) -> the edge, which runs from -> to.
+        # (start, end) -> the edge from start to end.
         self._edges: dict[tuple[int, int], Any] = {}
 
-    def share(self, placed: PlacedFaces, rim: int, points: Sequence[int]) -> None:
-        """Take a placed rim's vertices and edges for ``points``, which lie at its corners in its order."""
-        for side, edges in enumerate(placed.sheet.rims[rim]):
-            start, end, _ = placed.sheet.edges[edges[0]]
+    def share_rim(self, placed: PlacedFaces, rim: int, points: Sequence[int]) -> None:
+        """Use the vertices and edges of a placed rim for ``points``, the numbers of the rim's corners in order."""
+        for side, edges in enumerate(placed.plane.rims[rim]):
+            edge = placed.plane.edges[edges[0]]
             a, b = points[side], points[(side + 1) % len(points)]
-            self._vertices[a], self._vertices[b] = placed.vertices[start], placed.vertices[end]
+            self._vertices[a], self._vertices[b] = placed.vertices[edge.start], placed.vertices[edge.end]
             self._edges[a, b] = placed.shapes[edges[0]]
 
-    def add(self, wires: Iterable[Sequence[int]]) -> None:
-        """A face; the outer wire first, counter-clockwise from outside, holes clockwise."""
+    def add_face(self, wires: Iterable[Sequence[int]]) -> None:
+        """Add a face: the outer wire counter-clockwise as seen from outside, then the holes clockwise."""
         from OCP.Geom import Geom_Plane
         from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
         from OCP.TopoDS import TopoDS_Face
@@ -47,20 +52,20 @@ class FacetBuilder:
         make, face = self._builder.make, TopoDS_Face()
         make.MakeFace(face, Geom_Plane(axes), TOLERANCE_MM)
         for wire in wires:
-            make.Add(face, self._wire(wire))
+            make.Add(face, self._make_wire(wire))
         make.Add(self._builder.shell, face)
 
-    def _wire(self, corners: Sequence[int]) -> Any:
+    def _make_wire(self, corners: Sequence[int]) -> Any:
         from OCP.TopoDS import TopoDS_Wire
 
         wire = TopoDS_Wire()
         self._builder.make.MakeWire(wire)
         for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
-            self._builder.make.Add(wire, self._edge(a, b))
+            self._builder.make.Add(wire, self._get_edge(a, b))
         wire.Closed(True)
         return wire
 
-    def _edge(self, a: int, b: int) -> Any:
+    def _get_edge(self, a: int, b: int) -> Any:
         from OCP.TopAbs import TopAbs_Orientation
 
         if (b, a) in self._edges:
@@ -68,11 +73,11 @@ class FacetBuilder:
         if (a, b) not in self._edges:
             start, end = tuple(self._points[a].tolist()), tuple(self._points[b].tolist())
             self._edges[a, b] = make_straight_edge(
-                self._builder.make, self._vertex(a), start, self._vertex(b), end
+                self._builder.make, self._get_vertex(a), start, self._get_vertex(b), end
             )
         return self._edges[a, b].Oriented(TopAbs_Orientation.TopAbs_FORWARD)
 
-    def _vertex(self, number: int) -> Any:
+    def _get_vertex(self, number: int) -> Any:
         from OCP.gp import gp_Pnt
         from OCP.TopoDS import TopoDS_Vertex
 

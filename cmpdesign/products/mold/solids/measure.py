@@ -1,4 +1,4 @@
-"""What a built solid measures: asked of the kernel, not of the numbers that it was built from."""
+"""Measures of a built solid, computed by the kernel and not from the numbers that describe the solid."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-# A wall that stands within this of the pull direction has no draft; a face within it of level is no wall.
+# Walls are faces that lean against z by less than this.
 LEVEL_DEG = 45.0 - 1e-6
 
 Point = tuple[float, float, float]
@@ -15,13 +15,13 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class SolidMeasures:
-    """One solid's check.
+    """The measures of one solid.
 
     Attributes:
-        valid: BRepCheck finds nothing.
+        valid: BRepCheck reports no error.
         closed: every edge is shared by two faces.
-        faces: their number.
-        volume_mm3: by integration over faces.
+        faces: number of faces.
+        volume_mm3: volume by integration over the faces.
     """
 
     valid: bool
@@ -31,7 +31,7 @@ class SolidMeasures:
 
 
 def measure_solid(shape: Any) -> SolidMeasures:
-    """Validity, closure and volume of a solid."""
+    """Measure validity, closure, faces and volume of a solid (TopoDS_Shape)."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_ShapeEnum
 
@@ -41,7 +41,7 @@ def measure_solid(shape: Any) -> SolidMeasures:
 
 
 def volume_mm3(shape: Any) -> float:
-    """By integration over the faces; exact for flat faces, to 1e-12 for round ones."""
+    """Volume by integration over the faces; exact for flat faces, to 1e-12 for round faces."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
@@ -60,7 +60,7 @@ def is_closed(shape: Any) -> bool:
 
 
 def subshapes(shape: Any, kind: Any) -> list[Any]:
-    """Sub-shapes of a kind, in order; shared ones once for every use."""
+    """Sub-shapes of a kind (TopAbs_ShapeEnum) in order; a shared sub-shape once for every use."""
     from OCP.TopExp import TopExp_Explorer
 
     found = []
@@ -72,9 +72,13 @@ def subshapes(shape: Any, kind: Any) -> list[Any]:
 
 
 def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]:
-    """Least and largest lean against z of the walls that lie wholly within a box.
+    """Least and largest lean against z of the walls that lie wholly within a box; NaN without walls.
 
-    A wall is a plane steeper than ``LEVEL_DEG``, a cone, or a cylinder along z (lean 0).
+    A wall is a plane, cone or cylinder that leans by less than ``LEVEL_DEG``.
+
+    Args:
+        shape: the solid.
+        low_mm, high_mm: opposite corners of the box.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
@@ -93,15 +97,15 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
             lean = 90.0 - float(
                 np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z()))))
             )
-        # Where a face lies is asked only if it would change the answer: nearly all lean alike.
-        known = least <= lean <= largest
-        if lean < LEVEL_DEG and not known and _is_within(face, low_mm, high_mm):
+        # The place of a face is tested only if its lean extends the range: most faces lean alike.
+        in_range = least <= lean <= largest
+        if lean < LEVEL_DEG and not in_range and _is_within(face, low_mm, high_mm):
             least, largest = min(least, lean), max(largest, lean)
     return (least, largest) if least <= largest else (float("nan"), float("nan"))
 
 
 def _is_within(face: Any, low_mm: Point, high_mm: Point) -> bool:
-    """True when every corner of the face lies in the box, a micrometre of tolerance around it."""
+    """True when every corner of the face lies in the box, with a tolerance of a micrometre."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS

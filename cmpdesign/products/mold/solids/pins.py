@@ -1,4 +1,4 @@
-"""A dowel pin: a cylinder along z from 0 to its length, both ends chamfered."""
+"""A dowel pin: a cylinder along z from 0 to the pin's length, with chamfers at both ends."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ def pin_solid(diameter_mm: float, length_mm: float, chamfer_mm: float) -> Any:
     )
     rings = []
     for number, (z, diameter) in enumerate(levels):
-        sheet = untiled_faces(circle_loop(np.zeros(2), diameter), ())
+        plane = untiled_faces(circle_loop(np.zeros(2), diameter), ())
         if 0 < number < len(levels) - 1:
-            sheet.faces.clear()
-        rings.append(builder.place(sheet, z, up=number > 0))
+            plane.faces.clear()
+        rings.append(builder.add_faces(plane, z, up=number > 0))
     for lower, upper in pairwise(rings):
-        builder.walls(lower, 0, upper, 0, outward=True)
+        builder.add_walls(lower, 0, upper, 0, outward=True)
     return builder.solid()
 
 
 def pin_volume_mm3(diameter_mm: float, length_mm: float, chamfer_mm: float) -> float:
-    """A cylinder and two truncated cones."""
+    """The volume in closed form: a cylinder and two truncated cones."""
     wide, narrow = diameter_mm / 2, diameter_mm / 2 - chamfer_mm
     cones = 2 * chamfer_mm * (wide**2 + wide * narrow + narrow**2) / 3
     return float(np.pi * (wide**2 * (length_mm - 2 * chamfer_mm) + cones))

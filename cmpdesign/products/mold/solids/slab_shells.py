@@ -1,16 +1,15 @@
-"""Solids built face by face with shared edges, without booleans: time grows with the number of faces.
+"""Solids built face by face with shared edges, without boolean operations, in a time linear in the faces.
 
-A ``Slab`` is a plate with any number of bosses, pockets and through holes. Every outline is a ``Loop``; two
-outlines that belong together (a boss's root and tip) are joined by walls: planes along straight sides,
-cylinders or cones along arcs. Edges are shared between neighbouring faces, so the shell is closed by
-construction; nothing is intersected, sewn or healed.
+A ``Slab`` is a plate with any number of bosses, pockets and through holes. Every outline is a ``Loop``. Walls join two
+paired outlines (a boss's root and tip): planes along straight sides, cylinders or cones along arcs. Neighbouring faces
+share their edges, so the shell is closed by construction; nothing is intersected, sewn or healed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,15 +24,21 @@ from cmpdesign.products.mold.solids.tiled_faces import (
     untiled_faces,
 )
 
+# Tolerance of the kernel's vertices, edges and faces.
 TOLERANCE_MM = 1e-7
+# Distance from the bounding box of features to the border of their tiles.
 TILE_MARGIN_MM = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A boss (height > 0) or pocket (height < 0) on a slab's top: its outline there and at its other end.
+    """A boss (height > 0) or pocket (height < 0) on a slab's top.
 
-    ``island`` makes a ring of it: what lies inside that outline stays at the slab's top (a moat).
+    Attributes:
+        root: outline at the slab's top.
+        tip: outline at the other end.
+        height_mm: height of the tip over the slab's top.
+        island: inner outlines at the slab's top and at the other end, for a ring-shaped feature such as a moat.
     """
 
     root: Loop
@@ -47,13 +52,13 @@ class Slab:
     """A plate from ``bottom_mm`` to ``top_mm``.
 
     Attributes:
-        outer: its outline.
-        through: holes, as (outline at the bottom, outline at the top).
+        outer: outline of the plate; at the bottom if the outer walls lean.
+        bottom_mm, top_mm: heights of the faces.
+        through: through holes, as (outline at the bottom, outline at the top).
         features: few, large bosses and pockets on the top.
-        many: many small bosses on the top, convex.
-        many_through: many small through holes, convex.
-        bottom_mm, top_mm: heights of its faces.
-        outer_top: its outline at the top, if its outer walls lean.
+        many: many small convex bosses on the top.
+        many_through: many small convex through holes, as ``through``.
+        outer_top: outline at the top if the outer walls lean.
     """
 
     outer: Loop
@@ -67,12 +72,12 @@ class Slab:
 
     @property
     def outlines(self) -> tuple[Loop, Loop]:
-        """At the bottom and at the top."""
+        """The outlines at the bottom and at the top."""
         return self.outer, self.outer_top or self.outer
 
 
 class ShellBuilder:
-    """Collects faces of one solid; heights are given where loops are placed."""
+    """Collects the faces of one solid."""
 
     def __init__(self) -> None:
         from OCP.BRep import BRep_Builder
@@ -92,116 +97,130 @@ class ShellBuilder:
         self.make.Add(solid, self.shell)
         return solid
 
-    def place(self, sheet: PlanarFaces, z: float, up: bool) -> PlacedFaces:
-        """Add a sheet's faces at a height; ``up`` tells whether the material lies below them."""
-        return PlacedFaces(self.make, self.shell, sheet, z, up)
+    def add_faces(self, plane: PlanarFaces, z: float, up: bool) -> PlacedFaces:
+        """Add the faces of a plane at height z; ``up`` if the material lies below the faces."""
+        return PlacedFaces(self.make, self.shell, plane, z, up)
 
-    def walls(self, lower: PlacedFaces, rim: int, upper: PlacedFaces, upper_rim: int, outward: bool) -> None:
-        """Join two rims side by side; ``outward`` when the material lies inside the outlines."""
-        sides = len(lower.sheet.rims[rim])
+    def add_walls(
+        self, lower: PlacedFaces, rim: int, upper: PlacedFaces, upper_rim: int, outward: bool
+    ) -> None:
+        """Join two rims side by side by walls; ``outward`` if the material lies inside the outlines."""
+        sides = len(lower.plane.rims[rim])
         posts = [self._make_post(lower, rim, upper, upper_rim, side) for side in range(sides)]
         for side in range(sides):
-            below, above = lower.sheet.rims[rim][side], upper.sheet.rims[upper_rim][side]
-            after = posts[(side + 1) % sides]
-            self._add_wall(lower, below, upper, above, posts[side], after, outward)
+            wall = _Wall(
+                lower=lower,
+                below=lower.plane.rims[rim][side],
+                upper=upper,
+                above=upper.plane.rims[upper_rim][side],
+                first_post=posts[side],
+                last_post=posts[(side + 1) % sides],
+            )
+            self._add_wall(wall, outward)
 
     def _make_post(self, lower: PlacedFaces, rim: int, upper: PlacedFaces, upper_rim: int, side: int) -> Any:
-        """The edge from a corner of the lower rim up to the upper one's."""
-        start = lower.sheet.edges[lower.sheet.rims[rim][side][0]][0]
-        end = upper.sheet.edges[upper.sheet.rims[upper_rim][side][0]][0]
+        """The edge from a side's first corner on the lower rim to that on the upper rim."""
+        start = lower.plane.edges[lower.plane.rims[rim][side][0]].start
+        end = upper.plane.edges[upper.plane.rims[upper_rim][side][0]].start
         return make_straight_edge(
             self.make, lower.vertices[start], lower.xyz(start), upper.vertices[end], upper.xyz(end)
         )
 
-    def _add_wall(
-        self,
-        lower: PlacedFaces,
-        below: list[int],
-        upper: PlacedFaces,
-        above: list[int],
-        post: Any,
-        after: Any,
-        outward: bool,
-    ) -> None:
+    def _add_wall(self, wall: _Wall, outward: bool) -> None:
         from OCP.TopAbs import TopAbs_Orientation
         from OCP.TopoDS import TopoDS_Face, TopoDS_Wire
 
-        run, back = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
-        surface = _wall_surface(lower, below, upper, above)
+        forward, backward = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
+        surface = _wall_surface(wall)
         face, wire = TopoDS_Face(), TopoDS_Wire()
         self.make.MakeFace(face, surface.geometry, TOLERANCE_MM)
         self.make.MakeWire(wire)
-        for edge in below:
-            self.make.Add(wire, lower.shapes[edge].Oriented(run))
-        self.make.Add(wire, after.Oriented(run))
-        for edge in reversed(above):
-            self.make.Add(wire, upper.shapes[edge].Oriented(back))
-        self.make.Add(wire, post.Oriented(back))
-        if surface.round is not None:
-            self._add_parameter_curves(surface, lower, below, upper, above, (post, after))
+        for edge in wall.below:
+            self.make.Add(wire, wall.lower.shapes[edge].Oriented(forward))
+        self.make.Add(wire, wall.last_post.Oriented(forward))
+        for edge in reversed(wall.above):
+            self.make.Add(wire, wall.upper.shapes[edge].Oriented(backward))
+        self.make.Add(wire, wall.first_post.Oriented(backward))
+        if surface.span is not None:
+            self._add_parameter_curves(wall, surface.geometry, surface.span)
         wire.Closed(True)
         self.make.Add(face, wire)
-        self.make.Add(self.shell, face.Oriented(run if outward else back))
+        self.make.Add(self.shell, face.Oriented(forward if outward else backward))
 
-    def _add_parameter_curves(
-        self,
-        surface: _WallSurface,
-        lower: PlacedFaces,
-        below: list[int],
-        upper: PlacedFaces,
-        above: list[int],
-        posts: tuple[Any, Any],
-    ) -> None:
-        """Curves in the (angle, length) plane of a cylinder or cone: every edge is straight there."""
+    def _add_parameter_curves(self, wall: _Wall, geometry: Any, span: _RoundSpan) -> None:
+        """Add the edges' curves in the (angle, length) plane of a cylinder or cone, where every edge is straight."""
         from OCP.Geom2d import Geom2d_Line
         from OCP.gp import gp_Dir2d, gp_Pnt2d
         from OCP.TopLoc import TopLoc_Location
 
-        assert surface.round is not None
-        first, last, length = surface.round
-        here = TopLoc_Location()
+        identity = TopLoc_Location()
 
-        def add(edge: Any, u: float, v: float, across: bool) -> None:
+        def add_curve(edge: Any, u: float, v: float, across: bool) -> None:
             line = Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(0.0, 1.0) if across else gp_Dir2d(1.0, 0.0))
-            self.make.UpdateEdge(edge, line, surface.geometry, here, TOLERANCE_MM)
+            self.make.UpdateEdge(edge, line, geometry, identity, TOLERANCE_MM)
 
-        # An arc's parameter is the angle itself, so its curve starts at u = 0.
-        turn = 2 * np.pi * round((lower.angles[below[0]] - first) / (2 * np.pi))
-        for sheet, edges, v in ((lower, below, 0.0), (upper, above, length)):
+        # The parameter of an arc is the angle itself, so the arc's curve starts at u = 0.
+        for placed, edges, v in ((wall.lower, wall.below, 0.0), (wall.upper, wall.above, span.length_mm)):
             for edge in edges:
-                turn = 2 * np.pi * np.floor((sheet.angles[edge] - first + 1e-6) / (2 * np.pi))
-                add(sheet.shapes[edge], -turn, v, across=False)
-        add(posts[0], first, 0.0, across=True)
-        add(posts[1], last, 0.0, across=True)
+                turn = 2 * np.pi * np.floor((placed.angles[edge] - span.first + 1e-6) / (2 * np.pi))
+                add_curve(placed.shapes[edge], -turn, v, across=False)
+        add_curve(wall.first_post, span.first, 0.0, across=True)
+        add_curve(wall.last_post, span.last, 0.0, across=True)
 
 
-@dataclass(frozen=True, eq=False)
-class _WallSurface:
-    """A wall's surface; for a round one the first and last angle and the length from rim to rim."""
+class _Wall(NamedTuple):
+    """The borders of a wall along one side of two paired rims.
+
+    Attributes:
+        lower, upper: the placed faces that the wall joins.
+        below, above: numbers of the side's edges on the lower and on the upper rim.
+        first_post, last_post: the edges (TopoDS_Edge) from the lower to the upper rim at the ends of the side.
+    """
+
+    lower: PlacedFaces
+    below: list[int]
+    upper: PlacedFaces
+    above: list[int]
+    first_post: Any
+    last_post: Any
+
+
+class _RoundSpan(NamedTuple):
+    """The extent of a round wall: first and last angle in rad, and length from rim to rim."""
+
+    first: float
+    last: float
+    length_mm: float
+
+
+class _WallSurface(NamedTuple):
+    """A wall's surface (Geom_Surface); ``span`` is None for a flat wall."""
 
     geometry: Any
-    round: tuple[float, float, float] | None
+    span: _RoundSpan | None
 
 
-def _wall_surface(lower: PlacedFaces, below: list[int], upper: PlacedFaces, above: list[int]) -> _WallSurface:
-    start, _, centre = lower.sheet.edges[below[0]]
-    a = lower.sheet.points[start]
-    b = lower.sheet.points[lower.sheet.edges[below[-1]][1]]
-    top = upper.sheet.points[upper.sheet.edges[above[0]][0]]
+def _wall_surface(wall: _Wall) -> _WallSurface:
+    lower, upper = wall.lower, wall.upper
+    first_edge = lower.plane.edges[wall.below[0]]
+    centre = first_edge.centre
+    a = lower.plane.points[first_edge.start]
+    b = lower.plane.points[lower.plane.edges[wall.below[-1]].end]
+    top = upper.plane.points[upper.plane.edges[wall.above[0]].start]
     if centre is None:
         return _WallSurface(_wall_plane(a, b, top, lower.z, upper.z), None)
     radius = float(np.hypot(a[0] - centre[0], a[1] - centre[1]))
     top_radius = float(np.hypot(top[0] - centre[0], top[1] - centre[1]))
     height = upper.z - lower.z
-    first = lower.angles[below[0]]
-    sweep = sum(lower.sweeps[edge] for edge in below)
+    first = lower.angles[wall.below[0]]
+    sweep = sum(lower.sweeps[edge] for edge in wall.below)
     length = float(np.hypot(top_radius - radius, height))
     geometry = _round_wall_surface(centre, lower.z, radius, top_radius - radius, height)
-    return _WallSurface(geometry, (first, first + sweep, length))
+    return _WallSurface(geometry, _RoundSpan(first, first + sweep, length))
 
 
 def _wall_plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
-    """The plane through two points at z and one at top_z, its normal to the right of a -> b."""
+    """The plane through a and b at z and top at top_z, its normal to the right of a -> b."""
     from OCP.Geom import Geom_Plane
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 
@@ -217,6 +236,7 @@ def _wall_plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
 
 
 def _round_wall_surface(centre: Point, z: float, radius: float, growth: float, height: float) -> Any:
+    """A cylinder, or a cone whose radius grows by ``growth`` over ``height``."""
     from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 
@@ -227,67 +247,67 @@ def _round_wall_surface(centre: Point, z: float, radius: float, growth: float, h
 
 
 class PlacedFaces:
-    """A sheet's vertices, edges and faces at a height."""
+    """The vertices, edges and faces (TopoDS) of a plane at height z."""
 
-    def __init__(self, make: Any, shell: Any, sheet: PlanarFaces, z: float, up: bool) -> None:
+    def __init__(self, make: Any, shell: Any, plane: PlanarFaces, z: float, up: bool) -> None:
         from OCP.gp import gp_Pnt
         from OCP.TopoDS import TopoDS_Vertex
 
-        self.sheet, self.z = sheet, z
+        self.plane, self.z = plane, z
         self.vertices = []
-        for x, y in sheet.points:
+        for x, y in plane.points:
             vertex = TopoDS_Vertex()
             make.MakeVertex(vertex, gp_Pnt(x, y, z), TOLERANCE_MM)
             self.vertices.append(vertex)
-        # First angle and sweep of the arcs, by edge.
+        # Edge number -> first angle and sweep of the arc, rad.
         self.angles: dict[int, float] = {}
         self.sweeps: dict[int, float] = {}
-        self.shapes = [self._edge(make, number) for number in range(len(sheet.edges))]
-        self._faces(make, shell, up)
+        self.shapes = [self._make_plane_edge(make, number) for number in range(len(plane.edges))]
+        self._add_faces(make, shell, up)
 
     def xyz(self, point: int) -> tuple[float, float, float]:
-        return (*self.sheet.points[point], self.z)
+        """The place of a point, mm."""
+        return (*self.plane.points[point], self.z)
 
-    def _edge(self, make: Any, number: int) -> Any:
-        start, end, centre = self.sheet.edges[number]
+    def _make_plane_edge(self, make: Any, number: int) -> Any:
+        start, end, centre = self.plane.edges[number]
+        first, last = self.vertices[start], self.vertices[end]
         if centre is None:
-            return make_straight_edge(
-                make, self.vertices[start], self.xyz(start), self.vertices[end], self.xyz(end)
-            )
+            return make_straight_edge(make, first, self.xyz(start), last, self.xyz(end))
         from OCP.Geom import Geom_Circle
         from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-        (x0, y0), (x1, y1) = self.sheet.points[start], self.sheet.points[end]
+        (x0, y0), (x1, y1) = self.plane.points[start], self.plane.points[end]
         angle = float(np.arctan2(y0 - centre[1], x0 - centre[0])) % (2 * np.pi)
         sweep = (float(np.arctan2(y1 - centre[1], x1 - centre[0])) - angle) % (2 * np.pi)
         self.angles[number], self.sweeps[number] = angle, sweep
         axes = gp_Ax2(gp_Pnt(*centre, self.z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0))
         curve = Geom_Circle(axes, float(np.hypot(x0 - centre[0], y0 - centre[1])))
-        return _make_edge(make, curve, self.vertices[start], self.vertices[end], angle, angle + sweep)
+        return _make_edge(make, curve, first, last, angle, angle + sweep)
 
-    def _faces(self, make: Any, shell: Any, up: bool) -> None:
+    def _add_faces(self, make: Any, shell: Any, up: bool) -> None:
         from OCP.Geom import Geom_Plane
         from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
         from OCP.TopAbs import TopAbs_Orientation
         from OCP.TopoDS import TopoDS_Face
 
         orientation = TopAbs_Orientation.TopAbs_FORWARD if up else TopAbs_Orientation.TopAbs_REVERSED
-        plane = Geom_Plane(gp_Ax3(gp_Pnt(0.0, 0.0, self.z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0)))
-        for wires in self.sheet.faces:
+        surface = Geom_Plane(gp_Ax3(gp_Pnt(0.0, 0.0, self.z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0)))
+        for wires in self.plane.faces:
             face = TopoDS_Face()
-            make.MakeFace(face, plane, TOLERANCE_MM)
+            make.MakeFace(face, surface, TOLERANCE_MM)
             for wire in wires:
-                make.Add(face, self._wire(make, wire))
+                make.Add(face, self._make_wire(make, wire))
             make.Add(shell, face.Oriented(orientation))
 
-    def _wire(self, make: Any, steps: Wire) -> Any:
+    def _make_wire(self, make: Any, directed_edges: Wire) -> Any:
         from OCP.TopAbs import TopAbs_Orientation
         from OCP.TopoDS import TopoDS_Wire
 
         wire = TopoDS_Wire()
         make.MakeWire(wire)
-        for edge, along in steps:
-            orientation = TopAbs_Orientation.TopAbs_FORWARD if along else TopAbs_Orientation.TopAbs_REVERSED
+        for edge, forward in directed_edges:
+            orientation = TopAbs_Orientation.TopAbs_FORWARD if forward else TopAbs_Orientation.TopAbs_REVERSED
             make.Add(wire, self.shapes[edge].Oriented(orientation))
         wire.Closed(True)
         return wire
@@ -321,20 +341,20 @@ def _make_edge(make: Any, curve: Any, start: Any, end: Any, first: float, last: 
 
 
 def make_slab_solid(slab: Slab) -> Any:
-    """The slab as a solid (TopoDS_Solid), its volume ``slab_volume_mm3``."""
+    """The slab as a solid (TopoDS_Solid) with the volume ``slab_volume_mm3``."""
     builder = ShellBuilder()
-    bottom = builder.place(_bottom_faces(slab), slab.bottom_mm, up=False)
-    top = builder.place(_top_faces(slab), slab.top_mm, up=True)
-    builder.walls(bottom, 0, top, 0, outward=True)
+    bottom = builder.add_faces(_bottom_faces(slab), slab.bottom_mm, up=False)
+    top = builder.add_faces(_top_faces(slab), slab.top_mm, up=True)
+    builder.add_walls(bottom, 0, top, 0, outward=True)
     for number in range(len(slab.through)):
-        builder.walls(bottom, 1 + number, top, 1 + number, outward=False)
+        builder.add_walls(bottom, 1 + number, top, 1 + number, outward=False)
     rim = 1 + len(slab.through)
     for feature in slab.features:
         _add_feature(builder, top, rim, feature)
         rim += 1 if feature.island is None else 2
     below = 1 + len(slab.through)
     for number in range(len(slab.many_through)):
-        builder.walls(bottom, below + number, top, rim + number, outward=False)
+        builder.add_walls(bottom, below + number, top, rim + number, outward=False)
     rim += len(slab.many_through)
     for number, feature in enumerate(slab.many):
         _add_feature(builder, top, rim + number, feature)
@@ -347,7 +367,7 @@ def _bottom_faces(slab: Slab) -> PlanarFaces:
 
 
 def _top_faces(slab: Slab) -> PlanarFaces:
-    """The top's faces; an island's outline belongs to a face of its own, inside the ring."""
+    """The faces of the top; the area inside an island's outline is a face of its own."""
     holes = [above for _, above in slab.through]
     islands: list[int] = []
     for feature in slab.features:
@@ -362,9 +382,9 @@ def _top_faces(slab: Slab) -> PlanarFaces:
 
 
 def _faces_with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> PlanarFaces:
-    """Rims inside an island are cut out of it, the others out of the slab."""
+    """The faces of the top: rims inside an island are cut out of the island, other rims out of the slab."""
     outer = slab.outlines[1]
-    sheet = untiled_faces(outer, holes)
+    plane = untiled_faces(outer, holes)
     boxes = bounding_boxes([outer, *holes])
 
     def inside(inner: int, outer: int) -> bool:
@@ -372,25 +392,25 @@ def _faces_with_islands(slab: Slab, holes: list[Loop], islands: list[int]) -> Pl
         return inner != outer and bool((boxes[inner][0] > low).all() and (boxes[inner][1] < high).all())
 
     members = {island: [i for i in range(1, len(boxes)) if inside(i, island)] for island in islands}
-    taken = {i for island in islands for i in (island, *members[island])}
-    free = [i for i in range(1, len(boxes)) if i not in taken]
-    sheet.faces = [[forward_wire(sheet.around(0)), *(backward_wire(sheet.around(i)) for i in free)]]
+    on_islands = {i for island in islands for i in (island, *members[island])}
+    others = [i for i in range(1, len(boxes)) if i not in on_islands]
+    plane.faces = [[forward_wire(plane.rim_edges(0)), *(backward_wire(plane.rim_edges(i)) for i in others)]]
     for island in islands:
-        cut_out = [backward_wire(sheet.around(i)) for i in members[island]]
-        sheet.faces.append([forward_wire(sheet.around(island)), *cut_out])
-    return sheet
+        cut_out = [backward_wire(plane.rim_edges(i)) for i in members[island]]
+        plane.faces.append([forward_wire(plane.rim_edges(island)), *cut_out])
+    return plane
 
 
 def _add_feature(builder: ShellBuilder, top: PlacedFaces, rim: int, feature: Feature) -> None:
     holes = [] if feature.island is None else [feature.island[1]]
-    end = builder.place(untiled_faces(feature.tip, holes), top.z + feature.height_mm, up=True)
+    end = builder.add_faces(untiled_faces(feature.tip, holes), top.z + feature.height_mm, up=True)
     raised = feature.height_mm > 0
     for number in range(1 + len(holes)):
         outward = raised != (number == 1)
         if raised:
-            builder.walls(top, rim + number, end, number, outward)
+            builder.add_walls(top, rim + number, end, number, outward)
         else:
-            builder.walls(end, number, top, rim + number, outward)
+            builder.add_walls(end, number, top, rim + number, outward)
 
 
 def slab_volume_mm3(slab: Slab) -> float:
@@ -402,7 +422,7 @@ def slab_volume_mm3(slab: Slab) -> float:
         volume += frustum_volume_mm3(feature.root, feature.tip, feature.height_mm)
         if feature.island is not None:
             volume -= frustum_volume_mm3(*feature.island, feature.height_mm)
-    for tall in {feature.height_mm for feature in slab.many}:
-        pairs = [(feature.root, feature.tip) for feature in slab.many if feature.height_mm == tall]
-        volume += frusta_volume_mm3(pairs, tall)
+    for boss_height in {feature.height_mm for feature in slab.many}:
+        pairs = [(feature.root, feature.tip) for feature in slab.many if feature.height_mm == boss_height]
+        volume += frusta_volume_mm3(pairs, boss_height)
     return volume

@@ -1,10 +1,10 @@
-"""Solids as triangles."""
+"""Triangle meshes of solids."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,15 @@ from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.solids.loops import Loop, Points, chorded_pair
 from cmpdesign.products.mold.solids.slab_shells import Feature, Slab
 
+# Largest distance and angle between curved faces and their triangles.
 DEFLECTION_MM = 0.01
 DEFLECTION_RAD = 0.1
-# Neighbouring faces evaluate the same point to within the kernel's tolerance; no edge is this short.
+# Neighbouring faces evaluate a common point to within the kernel's tolerance (1e-7 mm); every edge is longer than this.
 MERGE_TOLERANCE_MM = 1e-5
 
 
 def chorded_slab(slab: Slab) -> Slab:
-    """The slab with every arc as chords: a polyhedron, whose mesh is exact and of a volume in closed form."""
+    """The slab with arcs replaced by chords: a polyhedron, whose triangle mesh is exact."""
     bottom, top = chorded_pair(*slab.outlines)
     return replace(
         slab,
@@ -40,7 +41,7 @@ def _chorded_feature(feature: Feature) -> Feature:
 
 
 def tessellate_solid(name: str, color: str, solid: Any) -> TriangleMesh:
-    """Triangles of a solid, exact where it is flat; neighbouring faces share their vertices."""
+    """The triangle mesh of a solid (TopoDS_Solid), exact on flat faces; neighbouring faces share their vertices."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_ShapeEnum
 
@@ -62,40 +63,63 @@ def _add_face_triangles(
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
-    place = TopLoc_Location()
-    triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
-    move = place.Transformation()
+    location = TopLoc_Location()
+    triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), location)
+    transformation = location.Transformation()
     first = len(points) - 1
     for number in range(1, triangulation.NbNodes() + 1):
-        node = triangulation.Node(number).Transformed(move)
+        node = triangulation.Node(number).Transformed(transformation)
         points.append((node.X(), node.Y(), node.Z()))
-    turned = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+    is_reversed = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
     for number in range(1, triangulation.NbTriangles() + 1):
         a, b, c = triangulation.Triangle(number).Get()
-        corners.append((first + a, first + c, first + b) if turned else (first + a, first + b, first + c))
+        corners.append(
+            (first + a, first + c, first + b) if is_reversed else (first + a, first + b, first + c)
+        )
 
 
 def merge_vertices(name: str, color: str, points: Points, corners: NDArray[np.int64]) -> TriangleMesh:
-    """Points within ``MERGE_TOLERANCE_MM`` are one vertex; triangles that this makes flat are left out."""
+    """Merge points within ``MERGE_TOLERANCE_MM`` to one vertex; triangles that become flat are left out.
+
+    Args:
+        name, color: name and color of the triangle mesh.
+        points: (P, 3) mm.
+        corners: (T, 3) int64 numbers of points.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     a, b = cKDTree(points).query_pairs(MERGE_TOLERANCE_MM, output_type="ndarray").T
-    near = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))
-    _, number = connected_components(near, directed=False)
+    adjacency = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))
+    _, number = connected_components(adjacency, directed=False)
     _, first = np.unique(number, return_index=True)
     triangles = number[corners]
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     return TriangleMesh(name, color, points[first], triangles[~flat].astype(np.int64))
 
 
-def frusta_mesh(name: str, color: str, frusta: Sequence[tuple[Loop, Points, Loop, Points]]) -> TriangleMesh:
-    """Convex frusta: each a lower outline with its heights (m,), an upper one with its heights."""
+class Frustum(NamedTuple):
+    """A convex frustum between two outlines of m straight sides.
+
+    Attributes:
+        lower, upper: the outlines in plan.
+        lower_z, upper_z: (m,) heights of their points, mm.
+    """
+
+    lower: Loop
+    lower_z: Points
+    upper: Loop
+    upper_z: Points
+
+
+def frusta_mesh(name: str, color: str, frusta: Sequence[Frustum]) -> TriangleMesh:
+    """The triangle mesh of frusta."""
     points, triangles, first = [], [], 0
-    for lower, lower_z, upper, upper_z in frusta:
-        m = len(lower.points)
-        points += [np.column_stack([lower.points, lower_z]), np.column_stack([upper.points, upper_z])]
+    for frustum in frusta:
+        m = len(frustum.lower.points)
+        points.append(np.column_stack([frustum.lower.points, frustum.lower_z]))
+        points.append(np.column_stack([frustum.upper.points, frustum.upper_z]))
         i, after = np.arange(m), (np.arange(m) + 1) % m
         fan = np.stack([np.zeros(m - 2, dtype=np.int64), i[1:-1], i[2:]], axis=1)
         sides = np.concatenate(

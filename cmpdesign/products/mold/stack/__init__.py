@@ -1,4 +1,4 @@
-"""The dimensions that all parts of a mold share: layers, levels, outlines, pins, crown, silicones. No solids.
+"""The dimensions that all parts of a mold share: silicone layers, levels, outlines, pins, crown. No solids.
 
-In: a ``Design`` and its ``Layout``. Out: a ``Stack``.
+In: a ``Design`` and its ``Layout``. Out: a ``MoldStack``.
 """

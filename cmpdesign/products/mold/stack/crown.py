@@ -1,8 +1,8 @@
-"""The crown of a domed pad: its height over the plan, and how a flat pattern comes on it.
+"""The crown of a domed pad: its height over the plan, and the projection of a flat pattern on the crown.
 
-Every surface of a domed pad is the same crown, moved along z. So thicknesses are constant along the
-direction in which the mold opens, all parts pull straight, and one lid fits every layer; measured at right
-angles to the surface, a layer is thinner by the cosine of the slope.
+Every surface of a domed pad is the same crown, moved along z. Thicknesses are therefore constant along the direction
+in which the mold opens, all parts pull straight, and one lid fits every silicone layer. Measured at right angles to the
+surface, a silicone layer is thinner by the cosine of the slope.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from cmpdesign.products.mold.solids.loops import Points
 
-# Steeper walls of a pad are seen at a grazing angle and no longer pull straight off the plates.
+# Steepest slope of a crown. The camera sees steeper surfaces at a grazing angle, and plates do not pull off them.
 STEEPEST_DEG = 60.0
-# The ends of a cylindrical crown lean like this: upright ones would tear every layer, which has no thickness there.
+# Slope of the ends of a cylindrical crown. At upright ends every silicone layer would have no thickness and tear.
 END_SLOPE = 1.0
 
 
@@ -26,9 +26,10 @@ class Crown:
     """A spherical or cylindrical (axis along y) cap; a cylinder is cut off at both ends by planes at 45 degrees.
 
     Attributes:
-        radius_mm: of the sphere or cylinder.
-        reach_mm: half width of the cap at its foot, where its height is 0.
-        length_mm: half length of a cylindrical cap in y at its foot; the reach of a spherical one.
+        shape: "sphere" or "cylinder".
+        radius_mm: radius of the sphere or cylinder.
+        reach_mm: half width of the cap at its foot, where the height is 0.
+        length_mm: half length in y of a cylindrical cap at its foot; ``reach_mm`` of a spherical cap.
     """
 
     shape: Literal["sphere", "cylinder"]
@@ -38,19 +39,19 @@ class Crown:
 
     @property
     def height_mm(self) -> float:
-        """At the apex, over the foot."""
+        """Height of the apex over the foot."""
         return float(self.radius_mm - np.sqrt(self.radius_mm**2 - self.reach_mm**2))
 
     @property
     def slope_deg(self) -> float:
-        """At the foot, where it is steepest."""
+        """Slope at the foot, the steepest of the crown."""
         return float(np.degrees(np.arcsin(self.reach_mm / self.radius_mm)))
 
     def z_mm(self, xy_mm: Points) -> NDArray[np.float64]:
-        """(N,) height over the foot."""
-        away = np.hypot(*xy_mm.T) if self.shape == "sphere" else np.abs(xy_mm[:, 0])
-        away = np.minimum(away, self.reach_mm)
-        heights: NDArray[np.float64] = np.sqrt(self.radius_mm**2 - away**2) - np.sqrt(
+        """(N,) height over the foot at (N, 2) points in plan."""
+        distance = np.hypot(*xy_mm.T) if self.shape == "sphere" else np.abs(xy_mm[:, 0])
+        distance = np.minimum(distance, self.reach_mm)
+        heights: NDArray[np.float64] = np.sqrt(self.radius_mm**2 - distance**2) - np.sqrt(
             self.radius_mm**2 - self.reach_mm**2
         )
         if self.shape == "cylinder":
@@ -58,7 +59,7 @@ class Crown:
         return heights
 
     def volume_mm3(self) -> float:
-        """Closed form: a spherical cap, or a circular segment times its length, less what the ends cut off."""
+        """Volume in closed form: a spherical cap, or a circular segment times length, less the volume cut off."""
         height, radius = self.height_mm, self.radius_mm
         if self.shape == "sphere":
             return float(np.pi * height**2 * (3 * radius - height) / 3)
@@ -72,16 +73,23 @@ class Crown:
 
 
 def project_on_crown(xy_mm: Points, shape: str, radius_mm: float, projection: str) -> Points:
-    """Where a flat pattern's points lie in plan once it is on the crown.
+    """Project the points of a flat pattern on a crown.
 
-    "equidistant" keeps the lengths from the apex (sphere: the azimuthal equidistant projection; cylinder: the
-    unrolled sheet); "vertical" leaves the plan as it is.
+    Args:
+        xy_mm: (N, 2) points of the flat pattern.
+        shape: "sphere" or "cylinder".
+        radius_mm: radius of the crown.
+        projection: "equidistant" keeps lengths from the apex (sphere: azimuthal equidistant projection; cylinder:
+            unrolled sheet); "vertical" leaves the points as they are.
+
+    Returns:
+        (N, 2) places in plan, mm.
     """
     if projection == "vertical":
         return xy_mm
     if shape == "cylinder":
         return np.stack([radius_mm * np.sin(xy_mm[:, 0] / radius_mm), xy_mm[:, 1]], axis=-1)
-    away = np.hypot(*xy_mm.T)
-    shrink = np.sinc(away / radius_mm / np.pi)
-    plan: Points = xy_mm * shrink[:, None]
+    distance = np.hypot(*xy_mm.T)
+    factor = np.sinc(distance / radius_mm / np.pi)
+    plan: Points = xy_mm * factor[:, None]
     return plan

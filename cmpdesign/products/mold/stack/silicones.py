@@ -1,4 +1,4 @@
-"""Silicones: TOML files with shrinkage, cure and what keeps them from curing, each value with its source."""
+"""Silicones: TOML files with shrinkage, cure and inhibiting materials, each value with its source."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ class Silicone(BaseModel):
     """A casting silicone.
 
     Attributes:
+        name: name of the product.
         cure: the chemistry; tin and platinum silicones do not cure against each other.
-        shrinkage_percent: linear, after full cure.
-        density_g_cm3, pot_life_min, cure_h: at room temperature, for the job sheet.
-        inhibited_by: materials of parts on which its surface stays sticky.
-        remedy: what helps where it is inhibited.
+        shrinkage_percent: linear shrinkage after full cure.
+        density_g_cm3, pot_life_min, cure_h: values at room temperature, for the job sheet.
+        inhibited_by: materials of parts on which the silicone's surface stays sticky.
+        remedy: remedy against the inhibition.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -42,20 +43,20 @@ class Silicone(BaseModel):
 
     @property
     def scale(self) -> float:
-        """Mold over cured part: 1 / (1 - shrinkage)."""
+        """Size of the mold over size of the cured silicone: 1 / (1 - shrinkage)."""
         return 1 / (1 - self.shrinkage_percent.value / 100)
 
 
 def silicones() -> dict[str, Path]:
-    """Every shipped silicone by name."""
+    """The TOML file of every shipped silicone, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "silicones").glob("*.toml"))}
 
 
 def load_silicone(name_or_path: str) -> Silicone:
-    """A shipped silicone, or one from a TOML file.
+    """Load a shipped silicone by name, or a silicone from a TOML file.
 
     Raises:
-        DesignError: no such silicone, or a file that does not describe one.
+        DesignError: unknown silicone, or a file that does not describe a silicone.
     """
     known = silicones()
     path = known.get(name_or_path, Path(name_or_path))

@@ -1,4 +1,4 @@
-"""The dimensions that all parts of a mold share: layers, levels, outlines, pins. Numbers only, no solids.
+"""The dimensions that all parts of a mold share: silicone layers, levels, outlines, pins. Numbers only, no solids.
 
           pin   vent                     z
     ______|_|____||_______________|_|______   lid
@@ -29,22 +29,24 @@ from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, 
 from cmpdesign.products.mold.stack.silicones import Silicone, load_silicone
 
 SILICONE_LAYERS = ("base", "marker", "cover")
-# A crown's foot keeps this distance to the pattern and to the pad's edge.
+# Distance of a crown's foot from the pattern and from the pad's edge.
 FOOT_MM = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class MoldStack:
-    """A mold's dimensions; lengths of the mold, shrinkage already added.
+    """The dimensions of a mold; lengths are those of the mold, with shrinkage added, unless stated otherwise.
+
+    A silicone layer is an index into ``SILICONE_LAYERS``.
 
     Attributes:
         options: the [mold] table.
         layout: the pattern.
-        silicones: of the base, the marker and the cover layer.
-        outline_mm: (K, 2) the pad's edge at its back, before shrinkage is added, convex.
-        crown: of a domed pad, as in the mold.
-        pins_mm: (4, 2) the pins; no turn of a part makes its holes fit them.
-        pin_diameter_mm: of the pins.
+        silicones: silicones of the base, the marker and the cover layer.
+        outline_mm: (K, 2) the pad's edge at its back, convex, before shrinkage is added.
+        crown: crown of a domed pad; None for a flat pad.
+        pins_mm: (4, 2) places of the pins; the holes of a turned part do not fit the pins.
+        pin_diameter_mm: diameter of the pins.
     """
 
     options: MoldOptions
@@ -57,12 +59,12 @@ class MoldStack:
 
     @property
     def lean(self) -> float:
-        """Sideways over upright of a drafted wall."""
+        """Tangent of the draft of walls."""
         return float(np.tan(np.radians(self.options.draft_deg)))
 
     @cached_property
     def thickness_mm(self) -> tuple[float, float, float]:
-        """Of the base, the marker and the cover layer, as cast."""
+        """Thickness of the base, the marker and the cover layer, as cast."""
         nominal = (self.options.base_mm, self.options.marker_mm, self.options.cover_mm)
         base, marker, cover = (t * s.scale for t, s in zip(nominal, self.silicones, strict=True))
         return base, marker, cover
@@ -79,19 +81,20 @@ class MoldStack:
     def z_cover_mm(self) -> float:
         return self.z_marker_mm + self.thickness_mm[2]
 
-    def edges(self, layer: int) -> tuple[Loop, Loop]:
-        """The pad's edge at the lower and the upper face of a layer; drafted, so that it opens upwards."""
-        nominal = polygon_loop(self.outline_mm * self.silicones[layer].scale)
-        low = self.lean * sum(self.thickness_mm[:layer])
-        return nominal.moved(low), nominal.moved(low + self.lean * self.thickness_mm[layer])
+    def edges(self, silicone_layer: int) -> tuple[Loop, Loop]:
+        """The pad's edge at the lower and the upper face of a silicone layer; drafted: the edge opens upwards."""
+        nominal = polygon_loop(self.outline_mm * self.silicones[silicone_layer].scale)
+        lower = self.lean * sum(self.thickness_mm[:silicone_layer])
+        upper = lower + self.lean * self.thickness_mm[silicone_layer]
+        return nominal.offset(lower), nominal.offset(upper)
 
     @cached_property
     def marker_xy_mm(self) -> Points:
         """(M, 2) markers in plan, as cast."""
-        return self.placed(self.layout.marker_xy_mm)
+        return self._to_plan(self.layout.marker_xy_mm)
 
-    def placed(self, xy_mm: Points) -> Points:
-        """Points of the layout in plan, as cast: shrinkage added, then projected on the crown."""
+    def _to_plan(self, xy_mm: Points) -> Points:
+        """(N, 2) points of the layout in plan, as cast: shrinkage added, then projected on the crown."""
         scaled = xy_mm * self.silicones[1].scale
         if self.crown is None:
             return scaled
@@ -99,52 +102,52 @@ class MoldStack:
 
     @cached_property
     def colors(self) -> tuple[int, ...]:
-        """The colors that are filled, each with a plate and a stencil of its own."""
+        """The colors with cells to fill, each with its own plate and stencil."""
         return tuple(c for c in range(len(COLORS)) if c != BLACK and (self.layout.cell_color == c).any())
 
     def cells(self, color: int) -> Points:
-        """(N, 3 or 4, 2) corners of a color's cells in plan, counter-clockwise."""
+        """(N, 3 or 4, 2) corners of a color's cells in plan, counter-clockwise, as cast."""
         corners: Points = self.marker_xy_mm[self.layout.cell_corners[self.layout.cell_color == color]]
         return corners
 
     @cached_property
     def block(self) -> Loop:
-        """Outer edge of every part: around pins, pad and moat."""
+        """Outer edge of every part: a rectangle around pins, pad and moat."""
         option = self.options
-        reach = option.wall_mm + self.pin_diameter_mm / 2
+        pin_margin = option.wall_mm + self.pin_diameter_mm / 2
         pad = self.edges(2)[1].points
-        away = option.parting_mm + option.moat_mm + option.wall_mm
-        low = np.minimum(self.pins_mm.min(axis=0) - reach, pad.min(axis=0) - away)
-        high = np.maximum(self.pins_mm.max(axis=0) + reach, pad.max(axis=0) + away)
+        pad_margin = option.parting_mm + option.moat_mm + option.wall_mm
+        low = np.minimum(self.pins_mm.min(axis=0) - pin_margin, pad.min(axis=0) - pad_margin)
+        high = np.maximum(self.pins_mm.max(axis=0) + pin_margin, pad.max(axis=0) + pad_margin)
         return rounded_rectangle(low, high, option.fillet_mm)
 
     def holes(self, clearance: bool = True) -> list[Loop]:
-        """The pin holes; in the base they hold the pins tight, elsewhere they have clearance."""
+        """The pin holes, with clearance, or without (in the base, which holds the pins)."""
         diameter = self.pin_diameter_mm + (self.options.clearance_mm if clearance else 0.0)
         return [circle_loop(place, diameter) for place in self.pins_mm]
 
 
 def make_stack(design: Design, layout: Layout) -> MoldStack:
-    """The dimensions of a design's mold.
+    """Compute the dimensions of a design's mold.
 
     Raises:
-        DesignError: an unknown silicone, or a crown that its pattern does not fit on.
+        DesignError: an unknown silicone, or a crown that is too small for the pattern.
     """
     option = design.mold
     base, marker, cover = (
         load_silicone(n) for n in (option.base_silicone, option.marker_silicone, option.cover_silicone)
     )
-    four = design.fiducials.model_copy(update={"count": 4})
-    pins = fiducial_positions(four, layout.outline_mm)
+    four_fiducials = design.fiducials.model_copy(update={"count": 4})
+    pins = fiducial_positions(four_fiducials, layout.outline_mm)
     diameter = option.pin_diameter_mm or design.fiducials.diameter_mm
     crown, outline = None, layout.outline_mm
     if option.crown != "none":
-        crown, outline = _fit_crown(option, layout, marker.scale)
+        crown, outline = _make_crown(option, layout, marker.scale)
     return MoldStack(option, layout, (base, marker, cover), outline, crown, pins, diameter)
 
 
-def _fit_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
-    """The crown that just carries the pattern, and the round or rectangular pad around it."""
+def _make_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
+    """The smallest crown that carries the pattern, and the (K, 2) round or rectangular outline of the pad."""
     from cmpdesign.layout.outline import circle_outline as round_outline
     from cmpdesign.layout.outline import rectangle_outline
 
@@ -152,8 +155,8 @@ def _fit_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown
         raise DesignError(f'mold.crown = "{option.crown}" needs mold.crown_radius_mm')
     radius = option.crown_radius_mm * scale
     points = layout.marker_xy_mm[np.unique(layout.cell_corners)] * scale
-    away = np.hypot(*points.T) if option.crown == "sphere" else np.abs(points[:, 0])
-    extent = float(away.max())
+    distance = np.hypot(*points.T) if option.crown == "sphere" else np.abs(points[:, 0])
+    extent = float(distance.max())
     slope = extent / radius if option.projection == "equidistant" else np.arcsin(min(1.0, extent / radius))
     if np.degrees(slope) > STEEPEST_DEG:
         raise DesignError(
@@ -170,7 +173,7 @@ def _fit_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown
     edge = crown_edge_mm(option, layout)
     if option.crown == "sphere":
         crown = Crown("sphere", radius, reach, reach)
-        # The inscribed polygon's sides come nearer than its corners.
+        # The sides of an inscribed polygon are nearer to the centre than its corners.
         return crown, round_outline(2 * (reach / scale + edge) / np.cos(np.pi / 360))
     height = Crown("cylinder", radius, reach, np.inf).height_mm
     length = float(np.abs(points[:, 1]).max()) + FOOT_MM + height / END_SLOPE
@@ -179,5 +182,5 @@ def _fit_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown
 
 
 def crown_edge_mm(option: MoldOptions, layout: Layout) -> float:
-    """Width of the flat edge around a crown: the border's, or what vents need."""
+    """Width of the flat edge around a crown: the border's width, or the width for vents if larger."""
     return max(layout.border_mm, option.vent_mm + 2 * FOOT_MM if option.vents else 0.0)

@@ -1,4 +1,4 @@
 """STEP AP242 files, the same bytes for the same solids.
 
-In: solids, or the texts of parts' files. Out: texts.
+In: solids, or the bytes of parts' files. Out: bytes.
 """

@@ -1,11 +1,11 @@
-"""STEP files as text (ISO 10303-21, AP242): entities, numbers, and what every product of a file needs."""
+"""STEP files as text (ISO 10303-21, AP242): entities, numbers, and the entities of a product."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# Files carry no date of their own: that of the format's edition stands for it.
+# The date in a file is that of the format's edition, so that files do not depend on the date of writing.
 _HEAD = """ISO-10303-21;
 HEADER;
 FILE_DESCRIPTION(('parts of a mold'),'2;1');
@@ -16,7 +16,7 @@ DATA;
 """
 _TAIL = "ENDSEC;\nEND-ISO-10303-21;\n"
 
-# What every file begins with; all its products share it.
+# The first entities of every file; all products of the file share them.
 CONTEXT, _LENGTH, _ANGLE, _SOLID_ANGLE, _UNCERTAINTY = 2, 3, 4, 5, 6
 SHARED_ENTITIES = (
     f"APPLICATION_PROTOCOL_DEFINITION('international standard',"
@@ -28,15 +28,15 @@ SHARED_ENTITIES = (
     f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-07),#{_LENGTH},"
     "'distance_accuracy_value','confusion accuracy')",
 )
-# References in a line of a long list.
+# References per line of a long list.
 _IN_A_LINE = 10
 
-Direction = tuple[float, float, float]
+Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class StepProduct:
-    """Numbers of a product's definition, its shape's representation and the origin in it."""
+    """Numbers of a product's definition, of its shape's representation and of the origin in the representation."""
 
     definition: int
     representation: int
@@ -44,12 +44,12 @@ class StepProduct:
 
     @classmethod
     def ending_at(cls, last: int) -> StepProduct:
-        """The one whose last entity is this: what ``add_product`` adds is always as many."""
+        """The product whose last entity has the number ``last``; ``add_product`` adds a fixed number of entities."""
         return cls(last - 2, last - 8, last - 9)
 
 
 class StepEntities:
-    """A file's entities, numbered one after the other from 1; the first are ``SHARED_ENTITIES``."""
+    """The entities of a file, numbered from 1; the first are ``SHARED_ENTITIES``."""
 
     def __init__(self) -> None:
         self.last = 0
@@ -59,46 +59,46 @@ class StepEntities:
             self.add(text)
 
     def add(self, text: str) -> int:
-        """An entity; its number."""
+        """Add an entity; its number."""
         self.last += 1
         self._texts.append(f"#{self.last} = {text};\n")
         return self.last
 
-    def share(self, text: str) -> int:
-        """The number of an entity that may stand for many: it is written once."""
+    def add_shared(self, text: str) -> int:
+        """Add an entity unless an equal entity exists; its number."""
         number = self._known.get(text)
         if number is None:
             number = self._known[text] = self.add(text)
         return number
 
-    def take_over(self, text: str, last: int) -> None:
-        """Entities that are numbered already, up to ``last``."""
+    def add_numbered(self, text: str, last: int) -> None:
+        """Add the text of entities that are numbered already, up to ``last``."""
         self._texts.append(text)
         self.last = last
 
-    def point(self, x: float, y: float, z: float) -> int:
-        return self.share(f"CARTESIAN_POINT('',({format_real(x)},{format_real(y)},{format_real(z)}))")
+    def add_point(self, x: float, y: float, z: float) -> int:
+        return self.add_shared(f"CARTESIAN_POINT('',({format_real(x)},{format_real(y)},{format_real(z)}))")
 
-    def direction(self, x: float, y: float, z: float) -> int:
-        return self.share(f"DIRECTION('',({format_real(x)},{format_real(y)},{format_real(z)}))")
+    def add_direction(self, x: float, y: float, z: float) -> int:
+        return self.add_shared(f"DIRECTION('',({format_real(x)},{format_real(y)},{format_real(z)}))")
 
-    def axes(self, point: Direction, z: Direction, x: Direction) -> int:
-        """A place, its z and its x axis."""
-        at, up, right = self.point(*point), self.direction(*z), self.direction(*x)
-        return self.add(f"AXIS2_PLACEMENT_3D('',#{at},#{up},#{right})")
+    def add_axes(self, origin: Triple, z: Triple, x: Triple) -> int:
+        """Add axes with an origin (mm), a z and an x direction; their number."""
+        numbers = self.add_point(*origin), self.add_direction(*z), self.add_direction(*x)
+        return self.add(f"AXIS2_PLACEMENT_3D('',#{numbers[0]},#{numbers[1]},#{numbers[2]})")
 
-    def file(self, name: str) -> bytes:
-        """The file that holds them."""
+    def to_bytes(self, name: str) -> bytes:
+        """The bytes of the file with all entities."""
         return "".join([_HEAD.format(name=name), *self._texts, _TAIL]).encode("ascii")
 
 
 def data_section(file: bytes) -> str:
-    """The entities of a file that ``StepEntities.file`` wrote."""
+    """The text of the entities of a file from ``StepEntities.to_bytes``."""
     return file.decode("ascii").partition("\nDATA;\n")[2].removesuffix(_TAIL)
 
 
 def format_real(value: float) -> str:
-    """Twelve digits, always a point; a zero has no sign."""
+    """Format a number with twelve digits and always a point; a zero has no sign."""
     text = f"{value:.12G}"
     if "E" in text:
         mantissa, _, exponent = text.partition("E")
@@ -109,13 +109,13 @@ def format_real(value: float) -> str:
 
 
 def format_references(numbers: Sequence[int]) -> str:
-    """A list of entities, in lines of a moderate length."""
+    """Format a list of references to entities, in lines of ``_IN_A_LINE``."""
     lines = (numbers[start : start + _IN_A_LINE] for start in range(0, len(numbers), _IN_A_LINE))
     return ",\n".join(",".join(f"#{number}" for number in line) for line in lines)
 
 
 def add_context(entities: StepEntities) -> int:
-    """A space of its own for one product's shape, in mm."""
+    """Add a geometric context for one product's shape, in mm; its number."""
     return entities.add(
         f"( GEOMETRIC_REPRESENTATION_CONTEXT(3) GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{_UNCERTAINTY})) "
         f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{_LENGTH},#{_ANGLE},#{_SOLID_ANGLE})) "
@@ -126,8 +126,8 @@ def add_context(entities: StepEntities) -> int:
 def add_product(
     name: str, kind: str, items: Sequence[int], context: int, entities: StepEntities
 ) -> StepProduct:
-    """A product whose shape is a representation of ``kind`` of these items and of its own origin."""
-    origin = entities.axes((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    """Add a product whose shape is a representation of ``kind`` of the items and of an origin."""
+    origin = entities.add_axes((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
     representation = entities.add(f"{kind}('',({format_references((origin, *items))}),#{context})")
     of_product = entities.add(f"PRODUCT_CONTEXT('',#{CONTEXT},'mechanical')")
     product = entities.add(f"PRODUCT('{name}','{name}','',(#{of_product}))")

@@ -19,7 +19,7 @@ class NamedSolid:
     """A named, colored solid.
 
     Attributes:
-        name: the product's name, ASCII.
+        name: name of the product, ASCII.
         color: "#rrggbb".
         shape: TopoDS_Solid, mm.
     """
@@ -30,7 +30,7 @@ class NamedSolid:
 
 
 def solid_to_step(solid: NamedSolid) -> bytes:
-    """A part's file.
+    """Format the STEP file of a part.
 
     Raises:
         RuntimeError: a solid that ``add_solid`` cannot write.
@@ -40,7 +40,7 @@ def solid_to_step(solid: NamedSolid) -> bytes:
     context = add_context(entities)
     _add_color(solid.color, body, context, entities)
     add_product(solid.name, PART, (body,), context, entities)
-    return entities.file(solid.name)
+    return entities.to_bytes(solid.name)
 
 
 def _add_color(color: str, body: int, context: int, entities: StepEntities) -> None:
@@ -58,7 +58,7 @@ def _add_color(color: str, body: int, context: int, entities: StepEntities) -> N
 
 @contextmanager
 def _silenced_output() -> Any:
-    """The kernel's reader reports every file on standard output; it must not."""
+    """Suppress the reports of the kernel's reader on standard output."""
     from OCP.Message import Message
 
     messenger = Message.DefaultMessenger_s()
@@ -73,7 +73,7 @@ def _silenced_output() -> Any:
 
 
 def read_step(data: bytes) -> Any:
-    """The file's shape (TopoDS_Shape), mm, as the kernel's own reader finds it."""
+    """Read the shape (TopoDS_Shape) of a file with the kernel's own reader, mm."""
     from OCP.STEPControl import STEPControl_Reader
 
     with _silenced_output(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
