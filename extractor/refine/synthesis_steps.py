@@ -204,7 +204,13 @@ class SynthesisSolver:
         sigma = _blur_after_step(drawing.sigma, drawing.edge_px, wider)
         if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
             bettered = adapt_levels_to_blur(bettered, fit.xy, mesh, drawing.sigma, sigma)
-        about = {"bend_variance": loose, "reading": reading, "noise": noise, "sigma": sigma, "levels": bettered}
+        about = {
+            "bend_variance": loose,
+            "reading": reading,
+            "noise": noise,
+            "sigma": sigma,
+            "levels": bettered,
+        }
         return with_solution(fit, step, median_misfit=usual, dot_gain=swelling, **about)
 
 
