@@ -12,7 +12,7 @@ from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
 from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surface
 
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
-PRESS_MM, REACH_MM = 2.0, 4.0
+PRESS_MM, REACH_MM = 2.0, 4.0  # press, and largest distance from the pattern's middle in x and y
 METHODS = cube.COMPARED_METHODS
 EDGE_MODES = ("press", "press_shear")
 MEASURES = (
@@ -23,7 +23,7 @@ VARIANTS = ("read", "with_virtual", "perfect")
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """As many places for every object, and for the cube in both modes."""
+    """The same number of positions for every object, and for the cube in both modes."""
     objects = [
         Trial(f"{name}-{i}", {**options.values, "object": name, "index": i})
         for name in OBJECTS
@@ -33,6 +33,7 @@ def trials(options: RunOptions) -> list[Trial]:
 
 
 def cube_trials(modes: Sequence[str], options: RunOptions) -> list[Trial]:
+    """Trials of the pressed cube: the same number of positions for every mode."""
     return [
         Trial(f"cube-{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in modes
@@ -41,7 +42,7 @@ def cube_trials(modes: Sequence[str], options: RunOptions) -> list[Trial]:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """One object or cube at one place, with both patterns."""
+    """The errors of both patterns for one object or cube at one position."""
     if "mode" in values:
         return cube.work(values)
     from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
@@ -49,21 +50,21 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 
     text = values["sensor"]
-    random = trial_rng(values["seed"], values["object"], values["index"])
-    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
-    pressed = place_surface(text, ContactLoad(values["object"], PRESS_MM), (float(x), float(y)))
-    seed = int(random.integers(2**31))
-    found: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
+    rng = trial_rng(values["seed"], values["object"], values["index"])
+    x, y = rng.uniform(-REACH_MM, REACH_MM, 2)
+    surface = place_surface(text, ContactLoad(values["object"], PRESS_MM), (float(x), float(y)))
+    seed = int(rng.integers(2**31))
+    result: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
     for method in METHODS:
-        one = instrument_for_method(text, method, values["preset"])
-        found[method] = measure_reconstruction(
-            one, pressed, mean_conditions(one.sensor.table.conditions), seed
+        instrument = instrument_for_method(text, method, values["preset"])
+        result[method] = measure_reconstruction(
+            instrument, surface, mean_conditions(instrument.sensor.table.conditions), seed
         )
-    return found
+    return result
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members."""
+    """The members of report.json."""
     pairs = list(zip(trials, results, strict=True))
     shapes = {
         name: {
@@ -84,7 +85,7 @@ def _summarise_errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def summarise_edge_errors(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
-    """The mean edge fitting error of both patterns, its distribution, and what else would have come out."""
+    """The mean edge fitting error of both patterns, its distribution, and the results of variants."""
     document: dict[str, Any] = {}
     for method in METHODS:
         errors = edge_errors_mm(found, method, "read")
@@ -113,6 +114,6 @@ def summarise_edge_errors(found: Sequence[Mapping[str, Any]], mode: str) -> dict
 def edge_errors_mm(
     found: Sequence[Mapping[str, Any]], method: str, variant: str, measure: str = "side_mm"
 ) -> list[float]:
-    """By how much the fitted square's side misses the cube's, where there is one."""
+    """Absolute differences in mm between the fitted square's side and the cube's, where a square was fitted."""
     sides = [one[method][variant][measure] for one in found]
     return [abs(side - cube.CUBE_SIDE_MM) for side in sides if side is not None]

@@ -1,4 +1,4 @@
-"""``evaluate response``: how much of a shear the markers in contact show (Fig. 11b)."""
+"""``evaluate response``: the share of a shear that the markers in contact show (Fig. 11b)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ work = cube.work
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """As many places of the cube for both directions."""
+    """The same number of positions of the cube for both directions."""
     return cube_trials(tuple(CASES.values()), options)
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members: by direction, mean displacement of the edge points over the shear."""
+    """The members of report.json: by direction, mean displacement of the edge points over the shear."""
     document: dict[str, Any] = {}
     for case, mode in CASES.items():
         found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
@@ -53,5 +53,5 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
 
 
 def response_values(found: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
-    """The responses of a method, where it has one."""
+    """The responses of a method, without trials that have none."""
     return [one[method][variant]["response"] for one in found if one[method][variant]["response"] is not None]

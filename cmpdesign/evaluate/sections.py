@@ -1,4 +1,4 @@
-"""What each report shows of its figures."""
+"""The sections of each report's page."""
 
 from __future__ import annotations
 
@@ -43,14 +43,17 @@ DIFFERENCES_RELIABILITY = (
 
 
 def format_number(value: float | None, digits: int = 3, unit: str = "") -> str:
+    """A number with fixed digits and its unit; "none" for None."""
     return "none" if value is None else f"{value:.{digits}f}{unit}"
 
 
 def format_percent(value: float | None) -> str:
+    """A signed percentage; "none" for None."""
     return "none" if value is None else f"{value:+.1f} %"
 
 
 def conditions_section(document: Document) -> Section:
+    """The section on the conditions of a run."""
     return Section(
         "Conditions",
         [
@@ -61,11 +64,13 @@ def conditions_section(document: Document) -> Section:
     )
 
 
-def differences_section(more: Sequence[str]) -> Section:
-    return Section(DIFFERENCES_TITLE, points=[*more, *DIFFERENCES])
+def differences_section(own_points: Sequence[str]) -> Section:
+    """The section on differences from the article: an experiment's own points, then the common ones."""
+    return Section(DIFFERENCES_TITLE, points=[*own_points, *DIFFERENCES])
 
 
 def reliability_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate reliability``."""
     modes = document["modes"]
     rows = [
         [
@@ -133,6 +138,7 @@ def _article_cell(one: Document) -> str:
 
 
 def precision_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate precision``."""
     return [
         conditions_section(document),
         _edge_section(document["edge_fit_error_mm"]),
@@ -142,7 +148,7 @@ def precision_sections(document: Document) -> list[Section]:
 
 
 def _change_rows(cases: Document) -> list[Sequence[str]]:
-    """Both patterns and the change from one to the other by label, the article's beside, variants below."""
+    """Rows by label: both patterns, the change, and the article's change; variants in further rows."""
     rows: list[Sequence[str]] = []
     for label, one in cases.items():
         cells = [
@@ -248,6 +254,7 @@ def _format_whole_percent(share: float | None) -> str:
 
 
 def response_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate response``."""
     rows = _change_rows({case.replace("_", " "): one for case, one in document["response"].items()})
     table = Table(
         "Mean displacement of the edge points over the shear of 1 mm.",
@@ -274,6 +281,7 @@ def response_sections(document: Document) -> list[Section]:
 
 
 def angle_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate angles``."""
     sections = []
     for name, title, equation in (
         ("shape_change_deg", "Shape change", "eq. 1: 360 / n"),
@@ -308,7 +316,8 @@ def angle_sections(document: Document) -> list[Section]:
 
 
 def design_sections(document: Document) -> list[Section]:
-    found = document["designs"]
+    """The page of ``evaluate designs``."""
+    designs = document["designs"]
     rows = [
         [
             name,
@@ -323,7 +332,7 @@ def design_sections(document: Document) -> list[Section]:
             format_number(one["smallest_feature_mm"]),
             format_number(one["laser_time_s"], 0),
         ]
-        for name, one in found.items()
+        for name, one in designs.items()
     ]
     headings = (
         "design",
@@ -341,7 +350,7 @@ def design_sections(document: Document) -> list[Section]:
     )
     points = {
         name: (one["markers_per_cm2"], _to_um(one["surface_rms_mm"]["mean"]) or 0.0)
-        for name, one in found.items()
+        for name, one in designs.items()
         if one["surface_rms_mm"]["mean"] is not None
     }
     return [
