@@ -62,7 +62,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class AccuracyResult:
-    """A preset on a case, over all noises; see the module. ``wrong``: farther off than 0.3 of the shortest edge."""
+    """A preset on a case, over all noise seeds; see the module. ``wrong``: error above 0.3 of the shortest edge."""
 
     group: str
     case: str
@@ -79,6 +79,7 @@ class AccuracyResult:
 
 
 def case_name(group: str, case: SceneCase) -> str:
+    """The name of a case in the tables of its group."""
     value = {"blur": f"blur {case.blur_px:g} px", "noise": f"noise {case.noise:g}/255"}
     value |= {"pitch": f"edges of {case.pitch_px:g} px", "scenes": f"{case.pattern}, {case.kind}"}
     return value[group]
@@ -89,12 +90,12 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyRe
     scene = case.scene()
     inner = inner_markers(scene.layout)
     bounds = bound_rms_px(scene, inner, np.ones_like(inner))
-    seen = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
-    visible = seen[0].truth.visible
-    true = seen[0].truth.marker_xy_px
+    rendered = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
+    visible = rendered[0].truth.visible
+    true = rendered[0].truth.marker_xy_px
     for preset in PRESETS:
         extractor = cached_extractor(case, preset)
-        read = [extractor.extract(picture.image) for picture in seen]
+        read = [extractor.extract(picture.image) for picture in rendered]
         errors = np.array([markers.xy_px for markers in read]) - true
         wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
         found = np.isfinite(errors[..., 0]) & visible
@@ -112,6 +113,7 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyRe
 
 
 def rms(errors: NDArray[np.float64]) -> float:
+    """Root mean square; NaN without values."""
     return float(np.sqrt(np.mean(errors**2))) if len(errors) else float("nan")
 
 
@@ -129,7 +131,7 @@ def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
 
 
 def markdown(results: Sequence[AccuracyResult]) -> str:
-    """A row a case, a column a preset: error in bounds, and the normalised error."""
+    """One row per case, columns per preset: error over the bound, and the normalised error."""
     head = " | ".join(f"{preset}: of the bound | normalised" for preset in PRESETS)
     lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
     for name in dict.fromkeys(r.case for r in results):
