@@ -193,6 +193,6 @@ def fit_edge_offsets(
         box = slice(top, bottom), slice(left, right)
         length = np.hypot(along_x, along_y)
         slope = (slope_x[box] * -along_y + slope_y[box] * along_x) / length
-        if (slope**2).sum() > 100.0:  # gridlines between black cells have no slope
+        if (slope**2).sum() > 100.0:  # outermost gridlines have black on both sides
             shifts.append(-(difference[box] * slope).sum() / (slope**2).sum())
     return np.array(shifts)

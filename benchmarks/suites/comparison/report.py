@@ -38,7 +38,7 @@ COLORS = {
     "chess-corners, its default": "#8bc34a",
     "chess-corners, saddle point": "#2e7d32",
 }
-MIN_FOUND = 0.5  # of the markers; what finds less is not drawn
+MIN_FOUND = 0.5  # of the markers; methods with a smaller share are not drawn
 
 
 def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") -> Table:
@@ -59,7 +59,7 @@ def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") 
 
 
 def comparison_markdown(results: Sequence[MethodResult]) -> str:
-    """One row a method: the standard scene, and the worst of all scenes."""
+    """One row per method: the standard scene, and the worst of all scenes."""
     lines = [
         "| method | reads | found | wrong | RMS px | of the bound | worst scene | ms | of SB's time |",
         "|---|---|---|---|---|---|---|---|---|",
@@ -78,7 +78,7 @@ def comparison_markdown(results: Sequence[MethodResult]) -> str:
 
 
 def comparison_picture(results: Sequence[MethodResult]) -> bytes:
-    """PNG: time against error, both logarithmic; a color a method, a mark a scene, the bounds as lines."""
+    """PNG: time against error, both logarithmic; one color per method, one mark per scene, the bounds as lines."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,4 +1,4 @@
-"""What a run of the stress suite says: failures by severity, a row a condition, a plot, a file."""
+"""Reports of the stress suite: failures by severity, one row per condition, a plot, a file."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ COLORS = {
 
 @dataclass(frozen=True)
 class ConditionRow:
-    """All images of one condition. Counts are of markers, see ``Score``; times are medians.
+    """All images of one condition. Counts are of markers, see ``MarkerScore``; times are medians.
 
     Attributes:
-        promised: yes, no, or how many of the images.
+        promised: yes, no, or the number of images with a promise.
         worst, slowest: names of images.
     """
 
@@ -60,17 +60,17 @@ class ConditionRow:
 
     @property
     def kept_share(self) -> float:
-        """Of the promised markers."""
+        """The share of the promised markers that is kept."""
         return self.kept / self.sure if self.sure else math.nan
 
     def share(self, name: str) -> float:
-        """Of the visible markers; wrong ones of the reported where none is visible."""
-        whole = self.visible or self.reported
-        return float(getattr(self, name)) / whole if whole else 0.0
+        """A count over the visible markers, or over the reported markers if none is visible."""
+        total = self.visible or self.reported
+        return float(getattr(self, name)) / total if total else 0.0
 
 
 def condition_rows(results: Iterable[CaseResult], kinds: Sequence[ConditionKind]) -> list[ConditionRow]:
-    """In the order of the conditions."""
+    """One row per condition, in the order of the conditions."""
     results = list(results)
     rows = []
     for kind in kinds:
@@ -127,7 +127,7 @@ def _median(values: list[float]) -> float:
 
 
 def failure_lines(rows: list[ConditionRow]) -> list[str]:
-    """A line each, the severest first: raised, wrong, outside the image, promise broken, slow."""
+    """One line per failure, the severest first: raised, wrong, outside the image, promise broken, slow."""
     found: list[tuple[int, float, str]] = []
     for row in rows:
         if row.raised:
@@ -153,6 +153,7 @@ HEAD = (
 
 
 def results_table(rows: list[ConditionRow]) -> str:
+    """The table of all rows, with headings by group."""
     lines, group = [HEAD], ""
     for row in rows:
         if row.group != group:
@@ -179,7 +180,7 @@ def _or_dash(value: float, width: int, digits: int) -> str:
 
 
 def result_line(result: CaseResult) -> str:
-    """One image."""
+    """The line of one image."""
     figures = result.score
     return (
         f"{result.case.name:<44} visible {figures.visible:>5} measured {figures.measured:>5} repaired "
@@ -210,18 +211,18 @@ def summary_text(rows: list[ConditionRow]) -> str:
 
 
 def write_json(rows: list[ConditionRow], path: Path) -> None:
-    """Every row as an object; NaN as null."""
+    """Write every row as an object, NaN as null."""
     columns = [{k: None if v != v else v for k, v in asdict(row).items()} for row in rows]
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
-    beside.replace(path)
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)
 
 
 def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], path: Path) -> None:
-    """A small panel a kind, a bar a step: shares of the visible markers; wrong ones in red, with their count."""
+    """Plot one panel per kind, one bar per step: shares of the visible markers; wrong ones in red, with their count."""
     import matplotlib
 
-    matplotlib.weight("Agg")
+    matplotlib.use("Agg")
     from matplotlib import pyplot
 
     shown = [kind for kind in kinds if any(_is_of_kind(row, kind) for row in rows)]
@@ -235,15 +236,15 @@ def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], pa
     handles = [matplotlib.patches.Patch(color=color, label=name) for name, color in COLORS.items()]
     figure.legend(handles=handles, loc="upper center", ncols=len(handles), frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.98))
-    beside = path.with_name(path.name + ".part")
+    partial = path.with_name(path.name + ".part")
     figure.savefig(
-        beside,
+        partial,
         format=path.suffix[1:] or "png",
         dpi=110,
         metadata={"Software": None} if path.suffix == ".png" else None,
     )
     pyplot.close(figure)
-    beside.replace(path)
+    partial.replace(path)
 
 
 def _is_of_kind(row: ConditionRow, kind: ConditionKind) -> bool:
