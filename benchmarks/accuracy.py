@@ -135,14 +135,14 @@ def markdown(results: Sequence[AccuracyResult]) -> str:
     head = " | ".join(f"{preset}: of the bound | normalised" for preset in PRESETS)
     lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
     for name in dict.fromkeys(r.case for r in results):
-        mine: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
-        cells = [name, f"{mine['balanced'].inner_bound_px:.4f}"]
+        by_preset: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
+        cells = [name, f"{by_preset['balanced'].inner_bound_px:.4f}"]
         for preset in PRESETS:
             cells += [
-                f"{mine[preset].inner_px / mine[preset].inner_bound_px:.2f}",
-                f"{mine[preset].normalised:.2f}",
+                f"{by_preset[preset].inner_px / by_preset[preset].inner_bound_px:.2f}",
+                f"{by_preset[preset].normalised:.2f}",
             ]
-        lines.append(f"| {' | '.join(cells)} | {mine['accurate'].bias_px:.4f} |")
+        lines.append(f"| {' | '.join(cells)} | {by_preset['accurate'].bias_px:.4f} |")
     return "\n".join(lines)
 
 
@@ -168,9 +168,9 @@ def main(arguments: list[str] | None = None) -> int:
     console = terminal if terminal.is_terminal else Console(width=130)  # a pipe has no width
     results: list[AccuracyResult] = []
     for group, cases in GROUPS.items():
-        mine = [result for case in cases for result in measure_case(group, case, seeds)]
-        console.print(results_table(f"{group}; {seeds} noises", mine))
-        results += mine
+        of_group = [result for case in cases for result in measure_case(group, case, seeds)]
+        console.print(results_table(f"{group}; {seeds} noises", of_group))
+        results += of_group
     console.print(conditions_text(), style="dim", soft_wrap=True)
     found: dict[str, Any] = {"seeds": seeds, "results": [asdict(result) for result in results]}
     if options.json:

@@ -84,9 +84,9 @@ def normalised_squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
                     (Status.REPAIRED, "repaired"),
                     (Status.FITTED, "fitted"),
                 ):
-                    mine = markers.status == status
-                    inverse = np.linalg.inv(markers.cov_px2[mine])
-                    found[name] += list(np.einsum("mi,mij,mj->m", error[mine], inverse, error[mine]) / 2)
+                    chosen = markers.status == status
+                    inverse = np.linalg.inv(markers.cov_px2[chosen])
+                    found[name] += list(np.einsum("mi,mij,mj->m", error[chosen], inverse, error[chosen]) / 2)
     return {name: np.array(values) for name, values in found.items()}
 
 

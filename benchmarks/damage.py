@@ -97,7 +97,7 @@ def parse_case(name: str) -> StressCase:
     """
     kind, _, rest = name.partition("/")
     pattern, _, seed = rest.partition("/")
-    if kind not in {one.name for one in RANDOM_KINDS} or pattern not in PATTERNS or not seed.isdigit():
+    if kind not in {entry.name for entry in RANDOM_KINDS} or pattern not in PATTERNS or not seed.isdigit():
         raise ValueError(
             f"no image is named {name!r}; give one as '{RANDOM_KINDS[0].name}/{PATTERNS[0]}/{SEED}'"
         )
@@ -132,39 +132,41 @@ def read_cases(chosen: list[StressCase], processes: int) -> Iterator[DamageResul
 def with_progress(chosen: list[StressCase], processes: int) -> list[DamageResult]:
     """All results in the order of seeds, with the progress on stderr."""
     results, started = [], time.perf_counter()
-    for one in read_cases(chosen, processes):
-        results.append(one)
+    for entry in read_cases(chosen, processes):
+        results.append(entry)
         if sys.stderr.isatty() or len(results) % 200 == 0:
             text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
             print(text, end="\r" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
-    return sorted(results, key=lambda one: one.result.case.seed)
+    return sorted(results, key=lambda entry: entry.result.case.seed)
 
 
-def total_of_kind(kind: str, own: Sequence[DamageResult]) -> DamageTotal:
+def total_of_kind(kind: str, entries: Sequence[DamageResult]) -> DamageTotal:
     """The totals of the images of one kind."""
-    results = [one.result for one in own]
-    read_in = [one.score for one in results if not one.reason]
-    scores = [one.score for one in results]
+    results = [entry.result for entry in entries]
+    read_in = [entry.score for entry in results if not entry.reason]
+    scores = [entry.score for entry in results]
     return DamageTotal(
         kind=kind,
         images=len(results),
         unread=len(results) - len(read_in),
-        raised=sum(one.raised for one in results),
-        visible=sum(one.visible for one in scores),
-        reported=sum(one.reported for one in scores),
-        wrong=sum(one.wrong for one in scores),
-        others=sum(one.others for one in own),
-        lost=sum(one.lost for one in scores),
-        sure=sum(one.sure for one in read_in),
-        kept=sum(one.kept for one in read_in),
-        seeds=tuple((case_name(one.case), one.score.wrong) for one in results if one.score.wrong),
+        raised=sum(entry.raised for entry in results),
+        visible=sum(entry.visible for entry in scores),
+        reported=sum(entry.reported for entry in scores),
+        wrong=sum(entry.wrong for entry in scores),
+        others=sum(entry.others for entry in entries),
+        lost=sum(entry.lost for entry in scores),
+        sure=sum(entry.sure for entry in read_in),
+        kept=sum(entry.kept for entry in read_in),
+        seeds=tuple((case_name(entry.case), entry.score.wrong) for entry in results if entry.score.wrong),
     )
 
 
 def totals_by_kind(results: Sequence[DamageResult]) -> list[DamageTotal]:
     """One row per kind, and one of all images."""
     kinds = [kind.name for kind in RANDOM_KINDS]
-    rows = [total_of_kind(kind, [one for one in results if one.result.case.kind == kind]) for kind in kinds]
+    rows = [
+        total_of_kind(kind, [entry for entry in results if entry.result.case.kind == kind]) for kind in kinds
+    ]
     return [*(row for row in rows if row.images), total_of_kind("together", results)]
 
 

@@ -47,8 +47,8 @@ def make_laser_job(design: Design) -> LaserJob:
 def travel_mm(job: LaserJob) -> float:
     """Length of the travel with the beam off between the cells of every pass, in the order of burning."""
     total = 0.0
-    for one in job.cell_passes:
-        starts = one.walls.xy_mm[one.walls.first[:-1]]
+    for laser_pass in job.cell_passes:
+        starts = laser_pass.walls.xy_mm[laser_pass.walls.first[:-1]]
         total += float(np.hypot(*np.diff(starts, axis=0).T).sum())
     return total
 
@@ -64,11 +64,11 @@ def nearest_bound_mm(entries_mm: Points) -> float:
     return float(nearest.sum() - nearest.max())
 
 
-def pass_in_layout_order(one: LaserPass) -> LaserPass:
+def pass_in_layout_order(laser_pass: LaserPass) -> LaserPass:
     """The pass with its closed paths in the layout's order, each starting at its first corner."""
-    assert one.cavities is not None
-    cells = one.cavities.selected(np.argsort(one.cavities.cell))
-    return replace(one, walls=loop_strokes(cells.loops_mm, np.arange(len(cells.cell))))
+    assert laser_pass.cavities is not None
+    cells = laser_pass.cavities.selected(np.argsort(laser_pass.cavities.cell))
+    return replace(laser_pass, walls=loop_strokes(cells.loops_mm, np.arange(len(cells.cell))))
 
 
 def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
@@ -102,7 +102,9 @@ def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
 def print_travel() -> None:
     """Print the travel for 2,000 cells in three colors (and one white), with the job's paths."""
     job = make_laser_job(make_design(26, laser__corner="plain", laser__holes="false"))
-    entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
+    entries = [
+        laser_pass.cavities.entries_mm for laser_pass in job.cell_passes if laser_pass.cavities is not None
+    ]
     started = time.perf_counter()
     for cells in entries:
         order_cells(cells, "travel")

@@ -138,15 +138,15 @@ def main() -> int:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     window = ImageWindow(260, 180, 120, 120) if options.quick else ImageWindow(220, 140, 200, 200)
-    judged = make_scenes()
+    scenes = make_scenes()
     # The first of the two views is the left half.
-    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in judged}
+    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in scenes}
     errors = [
         measure_render_error(name, scene, blur_px, windows[name], SIZE)
-        for name, scene in judged.items()
+        for name, scene in scenes.items()
         for blur_px in (1.0, 0.0)
     ]
-    timed = {**judged, "steep, parts hidden": steep_scene(judged["flat"])}
+    timed = {**scenes, "steep, parts hidden": steep_scene(scenes["flat"])}
     speeds = [
         measure_speed(name, scene, QUICK_REPEATS if options.quick else REPEATS)
         for name, scene in timed.items()

@@ -104,8 +104,8 @@ def _cell_sides(
     corners = layout.marker_xy_mm[layout.cell_corners[cells]]
     share = (np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE)[:, None]
     next_corners = np.roll(corners, -1, axis=1)
-    around = corners[:, :, None] * (1 - share) + next_corners[:, :, None] * share
-    px = view.image_from_layout(around.reshape(-1, 2)).reshape(len(cells), -1, 2)
+    points = corners[:, :, None] * (1 - share) + next_corners[:, :, None] * share
+    px = view.image_from_layout(points.reshape(-1, 2)).reshape(len(cells), -1, 2)
     reach = REACH_SIGMA * blur_px + 2
     near = (px[..., 1].max(axis=1) > window.y - reach) & (
         px[..., 1].min(axis=1) < window.y + window.height + reach
@@ -182,10 +182,10 @@ def fit_edge_offsets(
     """(N,) px: the shift of every gridline inside the window along its normal, by least squares."""
     ends = layout.marker_xy_mm[layout.edges]
     middle = view.image_from_layout(ends.mean(axis=1)) - (window.x, window.y)
-    ahead = view.image_from_layout(0.45 * ends[:, 0] + 0.55 * ends[:, 1]) - (window.x, window.y) - middle
+    direction = view.image_from_layout(0.45 * ends[:, 0] + 0.55 * ends[:, 1]) - (window.x, window.y) - middle
     slope_y, slope_x = np.gradient(true, axis=(0, 1))
     shifts = []
-    for (x, y), (along_x, along_y) in zip(middle, ahead, strict=True):
+    for (x, y), (along_x, along_y) in zip(middle, direction, strict=True):
         left, top = int(np.ceil(x - MIDDLE_PX)), int(np.ceil(y - MIDDLE_PX))
         right, bottom = int(np.floor(x + MIDDLE_PX)) + 1, int(np.floor(y + MIDDLE_PX)) + 1
         if left < 1 or top < 1 or right >= window.width or bottom >= window.height:

@@ -176,18 +176,18 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
     }
 
 
-def _summarise_method(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _summarise_method(readings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     counts = {
-        name: SuccessShare(len(found), sum(is_successful(name, one) for one in found)).to_json()
+        name: SuccessShare(len(readings), sum(is_successful(name, judged) for judged in readings)).to_json()
         for name in SUCCESS_CRITERIA
     }
     return {
         **counts["strict"],
         "by_criterion": counts,
         "right_in_area_percent": sample_statistics(
-            [100 * one["right"] / max(one["needed"], 1) for one in found]
+            [100 * judged["right"] / max(judged["needed"], 1) for judged in readings]
         ).to_json(),
-        "wrong_markers": sum(one["wrong"] for one in found),
-        "trials_with_wrong": sum(one["wrong"] > 0 for one in found),
-        "rms_px": sample_statistics([one["rms_px"] for one in found]).to_json(),
+        "wrong_markers": sum(judged["wrong"] for judged in readings),
+        "trials_with_wrong": sum(judged["wrong"] > 0 for judged in readings),
+        "rms_px": sample_statistics([judged["rms_px"] for judged in readings]).to_json(),
     }

@@ -65,12 +65,12 @@ def comparison_markdown(results: Sequence[MethodResult]) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for method in METHODS:
-        mine = [r for r in results if r.method == method.name]
-        flat = next(r for r in mine if r.scene == "flat")
-        worst = max(mine, key=lambda r: r.inner_px / r.bound_px)
+        of_method = [r for r in results if r.method == method.name]
+        flat = next(r for r in of_method if r.scene == "flat")
+        worst = max(of_method, key=lambda r: r.inner_px / r.bound_px)
         cells = (
-            method.name, "checkerboard" if method.board else "pattern", f"{min(r.found_share for r in mine):.0%}",
-            str(sum(r.wrong for r in mine)), f"{flat.inner_px:.4f}", f"{flat.inner_px / flat.bound_px:.2f}",
+            method.name, "checkerboard" if method.board else "pattern", f"{min(r.found_share for r in of_method):.0%}",
+            str(sum(r.wrong for r in of_method)), f"{flat.inner_px:.4f}", f"{flat.inner_px / flat.bound_px:.2f}",
             f"{worst.inner_px / worst.bound_px:.2f}, {worst.scene}", f"{flat.ms:.1f}", f"{flat.ratio:.2f}",
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")

@@ -75,36 +75,36 @@ def condition_rows(results: Iterable[CaseResult], kinds: Sequence[ConditionKind]
     rows = []
     for kind in kinds:
         for step in kind.steps:
-            own = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
-            if own:
-                rows.append(_condition_row(kind, sorted(own, key=lambda r: r.case.name)))
+            of_condition = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
+            if of_condition:
+                rows.append(_condition_row(kind, sorted(of_condition, key=lambda r: r.case.name)))
     return rows
 
 
-def _condition_row(kind: ConditionKind, own: list[CaseResult]) -> ConditionRow:
-    promised = [r for r in own if r.score.promised]
+def _condition_row(kind: ConditionKind, of_condition: list[CaseResult]) -> ConditionRow:
+    promised = [r for r in of_condition if r.score.promised]
     counted = ("visible", "measured", "repaired", "fitted", "lost", "reported", "wrong", "outside", "hidden")
-    reasons = sorted({r.reason for r in own if r.reason})
+    reasons = sorted({r.reason for r in of_condition if r.reason})
     return ConditionRow(
-        condition=own[0].case.condition,
+        condition=of_condition[0].case.condition,
         group=kind.group,
-        images=len(own),
-        **{name: sum(getattr(r.score, name) for r in own) for name in counted},
+        images=len(of_condition),
+        **{name: sum(getattr(r.score, name) for r in of_condition) for name in counted},
         sure=sum(r.score.sure for r in promised),
         kept=sum(r.score.kept for r in promised),
-        promised=f"{len(promised)}/{len(own)}"
-        if 0 < len(promised) < len(own)
+        promised=f"{len(promised)}/{len(of_condition)}"
+        if 0 < len(promised) < len(of_condition)
         else ("yes" if promised else "no"),
-        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in own]),
+        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in of_condition]),
         repaired_rms_px=_pooled_rms(
-            [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in own]
+            [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in of_condition]
         ),
-        ms=_median([r.ms for r in own]),
-        ratio=_median([r.ratio for r in own]),
-        raised=sum(r.raised for r in own),
+        ms=_median([r.ms for r in of_condition]),
+        ratio=_median([r.ratio for r in of_condition]),
+        raised=sum(r.raised for r in of_condition),
         reasons=", ".join(reasons),
-        worst=max(own, key=_severity).case.name,
-        slowest=max(own, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
+        worst=max(of_condition, key=_severity).case.name,
+        slowest=max(of_condition, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
     )
 
 
@@ -198,14 +198,14 @@ def summary_text(rows: list[ConditionRow]) -> str:
     }
     empty = [row for row in rows if row.group == "nothing"]
     promised = [row for row in rows if row.sure]
-    held = sum(row.kept_share >= PROMISED_SHARE for row in promised)
+    kept_promises = sum(row.kept_share >= PROMISED_SHARE for row in promised)
     slow = sum(row.ratio > SLOWEST_RATIO for row in rows)
     images = sum(row.images for row in empty)
     return (
         f"{len(rows)} conditions, {total['images']} images, {total['visible']} visible markers\n"
         f"{total['wrong']} wrong of {total['reported']} reported, {sum(row.wrong for row in empty)} of them on "
         f"{images} images without a pattern\n"
-        f"promise (99 % measured or repaired) held in {held} of {len(promised)} conditions, "
+        f"promise (99 % measured or repaired) held in {kept_promises} of {len(promised)} conditions, "
         f"{100 * total['kept'] / max(total['sure'], 1):.2f} % together; slower than {SLOWEST_RATIO} x plain: {slow}"
     )
 

@@ -14,8 +14,8 @@ from cmpdesign.scene import Busy, Gradient, Paper, Picture, Plain, Press, Twist,
 
 def pattern_behind(frame: PatternFrame, pitch_px: float) -> PatternFrame:
     """A larger pattern without a white cell as background."""
-    behind = plain_frame("honeycomb", frame.scene.seed + 1, 24).with_camera(pitch_px=pitch_px)
-    image = render(behind.with_inks(white=behind.scene.inks["black"]).scene, size=frame.size).image
+    background = plain_frame("honeycomb", frame.scene.seed + 1, 24).with_camera(pitch_px=pitch_px)
+    image = render(background.with_inks(white=background.scene.inks["black"]).scene, size=frame.size).image
     return frame.with_parts(background=Picture(np.asarray(image, dtype=np.uint8)))
 
 

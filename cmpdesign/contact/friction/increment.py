@@ -173,8 +173,8 @@ def _points_in_object_frame(problem: ContactProblem, state: ContactState, motion
     """(2, ny, nx) positions of all points in the object's initial frame if they move with the object."""
     if problem.friction == 0:
         return motion.brought_back(problem.grid.xy_mm, problem.indenter.centre_mm)
-    moved = problem.grid.xy_mm + state.displacement_mm[:2] - state.press_displacement_mm
-    return state.motion.brought_back(moved, problem.indenter.centre_mm)
+    position = problem.grid.xy_mm + state.displacement_mm[:2] - state.press_displacement_mm
+    return state.motion.brought_back(position, problem.indenter.centre_mm)
 
 
 def _solve_in_box(

@@ -147,9 +147,9 @@ def marker_covariances(information: Any, truth: Truth) -> NDArray[np.float64]:
     markers = len(truth.visible)
     solver = splu((information + PRIOR_PER_PX2 * eye_array(2 * markers)).tocsc())
     covariance = np.full((markers, 2, 2), np.nan)
-    wanted = np.flatnonzero(truth.visible)
-    for first in range(0, len(wanted), SOLVED_AT_ONCE):
-        chosen = wanted[first : first + SOLVED_AT_ONCE]
+    visible = np.flatnonzero(truth.visible)
+    for first in range(0, len(visible), SOLVED_AT_ONCE):
+        chosen = visible[first : first + SOLVED_AT_ONCE]
         unit = np.zeros((2 * markers, 2 * len(chosen)))
         entries = np.stack([2 * chosen, 2 * chosen + 1], axis=-1).ravel()
         unit[entries, np.arange(len(entries))] = 1.0
