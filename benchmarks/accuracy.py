@@ -62,7 +62,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class AccuracyResult:
-    """A preset on a case, over all noises; see the module. ``wrong``: farther off than 0.3 of the shortest edge."""
+    """A preset on a case, over all noise seeds; see the module. ``wrong``: error above 0.3 of the shortest edge."""
 
     group: str
     case: str
@@ -79,6 +79,7 @@ class AccuracyResult:
 
 
 def case_name(group: str, case: SceneCase) -> str:
+    """The name of a case in the tables of its group."""
     value = {"blur": f"blur {case.blur_px:g} px", "noise": f"noise {case.noise:g}/255"}
     value |= {"pitch": f"edges of {case.pitch_px:g} px", "scenes": f"{case.pattern}, {case.kind}"}
     return value[group]
@@ -89,12 +90,12 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyRe
     scene = case.scene()
     inner = inner_markers(scene.layout)
     bounds = bound_rms_px(scene, inner, np.ones_like(inner))
-    seen = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
-    visible = seen[0].truth.visible
-    true = seen[0].truth.marker_xy_px
+    rendered = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
+    visible = rendered[0].truth.visible
+    true = rendered[0].truth.marker_xy_px
     for preset in PRESETS:
         extractor = cached_extractor(case, preset)
-        read = [extractor.extract(picture.image) for picture in seen]
+        read = [extractor.extract(picture.image) for picture in rendered]
         errors = np.array([markers.xy_px for markers in read]) - true
         wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
         found = np.isfinite(errors[..., 0]) & visible
@@ -112,6 +113,7 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyRe
 
 
 def rms(errors: NDArray[np.float64]) -> float:
+    """Root mean square; NaN without values."""
     return float(np.sqrt(np.mean(errors**2))) if len(errors) else float("nan")
 
 
@@ -129,18 +131,18 @@ def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
 
 
 def markdown(results: Sequence[AccuracyResult]) -> str:
-    """A row a case, a column a preset: error in bounds, and the normalised error."""
+    """One row per case, columns per preset: error over the bound, and the normalised error."""
     head = " | ".join(f"{preset}: of the bound | normalised" for preset in PRESETS)
     lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
     for name in dict.fromkeys(r.case for r in results):
-        mine: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
-        cells = [name, f"{mine['balanced'].inner_bound_px:.4f}"]
+        by_preset: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
+        cells = [name, f"{by_preset['balanced'].inner_bound_px:.4f}"]
         for preset in PRESETS:
             cells += [
-                f"{mine[preset].inner_px / mine[preset].inner_bound_px:.2f}",
-                f"{mine[preset].normalised:.2f}",
+                f"{by_preset[preset].inner_px / by_preset[preset].inner_bound_px:.2f}",
+                f"{by_preset[preset].normalised:.2f}",
             ]
-        lines.append(f"| {' | '.join(cells)} | {mine['accurate'].bias_px:.4f} |")
+        lines.append(f"| {' | '.join(cells)} | {by_preset['accurate'].bias_px:.4f} |")
     return "\n".join(lines)
 
 
@@ -166,9 +168,9 @@ def main(arguments: list[str] | None = None) -> int:
     console = terminal if terminal.is_terminal else Console(width=130)  # a pipe has no width
     results: list[AccuracyResult] = []
     for group, cases in GROUPS.items():
-        mine = [result for case in cases for result in measure_case(group, case, seeds)]
-        console.print(results_table(f"{group}; {seeds} noises", mine))
-        results += mine
+        of_group = [result for case in cases for result in measure_case(group, case, seeds)]
+        console.print(results_table(f"{group}; {seeds} noises", of_group))
+        results += of_group
     console.print(conditions_text(), style="dim", soft_wrap=True)
     found: dict[str, Any] = {"seeds": seeds, "results": [asdict(result) for result in results]}
     if options.json:

@@ -1,9 +1,9 @@
-"""How true covariances are where something is damaged: 108 pictures, three patterns on three surfaces.
+"""Calibration of covariances under damage: 108 pictures, three patterns on three surfaces.
 
     python -m benchmarks.calibration
 
-Error over its stated deviation, per axis: its root mean square, and its median over that of a normal one (1 is true).
-Measured markers by kind of damage; repaired and fitted ones together.
+Error over its stated deviation, per axis: the root mean square, and the median over a normal distribution's median (1
+is ideal). Measured markers are listed by kind of damage; repaired and fitted markers over all kinds.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ SURFACES = {
 
 
 def sample_damages(seed: int) -> Iterator[Damage]:
-    """Cells that fell out; dirt; dark dirt; two large blots."""
+    """One damage of each kind: missing cells, dirt, dark dirt, two large blots."""
     rng = np.random.default_rng(seed)
 
     def spots(count: int, low_mm: float, high_mm: float, rgb: tuple[float, float, float]) -> tuple[Blob, ...]:
@@ -63,7 +63,7 @@ def sample_damages(seed: int) -> Iterator[Damage]:
 
 @cache
 def normalised_squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
-    """Squared errors over covariance per axis: of measured markers by ``DAMAGE_KINDS``, of repaired and fitted ones."""
+    """Squared errors over covariance per axis, of measured markers by ``DAMAGE_KINDS``, of repaired and fitted ones."""
     found: dict[str, list[float]] = {name: [] for name in (*DAMAGE_KINDS, "repaired", "fitted")}
     for pattern in ("honeycomb", "round", "elliptical"):
         layout = standard_layout(pattern, LAYERS)
@@ -75,18 +75,18 @@ def normalised_squares(preset: Preset) -> dict[str, NDArray[np.float64]]:
             for seed, damage in enumerate(
                 damage for draw in range(DRAWS) for damage in sample_damages(DRAWS * number + draw)
             ):
-                seen = render(replace(plain, damage=damage, seed=seed), size=SIZE)
-                markers = extractor.extract(seen.image)
-                error = markers.xy_px - seen.truth.marker_xy_px
+                rendered = render(replace(plain, damage=damage, seed=seed), size=SIZE)
+                markers = extractor.extract(rendered.image)
+                error = markers.xy_px - rendered.truth.marker_xy_px
                 kind = DAMAGE_KINDS[seed % len(DAMAGE_KINDS)]
                 for status, name in (
                     (Status.MEASURED, kind),
                     (Status.REPAIRED, "repaired"),
                     (Status.FITTED, "fitted"),
                 ):
-                    mine = markers.status == status
-                    inverse = np.linalg.inv(markers.cov_px2[mine])
-                    found[name] += list(np.einsum("mi,mij,mj->m", error[mine], inverse, error[mine]) / 2)
+                    chosen = markers.status == status
+                    inverse = np.linalg.inv(markers.cov_px2[chosen])
+                    found[name] += list(np.einsum("mi,mij,mj->m", error[chosen], inverse, error[chosen]) / 2)
     return {name: np.array(values) for name, values in found.items()}
 
 

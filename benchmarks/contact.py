@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from cmpdesign.contact.elastic_layer.green import green_kernels
 from cmpdesign.scene import standard_layout
 
 Array = NDArray[np.float64]
-LAYER = Elastomer(4.0, 0.3)
+ELASTOMER = Elastomer(4.0, 0.3)
 SIZE_MM = (30.0, 30.0)
 GRID, FINE = 256, 448
 LIMIT_S = 1.0
@@ -50,7 +51,7 @@ CASES = (
 
 @dataclass(frozen=True)
 class ContactFigures:
-    """What one case took, and how far its markers are from where a finer grid has them."""
+    """Time and error of one case: markers' distances from their positions on a finer grid."""
 
     name: str
     cells_in_contact: int
@@ -63,27 +64,35 @@ class ContactFigures:
     force_percent: float
 
 
-def timed_contact(case: Case, grid: int) -> tuple[Contact, float, float]:
-    """The contact, the processor's seconds and the clock's."""
+class TimedContact(NamedTuple):
+    """A contact with its processor time and wall time in s."""
+
+    contact: Contact
+    cpu_s: float
+    wall_s: float
+
+
+def timed_contact(case: Case, grid: int) -> TimedContact:
+    """Solve a contact and measure its time."""
     started, began = time.process_time(), time.perf_counter()
-    found = solve(LAYER, case.indenter, case.motion, friction=case.friction, size_mm=SIZE_MM, grid=grid)
-    return found, time.process_time() - started, time.perf_counter() - began
+    found = solve(ELASTOMER, case.indenter, case.motion, friction=case.friction, size_mm=SIZE_MM, grid=grid)
+    return TimedContact(found, time.process_time() - started, time.perf_counter() - began)
 
 
 def measure_contact(case: Case, runs: int, markers_mm: Array) -> ContactFigures:
-    """Cold is the first contact on a layer and grid, warm the best of some with its kernels at hand."""
+    """Measure a case. Cold: the first contact on an elastic layer and grid; warm: the best of some with its kernels."""
     green_kernels.cache_clear()
-    found, cold, wall = timed_contact(case, GRID)
-    warm = min(timed_contact(case, GRID)[1] for _ in range(runs))
-    fine, *_ = timed_contact(case, FINE)
+    cold = timed_contact(case, GRID)
+    warm_s = min(timed_contact(case, GRID).cpu_s for _ in range(runs))
+    found, fine = cold.contact, timed_contact(case, FINE).contact
     error = np.linalg.norm(found.surface()(markers_mm) - fine.surface()(markers_mm), axis=1)
     return ContactFigures(
         name=case.name,
         cells_in_contact=int(found.in_contact.sum()),
         applications=found.iterations,
-        cold_s=cold,
-        warm_s=warm,
-        wall_s=wall,
+        cold_s=cold.cpu_s,
+        warm_s=warm_s,
+        wall_s=cold.wall_s,
         rms_um=1e3 * float(np.sqrt(np.mean(error**2))),
         largest_um=1e3 * float(error.max()),
         force_percent=100
@@ -92,7 +101,7 @@ def measure_contact(case: Case, runs: int, markers_mm: Array) -> ContactFigures:
 
 
 def closed_form_errors() -> dict[str, float]:
-    """Percent off, on layers 1e5 mm thick, contact over the middle third of the grid and more."""
+    """Errors in percent against closed forms, on elastic layers 1e5 mm thick; the contact spans a third of the grid."""
     thick = Elastomer(1e5, 1.0)
     a = math.sqrt(10.0 * 0.01)
     hertz = solve(thick, Ball(10.0), Motion(0.01), friction=0, size_mm=(3 * a, 3 * a), grid=GRID)
@@ -100,16 +109,16 @@ def closed_form_errors() -> dict[str, float]:
     twist = solve(
         thick, Punch(1.0), Motion(1e-3, twist_deg=0.01), friction=math.inf, size_mm=(2.5, 2.5), grid=GRID
     )
-    wanted = {
+    pairs = {
         "ball (Hertz), force": (-hertz.force_n[2], 16 / 9 * math.sqrt(10.0) * 0.01**1.5),
         "flat punch (Sneddon), force": (-punch.force_n[2], 8 / 3 * 1e-3),
         "stuck punch (Reissner-Sagoci), torque": (twist.moment_nmm[2], 16 / 9 * math.radians(0.01)),
     }
-    return {name: 100 * float(found / exact - 1) for name, (found, exact) in wanted.items()}
+    return {name: 100 * float(found / exact - 1) for name, (found, exact) in pairs.items()}
 
 
 def contact_table(rows: list[ContactFigures]) -> Table:
-    """As it is printed."""
+    """The table of the terminal."""
     title = (
         f"Contact, {GRID} x {GRID} cells, {SIZE_MM[0]:g} x {SIZE_MM[1]:g} mm, layer of 4 mm, incompressible"
     )
@@ -142,7 +151,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
     options = parser.parse_args(arguments)
     markers = standard_layout("honeycomb", 8).marker_xy_mm * 1.5
-    solve(LAYER, Ball(5.0), Motion(0.1), grid=32)  # loads what is loaded on first use
+    solve(ELASTOMER, Ball(5.0), Motion(0.1), grid=32)  # loads what is loaded on first use
     rows = [measure_contact(case, 1 if options.quick else 3, markers) for case in CASES]
     console = Console() if Console().is_terminal else Console(width=110)
     console.print(contact_table(rows))

@@ -44,7 +44,7 @@ class DamageResult:
     """One image.
 
     Attributes:
-        others: of the wrong markers those that lie nearer to another one's true place than to their own.
+        others: wrong markers that lie nearer to another marker's true position than to their own.
     """
 
     result: CaseResult
@@ -53,12 +53,12 @@ class DamageResult:
 
 @dataclass(frozen=True)
 class DamageTotal:
-    """All images of one kind. Counts are of markers; unread are images that nothing was read in.
+    """All images of one kind. Counts are of markers; ``unread`` counts images without any marker.
 
     Attributes:
         lost: visible and not reported.
-        sure, kept: see the suite's ``Score``; only of images in which something was read.
-        seeds: names of the images with wrong markers, and how many.
+        sure, kept: see ``MarkerScore``; only of images with markers.
+        seeds: names of the images with wrong markers, and the numbers of these.
     """
 
     kind: str
@@ -76,7 +76,7 @@ class DamageTotal:
 
 
 def sample_cases(images: int, seed: int) -> list[StressCase]:
-    """The kinds in turn, each in all patterns; every image has a seed of its own, from ``seed`` on."""
+    """The kinds in turn, each in all patterns; every image has its own seed, from ``seed`` on."""
     kinds = [kind.name for kind in RANDOM_KINDS]
     return [
         StressCase(kinds[n % len(kinds)], 0, PATTERNS[n // len(kinds) % len(PATTERNS)], seed + n)
@@ -85,14 +85,19 @@ def sample_cases(images: int, seed: int) -> list[StressCase]:
 
 
 def case_name(case: StressCase) -> str:
+    """The name of an image, ``kind/pattern/seed``."""
     return f"{case.kind}/{case.pattern}/{case.seed}"
 
 
 def parse_case(name: str) -> StressCase:
-    """Raises ``ValueError`` where no image is named so."""
+    """The case of a name of ``case_name``.
+
+    Raises:
+        ValueError: no image has this name.
+    """
     kind, _, rest = name.partition("/")
     pattern, _, seed = rest.partition("/")
-    if kind not in {one.name for one in RANDOM_KINDS} or pattern not in PATTERNS or not seed.isdigit():
+    if kind not in {entry.name for entry in RANDOM_KINDS} or pattern not in PATTERNS or not seed.isdigit():
         raise ValueError(
             f"no image is named {name!r}; give one as '{RANDOM_KINDS[0].name}/{PATTERNS[0]}/{SEED}'"
         )
@@ -100,11 +105,11 @@ def parse_case(name: str) -> StressCase:
 
 
 def count_swapped_markers(shot: CaseImage, markers: Markers) -> int:
-    """How many wrong markers lie nearer to another one's true place than to their own."""
+    """The number of wrong markers that lie nearer to another marker's true position than to their own."""
     wrong, truth = find_wrong_markers(shot, markers)
-    places: NDArray[np.float64] = truth.marker_xy_px
-    apart = np.linalg.norm(markers.xy_px[wrong][:, None] - places, axis=2)
-    return int((apart.argmin(axis=1) != np.flatnonzero(wrong)).sum()) if wrong.any() else 0
+    true_px: NDArray[np.float64] = truth.marker_xy_px
+    distance_px = np.linalg.norm(markers.xy_px[wrong][:, None] - true_px, axis=2)
+    return int((distance_px.argmin(axis=1) != np.flatnonzero(wrong)).sum()) if wrong.any() else 0
 
 
 def _read_case(case: StressCase) -> DamageResult:
@@ -115,7 +120,7 @@ def _read_case(case: StressCase) -> DamageResult:
 
 
 def read_cases(chosen: list[StressCase], processes: int) -> Iterator[DamageResult]:
-    """Results as they come."""
+    """Results in the order of completion."""
     if processes == 1:
         warm_up()
         yield from map(_read_case, chosen)
@@ -125,39 +130,43 @@ def read_cases(chosen: list[StressCase], processes: int) -> Iterator[DamageResul
 
 
 def with_progress(chosen: list[StressCase], processes: int) -> list[DamageResult]:
+    """All results in the order of seeds, with the progress on stderr."""
     results, started = [], time.perf_counter()
-    for one in read_cases(chosen, processes):
-        results.append(one)
+    for entry in read_cases(chosen, processes):
+        results.append(entry)
         if sys.stderr.isatty() or len(results) % 200 == 0:
             text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
             print(text, end="\r" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
-    return sorted(results, key=lambda one: one.result.case.seed)
+    return sorted(results, key=lambda entry: entry.result.case.seed)
 
 
-def total_of_kind(kind: str, own: Sequence[DamageResult]) -> DamageTotal:
-    results = [one.result for one in own]
-    read_in = [one.score for one in results if not one.reason]
-    scores = [one.score for one in results]
+def total_of_kind(kind: str, entries: Sequence[DamageResult]) -> DamageTotal:
+    """The totals of the images of one kind."""
+    results = [entry.result for entry in entries]
+    read_in = [entry.score for entry in results if not entry.reason]
+    scores = [entry.score for entry in results]
     return DamageTotal(
         kind=kind,
         images=len(results),
         unread=len(results) - len(read_in),
-        raised=sum(one.raised for one in results),
-        visible=sum(one.visible for one in scores),
-        reported=sum(one.reported for one in scores),
-        wrong=sum(one.wrong for one in scores),
-        others=sum(one.others for one in own),
-        lost=sum(one.lost for one in scores),
-        sure=sum(one.sure for one in read_in),
-        kept=sum(one.kept for one in read_in),
-        seeds=tuple((case_name(one.case), one.score.wrong) for one in results if one.score.wrong),
+        raised=sum(entry.raised for entry in results),
+        visible=sum(entry.visible for entry in scores),
+        reported=sum(entry.reported for entry in scores),
+        wrong=sum(entry.wrong for entry in scores),
+        others=sum(entry.others for entry in entries),
+        lost=sum(entry.lost for entry in scores),
+        sure=sum(entry.sure for entry in read_in),
+        kept=sum(entry.kept for entry in read_in),
+        seeds=tuple((case_name(entry.case), entry.score.wrong) for entry in results if entry.score.wrong),
     )
 
 
 def totals_by_kind(results: Sequence[DamageResult]) -> list[DamageTotal]:
-    """A row a kind, and one of all."""
+    """One row per kind, and one of all images."""
     kinds = [kind.name for kind in RANDOM_KINDS]
-    rows = [total_of_kind(kind, [one for one in results if one.result.case.kind == kind]) for kind in kinds]
+    rows = [
+        total_of_kind(kind, [entry for entry in results if entry.result.case.kind == kind]) for kind in kinds
+    ]
     return [*(row for row in rows if row.images), total_of_kind("together", results)]
 
 
@@ -168,7 +177,7 @@ HEAD = (
 
 
 def totals_table(rows: Sequence[DamageTotal]) -> str:
-    """As printed; ``ids`` are the wrong markers that lie where another one is."""
+    """The printed table; ``ids`` are the wrong markers at another marker's position."""
     lines = [HEAD]
     for row in rows:
         share = f"{100 * row.kept / row.sure:.2f}" if row.sure else "-"
@@ -183,7 +192,7 @@ def totals_table(rows: Sequence[DamageTotal]) -> str:
 
 
 def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
-    """Read one image here, print what is wrong in it, and write it with its overlay."""
+    """Read one image in this process, print its wrong markers, and write the image with its overlay."""
     import cv2
 
     warm_up()
@@ -201,13 +210,14 @@ def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
 
 
 def write_json(rows: Sequence[DamageTotal], path: Path) -> None:
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(json.dumps([row.__dict__ for row in rows], indent=1) + "\n", encoding="utf-8")
-    beside.replace(path)
+    """Write every row as an object."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps([row.__dict__ for row in rows], indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print a row a kind and the images with wrong markers; 1 when there is one, or an image raised."""
+    """Print one row per kind and the images with wrong markers. Returns 1 if there is one, or an image raised."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.damage", description=__doc__.split("\n")[0])
     parser.add_argument("--images", type=int, default=IMAGES, metavar="N")
     parser.add_argument("--seed", type=int, default=SEED, metavar="S", help="of the first image")
@@ -215,20 +225,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--save", type=Path, metavar="DIR", help="with --only: write image and overlay here")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
-    asked = parser.parse_args(arguments)
-    if asked.with_one_pass:
+    options = parser.parse_args(arguments)
+    if options.only:
         try:
-            result = read_one_image(parse_case(asked.with_one_pass), asked.save)
+            result = read_one_image(parse_case(options.only), options.save)
         except ValueError as error:
             parser.error(str(error))
         return int(result.score.wrong > 0 or result.raised)
     started = time.perf_counter()
-    rows = totals_by_kind(with_progress(sample_cases(asked.images, asked.seed), asked.processes))
+    rows = totals_by_kind(with_progress(sample_cases(options.images, options.seed), options.processes))
     print(totals_table(rows))
-    last = asked.seed + asked.images - 1
-    print(f"{asked.images} images, seeds {asked.seed} to {last}; {time.perf_counter() - started:.0f} s")
-    if asked.json:
-        write_json(rows, asked.json)
+    last = options.seed + options.images - 1
+    print(f"{options.images} images, seeds {options.seed} to {last}; {time.perf_counter() - started:.0f} s")
+    if options.json:
+        write_json(rows, options.json)
     return int(any(row.wrong or row.raised for row in rows))
 
 

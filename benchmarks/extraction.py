@@ -2,8 +2,8 @@
 
     python -m benchmarks.extraction [--quick] [--json FILE] [--publish]
 
-One core, warm code, every image new to the extractor (no previous frame is used). What it finds is counted too;
-``benchmarks.accuracy`` says how precise it is.
+One core, compiled code, every image new to the extractor (no previous frame is used). Found markers are counted too;
+``benchmarks.accuracy`` measures their precision.
 """
 
 from __future__ import annotations
@@ -41,13 +41,12 @@ PITCH_PX = 20.0
 SIZE = (640, 480)
 PIXELS_MP = (0.3, 0.6, 1.2, 2.4, 4.8, 8.0, 12.0, 20.0)
 MARKER_LAYERS = (3, 5, 8, 12, 18, 27, 41, 64, 99)  # 37 to 29,701 markers
-MARGIN = 1.02  # of a picture around its pattern, and
-BORDER_PX = 40
+MARGIN, BORDER_PX = 1.02, 40  # a picture is this factor larger than its pattern, plus this border
 
 
 @dataclass(frozen=True)
 class Speed:
-    """Times of one scene: milliseconds in total and per stage."""
+    """Times of one scene: milliseconds in total and by stage."""
 
     name: str
     megapixels: float
@@ -61,15 +60,16 @@ class Speed:
 
 
 def make_extractor(layout: Layout, preset: Preset = "balanced") -> Extractor:
+    """An extractor of a layout of this package."""
     return Extractor(parse_layout(layout_to_json(layout)), preset)
 
 
 def wrong_ids(layout: Layout, markers: Markers, rendered: Rendered) -> int:
-    """Measured markers farther than 0.3 of their shortest edge from the truth."""
+    """The number of measured markers with an error above 0.3 of their shortest edge."""
     true = rendered.truth.marker_xy_px
     measured = markers.status == Status.MEASURED
-    away = np.hypot(*(markers.xy_px - true).T)
-    return int((away[measured] > WRONG_SHARE * shortest_edges(layout, true)[measured]).sum())
+    error_px = np.hypot(*(markers.xy_px - true).T)
+    return int((error_px[measured] > WRONG_SHARE * shortest_edges(layout, true)[measured]).sum())
 
 
 def measure_speed(
@@ -80,7 +80,7 @@ def measure_speed(
     runs: int,
     preset: Preset = "balanced",
 ) -> Speed:
-    """Time the extraction of one scene; two runs before the clock starts."""
+    """Time the extraction of one scene, after two runs that are not timed."""
     scene = standard_scene(layout)
     rendered = render(replace(scene, camera=Camera(pitch_px, rotation_deg=7.3)), size=size)
     extractor = make_extractor(layout, preset)
@@ -101,20 +101,20 @@ def measure_speed(
 
 
 def image_size_px(megapixels: float) -> tuple[int, int]:
-    """4 : 3."""
+    """Width and height in px of a 4 : 3 image."""
     height = round((megapixels * 1e6 * 3 / 4) ** 0.5)
     return round(height * 4 / 3), height
 
 
 def measure_over_pixels(runs: int) -> list[Speed]:
-    """One pattern of 331 markers, the whole picture growing."""
+    """One pattern of 331 markers in images of increasing size."""
     layout = standard_layout("honeycomb", LAYERS)
     sizes = [(mp, image_size_px(mp)) for mp in PIXELS_MP]
     return [measure_speed(f"{mp:g} MP", layout, PITCH_PX * size[1] / 480, size, runs) for mp, size in sizes]
 
 
 def measure_over_markers(runs: int) -> list[Speed]:
-    """Patterns of ever more layers with edges of 20 px, the picture as large as the pattern."""
+    """Patterns of increasing layers with edges of 20 px, in images of the pattern's size."""
     return [
         measure_speed(f"{n} layers", standard_layout("honeycomb", n), PITCH_PX, picture_px(n), runs)
         for n in MARKER_LAYERS
@@ -122,6 +122,7 @@ def measure_over_markers(runs: int) -> list[Speed]:
 
 
 def picture_px(layers: int) -> tuple[int, int]:
+    """Width and height in px of an image of a whole pattern."""
     side = round(2 * layers * PITCH_PX * MARGIN) + BORDER_PX
     return side, side
 
@@ -169,7 +170,7 @@ def stage_table(results: Sequence[Speed]) -> Table:
 
 
 def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str, Any]:
-    """How times grow: the exponent of the best ones, of all and of the larger half; by stage, of the larger half."""
+    """Exponents of the best times, over all sizes and over the larger half; by stage, over the larger half."""
     x, y = [unit(result) for result in results], [result.best_ms for result in results]
     large = len(results) // 2
     stages = {
@@ -194,15 +195,16 @@ def growth_table(title: str, largest: Speed, grown: dict[str, Any]) -> Table:
     return make_table(title, ("stage", "ms", "share", "exponent"), rows)
 
 
-def growth_text(unit: str, fit: dict[str, Any]) -> str:
+def growth_text(unit: str, grown: dict[str, Any]) -> str:
+    """The caption of a table on growth."""
     return (
-        f"time ~ {unit}^{fit['exponent']:.2f}, ^{fit['exponent_large']:.2f} over the larger half; straight line "
-        f"through the best times: {fit['ms_at_zero']:.1f} ms + {fit['ms_per_unit']:.3g} ms per {unit}"
+        f"time ~ {unit}^{grown['exponent']:.2f}, ^{grown['exponent_large']:.2f} over the larger half; straight line "
+        f"through the best times: {grown['ms_at_zero']:.1f} ms + {grown['ms_per_unit']:.3g} ms per {unit}"
     )
 
 
 def run_all(quick: bool) -> tuple[dict[str, Any], list[Table]]:
-    """Everything, as data and as tables."""
+    """All results, as data and as tables."""
     runs = 7 if quick else 31
     usual = standard_layout("honeycomb", LAYERS)
     presets = [measure_speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
@@ -239,7 +241,7 @@ def markdown(results: dict[str, Any]) -> dict[str, str]:
     """The tables of docs/accuracy.md, by block."""
     found = {}
     for name, key, unit in (("pixels", "over_pixels", "megapixels"), ("markers", "over_markers", "markers")):
-        rows, fit = results[key], results["growth"][unit]
+        rows, grown = results[key], results["growth"][unit]
         head = "MP" if unit == "megapixels" else "markers"
         lines = [
             f"| {head} | {' | '.join(f'{r[unit]:.0f}' if r[unit] > 30 else f'{r[unit]:.1f}' for r in rows)} |",
@@ -249,7 +251,7 @@ def markdown(results: dict[str, Any]) -> dict[str, str]:
         slowest = sorted(rows[-1]["stages_ms"].items(), key=lambda pair: -pair[1])[:4]
         total = rows[-1]["median_ms"]
         words = ", ".join(f"`{stage}` {ms / total:.0%}" for stage, ms in slowest)
-        lines += ["", f"Exponent {fit['exponent']:.2f}; over the larger half {fit['exponent_large']:.2f}. "
+        lines += ["", f"Exponent {grown['exponent']:.2f}; over the larger half {grown['exponent_large']:.2f}. "
                   f"At the largest: {words}."]  # fmt: skip
         found[f"scaling-{name}"] = "\n".join(lines)
     return found

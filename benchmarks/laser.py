@@ -1,6 +1,6 @@
-"""Laser jobs: travel against vpype, time to write all formats, areas over kerf. One run prints every figure.
+"""Laser jobs: travel against vpype, time to write all formats, areas over kerf. One run prints all figures.
 
-vpype pins old packages, so it gets an environment of its own, made on the first run.
+vpype needs old packages, so it is installed in its own environment on the first run.
 """
 
 from __future__ import annotations
@@ -34,26 +34,27 @@ PX_IN_MM = 96 / 25.4
 
 
 def make_design(layers: int, **options: str) -> Design:
-    """A honeycomb of 1.5 mm, on a bed that is large enough; 3 n^2 + 1 cells are carved of n layers."""
+    """A honeycomb with a pitch of 1.5 mm on a sufficiently large bed; n layers have 3 n^2 + 1 carved cells."""
     given = {"layers": str(layers), "pitch_mm": "1.5", "laser.machine": "co2-40w", "fiducials.count": "0"}
     return load_design("honeycomb", given | {key.replace("__", "."): value for key, value in options.items()})
 
 
-def make_laser_job(made: Design) -> LaserJob:
-    return make_job(made.name, build_layout(made), complete_setup(made.laser))
+def make_laser_job(design: Design) -> LaserJob:
+    """The laser job of a design."""
+    return make_job(design.name, build_layout(design), complete_setup(design.laser))
 
 
 def travel_mm(job: LaserJob) -> float:
-    """Dark way between the cells of every pass, as they are burnt."""
+    """Length of the travel with the beam off between the cells of every pass, in the order of burning."""
     total = 0.0
-    for one in job.cell_passes:
-        starts = one.walls.xy_mm[one.walls.first[:-1]]
+    for laser_pass in job.cell_passes:
+        starts = laser_pass.walls.xy_mm[laser_pass.walls.first[:-1]]
         total += float(np.hypot(*np.diff(starts, axis=0).T).sum())
     return total
 
 
 def nearest_bound_mm(entries_mm: Points) -> float:
-    """No order can be shorter: every cell but one has to be reached from a cell, at best from its nearest."""
+    """A lower bound of the travel in mm: every cell but one is reached from another cell, at best from the nearest."""
     if len(entries_mm) < 2:
         return 0.0
     points, owner = entries_mm.reshape(-1, 2), np.repeat(np.arange(len(entries_mm)), entries_mm.shape[1])
@@ -63,15 +64,15 @@ def nearest_bound_mm(entries_mm: Points) -> float:
     return float(nearest.sum() - nearest.max())
 
 
-def pass_in_layout_order(one: LaserPass) -> LaserPass:
-    """The pass with its closed paths in the layout's order, each from its first corner on."""
-    assert one.cavities is not None
-    cells = one.cavities.selected(np.argsort(one.cavities.cell))
-    return replace(one, walls=loop_strokes(cells.loops_mm, np.arange(len(cells.cell))))
+def pass_in_layout_order(laser_pass: LaserPass) -> LaserPass:
+    """The pass with its closed paths in the layout's order, each starting at its first corner."""
+    assert laser_pass.cavities is not None
+    cells = laser_pass.cavities.selected(np.argsort(laser_pass.cavities.cell))
+    return replace(laser_pass, walls=loop_strokes(cells.loops_mm, np.arange(len(cells.cell))))
 
 
 def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
-    """Dark way in mm and seconds of vpype's linesort on the same paths, given cell by cell as in the layout."""
+    """Travel in mm and time in s of vpype's linesort on the same paths, in the layout's order."""
     program = VPYPE_HOME / "bin" / "vpype"
     if not program.exists():
         venv.create(VPYPE_HOME, with_pip=True)
@@ -99,9 +100,11 @@ def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
 
 
 def print_travel() -> None:
-    """2,000 cells in three colors (and one white), paths as the job burns them."""
+    """Print the travel for 2,000 cells in three colors (and one white), with the job's paths."""
     job = make_laser_job(make_design(26, laser__corner="plain", laser__holes="false"))
-    entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
+    entries = [
+        laser_pass.cavities.entries_mm for laser_pass in job.cell_passes if laser_pass.cavities is not None
+    ]
     started = time.perf_counter()
     for cells in entries:
         order_cells(cells, "travel")
@@ -109,18 +112,18 @@ def print_travel() -> None:
     bound = sum(nearest_bound_mm(cells) for cells in entries)
     plain, plain_s = vpype_mm(job)
     best, best_s = vpype_mm(job, "--two-opt")
-    ours = travel_mm(job)
+    own = travel_mm(job)
     print(f"\ntravel on {sum(map(len, entries))} cells in {len(entries)} passes")
     print(f"{'':34}{'m':>8}{'against two-opt':>18}{'s':>8}")
     rows = [("vpype linesort", plain, plain_s), ("vpype linesort --two-opt", best, best_s)]
-    rows += [("cmpdesign", ours, seconds), ("lower bound (nearest neighbours)", bound, 0.0)]
-    for name, way, took in rows:
-        print(f"{name:34}{way / 1000:8.3f}{100 * (way / best - 1):+17.1f} %{took:8.2f}")
-    assert ours < 0.88 * best, "at least 12 % below"
+    rows += [("cmpdesign", own, seconds), ("lower bound (nearest neighbours)", bound, 0.0)]
+    for name, length, seconds_of in rows:
+        print(f"{name:34}{length / 1000:8.3f}{100 * (length / best - 1):+17.1f} %{seconds_of:8.2f}")
+    assert own < 0.88 * best, "at least 12 % below"
 
 
 def print_format_times() -> None:
-    """Layout in hand; everything in the folder laser/, in memory. CPU time is what an idle core takes."""
+    """Print the time to make all files of the folder laser/ in memory, from a layout. CPU time excludes waiting."""
     print("\ntime to everything in laser/ (figures, 4 formats, sheet, coupon), corners overcut")
     print(f"{'cells':>8}{'files':>8}{'MB':>8}{'CPU s':>8}{'wall s':>8}{'limit s':>9}")
     with tempfile.TemporaryDirectory() as folder:
@@ -135,22 +138,22 @@ def print_format_times() -> None:
             )
         )
         for layers, limit in ((26, 3.0), (82, 30.0)):
-            made = make_design(layers, laser__machine=str(machine), fiducials__count="3")
-            layout = build_layout(made)
+            design = make_design(layers, laser__machine=str(machine), fiducials__count="3")
+            layout = build_layout(design)
             started, begun = time.perf_counter(), time.process_time()
-            files = make_laser(made, layout).files
+            files = make_laser(design, layout).files
             wall, seconds = time.perf_counter() - started, time.process_time() - begun
             size = sum(len(content) for content in files.values()) / 1e6
             cells = sum(
-                len(one.walls) for one in make_job("", layout, complete_setup(made.laser)).cell_passes
+                len(one.walls) for one in make_job("", layout, complete_setup(design.laser)).cell_passes
             )
             print(f"{cells:8d}{len(files):8d}{size:8.1f}{seconds:8.2f}{wall:8.2f}{limit:9.0f}")
             assert seconds < limit
-            assert files == make_laser(made, layout).files, "the same bytes twice"
+            assert files == make_laser(design, layout).files, "the same bytes twice"
 
 
 def print_areas() -> None:
-    """Area against the nominal cell of 1.5 mm, what a corner loses, what is burnt beside."""
+    """Print areas against the nominal cell of 1.5 mm, losses at corners, and burns outside the cell."""
     print("\nas made at the front, honeycomb of 1.5 mm")
     print(
         f"{'kerf mm':>9}{'corner':>10}{'area %':>10}{'corner lost um':>16}{'beside um':>11}{'web um':>9}"

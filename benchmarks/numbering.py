@@ -1,9 +1,9 @@
-"""Two ways to number the same cells: the article's graph of corners, and the extractor's mesh of centers.
+"""Two methods of numbering the same cells: the article's graph of corners, and the extractor's cell mesh.
 
     python -m benchmarks.numbering
 
-Both start from the same triangles or centers of the same images. A cell is right when it gets the layout's number,
-wrong when it gets another's.
+Both methods start from the triangles or centres of the same images. A cell is right if it gets the layout's number, and
+wrong if it gets another number.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ LAYERS = 10
 
 @dataclass(frozen=True)
 class NumberingCondition:
-    """One kind of image; ``pitch_px``, ``blur_px``, ``noise`` as a camera gives them."""
+    """One kind of image; ``pitch_px``, ``blur_px`` in px of the image, ``noise`` in 8-bit units."""
 
     name: str
     damage: Damage | None = None
@@ -88,20 +88,20 @@ class CellCount:
     def add(
         self, cell: NDArray[np.int32], center_px: NDArray[np.float64], reference: Reference, truth: Truth
     ) -> None:
-        """Count the cells that were numbered: each belongs to the layout's cell whose true center is nearest."""
+        """Count the numbered cells: each belongs to the layout's cell with the nearest true centre."""
         inked = np.flatnonzero(reference.cell_color < 3)
         true_px = truth.marker_xy_px[reference.cell_corners[inked]].mean(axis=1)
         self.visible += int(truth.cell_visible[inked].sum())
-        for found, at in zip(cell[cell >= 0], center_px[cell >= 0], strict=True):
-            right = inked[np.linalg.norm(true_px - at, axis=1).argmin()] == found
-            # a damaged cell is not owed, but its number must be right too
+        for found, centre in zip(cell[cell >= 0], center_px[cell >= 0], strict=True):
+            right = inked[np.linalg.norm(true_px - centre, axis=1).argmin()] == found
+            # A damaged cell need not be found, but its number must be right too.
             self.right += int(right and truth.cell_visible[found])
             self.wrong += int(not right)
 
 
 def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount]:
-    """The article's way and the extractor's on the same images."""
-    article, mesh = CellCount(), CellCount()
+    """The counts of the article's method and of the extractor on the same images."""
+    article, cell_mesh = CellCount(), CellCount()
     inks = standard_scene().inks
     for pattern in PATTERNS:
         layout = standard_layout(pattern, LAYERS)
@@ -128,11 +128,11 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
             article.add(found, triangles.corner_px.mean(axis=1), reference, truth)
             attached = stages.get("attach")
             if attached is None:
-                mesh.visible += int((truth.cell_visible & (reference.cell_color < 3)).sum())
+                cell_mesh.visible += int((truth.cell_visible & (reference.cell_color < 3)).sum())
                 continue
-            ours = np.where(attached.cell >= 0, colored[attached.cell], -1)
-            mesh.add(ours, stages["cells"].center_px, reference, truth)
-    return article, mesh
+            numbered = np.where(attached.cell >= 0, colored[attached.cell], -1)
+            cell_mesh.add(numbered, stages["cells"].center_px, reference, truth)
+    return article, cell_mesh
 
 
 def main() -> None:
@@ -140,9 +140,9 @@ def main() -> None:
     for name in ("condition", "visible", "corners: right", "wrong", "centers: right", "wrong"):
         table.add_column(name, justify="left" if name == "condition" else "right")
     for condition in CONDITIONS:
-        article, mesh = compare_methods(condition)
+        article, cell_mesh = compare_methods(condition)
         row = [f"{article.visible}"]
-        for count in (article, mesh):
+        for count in (article, cell_mesh):
             row += [f"{100 * count.right / count.visible:.2f} %", f"{count.wrong}"]
         table.add_row(condition.name, *row)
     Console(width=110).print(table)

@@ -3,11 +3,11 @@
     python -m benchmarks.reconstruction [--quick] [--json FILE]
 
 The layout is the tac3d template (331 markers of pitch 1.5 mm, 4650 virtual ones) on an elastomer of 6 mm, seen from the
-back by two views that share one image, as behind mirrors. Poses come from a rest frame of its own; intrinsics are
-known. Errors are RMS per axis against the scene's truth, over all markers and frames. Two bounds stand beside
-them: what the covariances that the extractor states imply for this geometry ("stated"), and what the image itself
-allows (Cramer-Rao of each view, gridline by gridline, "image"), both with true poses. "err/cov" is the error in units
-of the covariance that is reported for each marker. One core.
+back by two views that share one image, as behind mirrors. Poses come from a separate rest frame; intrinsics are
+known. Errors are RMS per axis against the scene's truth, over all markers and frames. They are compared with two
+deviations, both with true poses: the one that the extractor's covariances imply for this geometry ("stated"), and the
+Cramer-Rao bound of each view, gridline by gridline ("image"). "err/cov" is the error in units of the covariance that
+is reported for each marker. One core.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
@@ -45,11 +46,21 @@ Surface = Callable[[Array], Array]
 
 FRAMES, QUICK_FRAMES = 8, 2
 DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
-SENSORS = {  # the whole image, the angle of each view to the pattern's normal, and its distance in mm
-    "1280 x 480, two halves of 640 x 480": ((1280, 480), 20.0, 56.0),
-    "640 x 480, two halves of 320 x 480": ((640, 480), 15.0, 44.0),
+
+
+class SensorSetup(NamedTuple):
+    """Size of the whole image, angle of each view to the pattern's normal, distance of each view."""
+
+    size: tuple[int, int]
+    angle_deg: float
+    distance_mm: float
+
+
+SENSORS = {
+    "1280 x 480, two halves of 640 x 480": SensorSetup((1280, 480), 20.0, 56.0),
+    "640 x 480, two halves of 320 x 480": SensorSetup((640, 480), 15.0, 44.0),
 }
-LAYER = Elastomer(thickness_mm=6.0, young_mpa=0.2, poisson=0.48)
+ELASTOMER = Elastomer(thickness_mm=6.0, young_mpa=0.2, poisson=0.48)
 WIDE, NARROW = Ball(radius_mm=20.0), Ball(radius_mm=8.0)
 STATES: dict[str, tuple[Ball, Motion] | None] = {
     "at rest": None,
@@ -65,7 +76,7 @@ STATES: dict[str, tuple[Ball, Motion] | None] = {
 
 @dataclass(frozen=True)
 class ReconstructionResult:
-    """One sensor and state. Triples are x, y, z."""
+    """The result for one sensor and state. Triples are x, y, z."""
 
     sensor: str
     state: str
@@ -85,7 +96,7 @@ class ReconstructionResult:
 
 
 def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
-    """Left and right half, from the back."""
+    """Cameras of the left and the right half of the image, behind the pattern."""
     width, height = size[0] // 2, size[1]
     return tuple(
         Pinhole.looking(
@@ -105,7 +116,7 @@ def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) ->
 
 
 def make_rig(views: tuple[Pinhole, ...]) -> Rig:
-    """Intrinsics only: the poses are to be found."""
+    """A rig with intrinsics and without poses."""
     return Rig(tuple(View(v.name, v.focal_px, v.centre_px, v.distortion, v.area_px) for v in views))
 
 
@@ -125,14 +136,14 @@ def make_scene(layout: Layout, camera: tuple[Pinhole, ...], surface: Surface | N
 def implied_deviation_um(
     placed: list[View], xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]
 ) -> tuple[float, ...]:
-    """RMS deviation per axis that pixel covariances imply where the views' poses are exact."""
+    """RMS deviation per axis that pixel covariances imply with exact poses of the views."""
     pixels = np.stack([view.project(xyz) for view in placed])
     cov = triangulate(placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
     return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
 
 
 def measure_sensor(name: str, frames: int) -> list[ReconstructionResult]:
-    """All states of one sensor."""
+    """The results of all states of one sensor."""
     size, angle_deg, distance_mm = SENSORS[name]
     layout = build_layout(load_design("tac3d"))
     reference = parse_layout(layout_to_json(layout))
@@ -158,7 +169,7 @@ def measure_sensor(name: str, frames: int) -> list[ReconstructionResult]:
     ]
     results = []
     for state, contact in STATES.items():
-        surface = None if contact is None else solve(LAYER, *contact).surface()
+        surface = None if contact is None else solve(ELASTOMER, *contact).surface()
         results.append(
             _measure_state(
                 name,
@@ -202,19 +213,19 @@ def _measure_state(
         virtual.append((shape.virtual_xyz_mm - shot.truth.virtual_xyz_mm).reshape(-1, 3))
         tilts.append(_angles_deg(shape.normals, reconstructor, shown))
     error, covs = np.concatenate(errors), np.concatenate(cov)
-    seen = np.isfinite(error[:, 0])
+    known = np.isfinite(error[:, 0])
     image = implied_deviation_um(
-        placed, true, np.stack([_image_bound(shown, v, size) for v in shown.camera]), seen[: len(true)]
+        placed, true, np.stack([_image_bound(shown, v, size) for v in shown.camera]), known[: len(true)]
     )  # type: ignore[union-attr]
     found = rms_um(error)
     stated_um = tuple(float(v) for v in np.sqrt(np.mean(np.square(stated), axis=0)))
-    squares = np.einsum("ni,nij,nj->n", error[seen], np.linalg.inv(covs[seen]), error[seen]) / 3
+    squares = np.einsum("ni,nij,nj->n", error[known], np.linalg.inv(covs[known]), error[known]) / 3
     extract_ms, reconstruct_ms = 1e3 * np.median(times, axis=0)
     return ReconstructionResult(
         sensor=name,
         state=state,
         frames=frames,
-        reported_share=float(seen.mean()),
+        reported_share=float(known.mean()),
         error_um=found,
         stated_um=stated_um,
         image_um=image,
@@ -246,12 +257,12 @@ def _angles_deg(normals: Array, reconstructor: Reconstructor, shown: Scene) -> A
 
 
 def rms_um(error_mm: Array) -> tuple[float, ...]:
-    """RMS per axis of (N, 3) mm, in micrometres; NaN does not count."""
+    """RMS per axis of (N, 3) mm, in micrometres; NaN is ignored."""
     return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(error_mm**2, axis=0)))
 
 
 def bound_ratio(error_um: tuple[float, ...], bound_um: tuple[float, ...]) -> float:
-    """RMS over the three axes, each in units of its bound."""
+    """RMS over the three axes of error over bound."""
     return float(np.sqrt(np.mean(np.square(error_um) / np.square(bound_um))))
 
 

@@ -6,9 +6,9 @@ Scenes of 640x480 and 331 markers: flat, seen through a distorting lens, pressed
 the back), and that in the two halves of a virtual binocular. Blur 1 px and none, no noise. For its time only, a steep
 dent that hides a part of itself.
 
-The reference (``benchmarks.scanlines``) shares no step with the renderer. It is poor where a side runs along its scan
-lines, so the patterns are turned by 30 degrees, the flat one by 7.3. The error in grey levels is that of a 16-bit
-image, in 8-bit steps. The error in px is how far the gridlines' middles have to move along their normals so that the
+The reference (``benchmarks.support.scanlines``) shares no step with the renderer. It is inexact for sides along its
+scan lines, so the patterns are rotated by 30 degrees, the flat one by 7.3. The error in grey levels is that of a 16-bit
+image, in 8-bit units. The error in px is the shift of the gridlines' middles along their normals with which the
 reference fits the image best. One core.
 """
 
@@ -45,7 +45,7 @@ BARREL = (-0.2, 0.05, 0.001, -0.002, 0.0)
 
 @dataclass(frozen=True)
 class Speed:
-    """Of one picture: median and 95th percentile of the wall clock, and median CPU time, in ms."""
+    """Times of one picture in ms: median and 95th percentile of wall time, and median of CPU time."""
 
     name: str
     p50_ms: float
@@ -54,7 +54,7 @@ class Speed:
 
 
 def make_scenes(grid: int = 256) -> dict[str, Scene]:
-    """The pictures that are judged, by name; the flat one is the standard scene with 10 layers."""
+    """The scenes whose error is measured, by name; the flat one is the standard scene with 10 layers."""
     layout = standard_layout(layers=10)
     flat = standard_scene(layout)
     contact = solve(Elastomer(3.0, 0.2), Ball(6.0), Motion(0.6, (0.4, 0.0), 8.0), size_mm=(24, 22), grid=grid)
@@ -88,7 +88,7 @@ def make_scenes(grid: int = 256) -> dict[str, Scene]:
 
 
 def steep_scene(flat: Scene) -> Scene:
-    """A dent seen from the side: half a percent of the pattern turns away."""
+    """A dent viewed from the side: half a percent of the pattern turns away."""
     camera = Pinhole.looking(
         SIZE, distance_mm=36, field_of_view_deg=42, tilt_deg=50, roll_deg=TURN_DEG, back=True
     )
@@ -96,7 +96,7 @@ def steep_scene(flat: Scene) -> Scene:
 
 
 def measure_speed(name: str, scene: Scene, repeats: int) -> Speed:
-    """With the blur and noise of the standard scene; the first picture, which loads code, does not count."""
+    """Time a scene with the blur and noise of the standard scene, after one picture that is not timed."""
     render(scene, size=SIZE)
     wall, cpu = [], []
     for _ in range(repeats):
@@ -108,27 +108,27 @@ def measure_speed(name: str, scene: Scene, repeats: int) -> Speed:
 
 
 def result_tables(errors: Sequence[RenderError], speeds: Sequence[Speed]) -> list[Table]:
-    judged = Table(box=SIMPLE_HEAD, title="the renderer's own error")
+    error_table = Table(box=SIMPLE_HEAD, title="the renderer's own error")
     for heading in ("scene", "blur px", "grey RMS", "largest", "edge RMS px", "largest", "gridlines"):
-        judged.add_column(heading, justify="left" if heading == "scene" else "right")
-    for item in errors:
-        judged.add_row(
-            item.name,
-            f"{item.blur_px:g}",
-            f"{item.grey_rms:.4f}",
-            f"{item.grey_largest:.3f}",
-            f"{item.edge_rms_px:.6f}",
-            f"{item.edge_largest_px:.6f}",
-            f"{item.edges}",
+        error_table.add_column(heading, justify="left" if heading == "scene" else "right")
+    for error in errors:
+        error_table.add_row(
+            error.name,
+            f"{error.blur_px:g}",
+            f"{error.grey_rms:.4f}",
+            f"{error.grey_largest:.3f}",
+            f"{error.edge_rms_px:.6f}",
+            f"{error.edge_largest_px:.6f}",
+            f"{error.edges}",
         )
-    timed = Table(box=SIMPLE_HEAD, title="time of a picture, 640x480, 331 markers, blur 1 px, noise 2/255")
+    speed_table = Table(
+        box=SIMPLE_HEAD, title="time of a picture, 640x480, 331 markers, blur 1 px, noise 2/255"
+    )
     for heading in ("scene", "p50 ms", "p95 ms", "CPU p50 ms"):
-        timed.add_column(heading, justify="left" if heading == "scene" else "right")
-    for speed_of in speeds:
-        timed.add_row(
-            speed_of.name, *(f"{v:.1f}" for v in (speed_of.p50_ms, speed_of.p95_ms, speed_of.cpu_ms))
-        )
-    return [judged, timed]
+        speed_table.add_column(heading, justify="left" if heading == "scene" else "right")
+    for speed in speeds:
+        speed_table.add_row(speed.name, *(f"{v:.1f}" for v in (speed.p50_ms, speed.p95_ms, speed.cpu_ms)))
+    return [error_table, speed_table]
 
 
 def main() -> int:
@@ -138,15 +138,15 @@ def main() -> int:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     window = ImageWindow(260, 180, 120, 120) if options.quick else ImageWindow(220, 140, 200, 200)
-    judged = make_scenes()
-    # The two views' first one lies in the left half.
-    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in judged}
+    scenes = make_scenes()
+    # The first of the two views is the left half.
+    windows = {name: window if "two" not in name else replace(window, x=80, width=120) for name in scenes}
     errors = [
         measure_render_error(name, scene, blur_px, windows[name], SIZE)
-        for name, scene in judged.items()
+        for name, scene in scenes.items()
         for blur_px in (1.0, 0.0)
     ]
-    timed = {**judged, "steep, parts hidden": steep_scene(judged["flat"])}
+    timed = {**scenes, "steep, parts hidden": steep_scene(scenes["flat"])}
     speeds = [
         measure_speed(name, scene, QUICK_REPEATS if options.quick else REPEATS)
         for name, scene in timed.items()

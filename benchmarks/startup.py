@@ -40,11 +40,10 @@ COMMANDS = {
     ],
     "cmpdesign build honeycomb": ["build", "honeycomb", "-o", "made"],
 }
-# The child reports what it needed itself: peak memory of the whole process, in the system's unit of kB.
+# The child process reports its own peak memory, which the system states in kB.
 LARGEST = """
 import json, resource, sys, time
-from cmpdesign import build_layout
-from cmpdesign.design import Design
+from cmpdesign import Design, build_layout
 design = Design(pattern=sys.argv[1], layers=200, pitch_mm=1.0)
 start = time.perf_counter()
 layout = build_layout(design)
@@ -65,7 +64,7 @@ class ProcessTime:
 
 @dataclass(frozen=True)
 class LargestBuild:
-    """Building 200 layers: the fastest run, and the process's peak memory."""
+    """Building 200 layers: the fastest run, and its process's peak memory."""
 
     pattern: str
     markers: int
@@ -74,14 +73,14 @@ class LargestBuild:
 
 
 def run_python(code: str, arguments: Sequence[str], folder: Path) -> str:
-    """Run code in a process of its own; its output."""
+    """Run code in a new process, and return its output."""
     start = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
     command = [sys.executable, "-c", start + code, *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
 def measure_process(command: str, runs: int, folder: Path) -> ProcessTime:
-    """Time a command; the first run, which reads the files from disk, is not counted."""
+    """Time a command after one run that is not timed, which reads the files from disk."""
     arguments = COMMANDS[command]
     seconds = []
     for _ in range(runs + 1):

@@ -2,10 +2,10 @@
 
     python -m benchmarks.tracking [--quick] [--json FILE] [--plot FILE.png]
 
-2,000 frames of 640x480 and 331 markers (quick: 120), pressed, twisted, dragged and carried about. In the second
-sequence the pattern also jumps now and then by most of an edge, and the view is black for some frames. Optical flow
-starts from the true positions of the first frame. An id is wrong when its marker is nearer to another marker's true
-place than to its own. Errors are per axis against the scene's truth. One core.
+2,000 frames of 640x480 and 331 markers (quick: 120), pressed, twisted, sheared and moved. In the second
+sequence the pattern also jumps at times by most of an edge, and some frames are black. Optical flow
+starts from the true positions of the first frame. An id is wrong if its marker is nearer to another marker's true
+position than to its own. Errors are per axis against the scene's truth. One core.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
@@ -75,7 +75,7 @@ class ErrorBlock:
 
 @dataclass(frozen=True)
 class TrackingResult:
-    """A sequence: its blocks, how frames were started, and times of the tracker in ms."""
+    """A sequence: its blocks, numbers of warm and cold starts, and times of the tracker in ms."""
 
     name: str
     frames: int
@@ -91,8 +91,27 @@ class TrackingResult:
     largest_step_px: float
 
 
+class TrackedFrame(NamedTuple):
+    """A rendered frame, its tracked markers, and the processor time of tracking in ms."""
+
+    rendered: Rendered
+    tracked: Tracked
+    cpu_ms: float
+
+
+class FrameErrors(NamedTuple):
+    """Errors of one frame in px and px^2; NaN where nothing was found."""
+
+    squared: float
+    worst: float
+    lost: int
+    wrong: int
+    flow_squared: float
+    flow_wrong: int
+
+
 def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendered]:
-    """Frame 0 is at rest; a black frame is rendered black."""
+    """The frames of a sequence; frame 0 is at rest. ``jerky``: with jumps and black frames."""
     rng = np.random.default_rng(1)
     offset = np.zeros(2)
     for index in range(count):
@@ -131,13 +150,13 @@ def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendere
 
 
 def wrong_ids(xy_px: NDArray[np.float64], true_px: NDArray[np.float64]) -> int:
-    """How many of the found markers are nearest to another marker's true place."""
+    """The number of found markers that are nearest to another marker's true position."""
     found = np.flatnonzero(np.isfinite(xy_px[:, 0]))
     return int((cKDTree(true_px).query(xy_px[found])[1] != found).sum())
 
 
 class OpticalFlow:
-    """Pyramidal Lucas-Kanade, from the true places in the first frame; a point that it loses stays where it was."""
+    """Pyramidal Lucas-Kanade from the true positions in the first frame; a lost point keeps its position."""
 
     def __init__(self, image: NDArray[np.uint8], true_px: NDArray[np.float64]) -> None:
         self._gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
@@ -158,23 +177,23 @@ class OpticalFlow:
         return np.asarray(self._points[:, 0], dtype=np.float64)
 
 
-def track_frames(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[tuple[Rendered, Tracked, float]]:
-    """Every frame as tracked and its processor time in ms; frames come in a row, as from a camera, rendered before."""
+def track_frames(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[TrackedFrame]:
+    """Track frames in groups that are rendered in advance, so that frames follow each other as from a camera."""
     count = 0
     while part := list(islice(frames, AHEAD)):
         found = []
         for rendered in part:
             cpu = time.thread_time()
             frame = tracker.track(np.asarray(rendered.image, np.uint8), time_s=count / 30)
-            found.append((rendered, frame, 1e3 * (time.thread_time() - cpu)))
+            found.append(TrackedFrame(rendered, frame, 1e3 * (time.thread_time() - cpu)))
             count += 1
         yield from found
 
 
 def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> TrackingResult:
-    """Track the sequence both ways."""
+    """Track the sequence with the tracker and with optical flow."""
     tracker = Tracker(parse_layout(layout_to_json(layout)))
-    rows: list[tuple[float, float, int, int, float, int]] = []
+    rows: list[FrameErrors] = []
     times: dict[str, list[float]] = {"warm": [], "cpu": [], "cold": []}
     flow: OpticalFlow | None = None
     flow_s, step_px, failed, before = 0.0, 0.0, 0, None
@@ -185,21 +204,24 @@ def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> Trac
         if frame.start is StartKind.WARM:
             times["warm"].append(frame.elapsed_ms)
             times["cpu"].append(cpu)
-        elif frame.start is StartKind.COLD and index:  # the very first one loads code
+        elif frame.start is StartKind.COLD and index:  # the first frame loads code
             times["cold"].append(frame.elapsed_ms)
         failed += frame.status is not FrameStatus.TRACKED
         flow = flow or OpticalFlow(image, true)
         start = time.perf_counter()
         flowed = flow.track(image)
         flow_s += time.perf_counter() - start
-        away = frame.markers.xy_px - true
-        squares = away[np.isfinite(away)] ** 2
-        rms2 = float(squares.mean()) if len(squares) else np.nan
-        worst = float(np.sqrt(np.nanmax((away**2).sum(axis=1)))) if len(squares) else np.nan
-        lost = int((~np.isfinite(away[:, 0])).sum())
-        flow_rms2 = float(np.mean((flowed - true) ** 2))
+        error = frame.markers.xy_px - true
+        squares = error[np.isfinite(error)] ** 2
         rows.append(
-            (rms2, worst, lost, wrong_ids(frame.markers.xy_px, true), flow_rms2, wrong_ids(flowed, true))
+            FrameErrors(
+                squared=float(squares.mean()) if len(squares) else np.nan,
+                worst=float(np.sqrt(np.nanmax((error**2).sum(axis=1)))) if len(squares) else np.nan,
+                lost=int((~np.isfinite(error[:, 0])).sum()),
+                wrong=wrong_ids(frame.markers.xy_px, true),
+                flow_squared=float(np.mean((flowed - true) ** 2)),
+                flow_wrong=wrong_ids(flowed, true),
+            )
         )
         step_px = (
             step_px if before is None else max(step_px, float(np.linalg.norm(true - before, axis=1).max()))
@@ -209,7 +231,7 @@ def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> Trac
         name=name,
         frames=count,
         markers=len(layout.marker_layer),
-        blocks=_error_blocks(np.array(rows)),
+        blocks=_error_blocks(rows),
         warm_frames=len(times["warm"]),
         cold_frames=len(times["cold"]) + 1,
         not_tracked=failed,
@@ -226,27 +248,28 @@ def percentiles(values: Sequence[float]) -> dict[str, float]:
     return dict(zip(("p50", "p95", "p99"), (float(v) for v in found), strict=True))
 
 
-def _error_blocks(rows: NDArray[np.float64]) -> list[ErrorBlock]:
+def _error_blocks(rows: Sequence[FrameErrors]) -> list[ErrorBlock]:
     blocks = []
-    for part in np.array_split(np.arange(len(rows)), BLOCKS):
-        seen = rows[part][np.isfinite(rows[part, 0])]
+    for numbers in np.array_split(np.arange(len(rows)), BLOCKS):
+        block = [rows[number] for number in numbers]
+        tracked = [row for row in block if np.isfinite(row.squared)]
         blocks.append(
             ErrorBlock(
-                first=int(part[0]),
-                last=int(part[-1]),
-                rms_px=float(np.sqrt(seen[:, 0].mean())),
-                worst_px=float(seen[:, 1].max()),
-                lost=int(rows[part, 2].sum()),
-                wrong=int(rows[part, 3].sum()),
-                flow_rms_px=float(np.sqrt(rows[part, 4].mean())),
-                flow_wrong=int(rows[part, 5].sum()),
+                first=int(numbers[0]),
+                last=int(numbers[-1]),
+                rms_px=float(np.sqrt(np.mean([row.squared for row in tracked]))),
+                worst_px=max(row.worst for row in tracked),
+                lost=sum(row.lost for row in block),
+                wrong=sum(row.wrong for row in block),
+                flow_rms_px=float(np.sqrt(np.mean([row.flow_squared for row in block]))),
+                flow_wrong=sum(row.flow_wrong for row in block),
             )
         )
     return blocks
 
 
 def error_growth(rms_px: Sequence[float]) -> float:
-    """The second half's RMS over the first one's."""
+    """The RMS of the second half over the RMS of the first half."""
     halves = np.split(np.square(rms_px), 2)
     return float(np.sqrt(halves[1].mean() / halves[0].mean()))
 
@@ -281,7 +304,7 @@ def result_tables(result: TrackingResult) -> list[Table]:
 
 
 def plot_errors(results: Sequence[TrackingResult], path: Path) -> None:
-    """Error over frames, both ways, on a logarithmic scale."""
+    """Plot the error of both methods over frames on a logarithmic scale."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,6 +1,13 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Everything is imported where it is first used, so that ``import cmpdesign`` costs next to nothing.
+    patterns  graphs, numbering and positions      contact   objects pressed into the elastic layer
+    design    validated parameters of a pattern    scene     rendered images with exact ground truth
+    layout    markers, cells, edges; checks        tracking  markers of videos and cameras as tables
+    files     layout.json, images, videos          evaluate  the article's experiments, simulated
+    products  drawings, lasers, molds, prints      cli       the command line
+    reading   layouts and pictures verified
+
+Each room imports only rooms above it, left column first. Public names are loaded at their first use.
 """
 
 from __future__ import annotations

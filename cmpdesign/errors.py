@@ -1,4 +1,4 @@
-"""The errors that a user can meet: each names the value, the limit, the unit and the remedy."""
+"""Errors for users: every message names the value, the limit, the unit and the remedy."""
 
 from __future__ import annotations
 
@@ -12,4 +12,4 @@ class DesignError(CmpDesignError, ValueError):
 
 
 class OutputError(CmpDesignError, OSError):
-    """A file or folder that could not be written; what stood there before is unchanged."""
+    """A file or folder that could not be written. Its previous content is unchanged."""

@@ -1,4 +1,4 @@
-"""Quantities as people write them ("1.5mm", "60mil", "30deg") to millimetres and degrees."""
+"""Conversion of texts with units ("1.5mm", "60mil", "30deg") to millimetres and degrees."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(\
 
 
 def parse_length_mm(value: object) -> float:
-    """A length in mm from a number (mm) or a string with a unit.
+    """Convert a number (mm) or a string with a unit to a length in mm.
 
     >>> parse_length_mm("60mil"), parse_length_mm(2)
     (1.524, 2.0)
 
     Raises:
-        ValueError: not a finite number, or a unit that is none of ``LENGTHS_MM``.
+        ValueError: the value is not finite or not a number, or its unit is not in ``LENGTHS_MM``.
     """
     return _parse(value, LENGTHS_MM, "length", "1.5mm")
 
 
 def parse_angle_deg(value: object) -> float:
-    """An angle in degrees from a number (degrees) or a string with a unit.
+    """Convert a number (degrees) or a string with a unit to an angle in degrees.
 
     >>> parse_angle_deg("0.25turn")
     90.0
 
     Raises:
-        ValueError: not a finite number, or a unit that is none of ``ANGLES_DEG``.
+        ValueError: the value is not finite or not a number, or its unit is not in ``ANGLES_DEG``.
     """
     return _parse(value, ANGLES_DEG, "angle", "30deg")
 

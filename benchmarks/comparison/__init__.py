@@ -1,1 +1,1 @@
-"""Speed against error: the extractor's presets, its rivals and the article's corners on the same scenes."""
+"""Speed against error: the extractor's presets, other detectors and the article's corners on the same scenes."""

@@ -2,11 +2,11 @@
 
     python -m benchmarks.comparison [--quick] [--json FILE] [--publish]
 
-640 x 480 px, edges of 20 px, turned by 7.3 degrees, blur 1 px, noise 2/255: honeycomb with 397 markers flat, tilted by
-35 degrees, bulged and twisted; round and elliptical patterns flat. Detectors of checkerboards read one of 400 inner
-corners with the same edge length under the same camera and surface, in black and white only, given as gray image.
-One thread each, processor time; the repetitions of all methods take turns, each with a noise of its own. Each method
-has just read another frame, not timed, as in a stream.
+640 x 480 px, edges of 20 px, rotated by 7.3 degrees, blur 1 px, noise 2/255: honeycomb with 397 markers flat, tilted by
+35 degrees, bulged and twisted; round and elliptical patterns flat. Detectors of checkerboards read a board of 400 inner
+corners with the same edge length, camera and surface, in black and white only, as gray image.
+One thread each, processor time. The repetitions of all methods alternate, each with its own noise. Before every timed
+frame a method reads another frame, not timed, as in a stream.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ REPETITIONS, QUICK_REPETITIONS = 11, 3
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print a table a scene; write the JSON file or the documentation if asked."""
+    """Measure, print one table per scene; write the JSON file or the documentation on request."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.comparison", description=(__doc__ or "").split("\n")[0]
     )

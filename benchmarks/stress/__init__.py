@@ -1,1 +1,1 @@
-"""``python -m benchmarks.stress``: how far each kind of damage and distortion may go."""
+"""``python -m benchmarks.stress``: the tolerated strength of each kind of damage and distortion."""

@@ -3,8 +3,8 @@
     python -m benchmarks.stress [--quick] [--table] [--json FILE] [--plot FILE]
     python -m benchmarks.stress --only "blur=3/round" --save DIR     some cases: their images and overlays
 
-Times are of the processor, one core, the best of some runs. Each run follows one of the plain frame: the ratio to it
-is the median of these.
+Times are processor times of one core, the best of some runs. Each run follows a run on the plain frame; the stated
+ratio is the median of the ratios of such pairs.
 """
 
 from __future__ import annotations
@@ -30,15 +30,18 @@ from benchmarks.suites.scoring.report import (
 from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases, matching_cases
 from benchmarks.suites.stress.kinds import StressCase
 
-RUNS, FEW_RUNS = 15, 5  # of an image, and of one of many alike; a median of five is off by 0.03
+RUNS, FEW_RUNS = (
+    15,
+    5,
+)  # per image, and per image of conditions with many images; a median of five errs by 0.03
 
 
 def _read_case(job: tuple[StressCase, int]) -> CaseResult:
-    return read_case(*job)[0]
+    return read_case(*job).result
 
 
 def read_cases(chosen: list[StressCase], processes: int, runs: int) -> Iterator[CaseResult]:
-    """Results as they come, the large images first."""
+    """Results in the order of completion; large images are read first."""
     last = [case for case in chosen if BY_NAME[case.kind].group != "view"]
     first = [case for case in chosen if BY_NAME[case.kind].group == "view"]
     # Conditions of many images need fewer runs of each.
@@ -51,6 +54,7 @@ def read_cases(chosen: list[StressCase], processes: int, runs: int) -> Iterator[
 
 
 def with_progress(chosen: list[StressCase], processes: int, runs: int) -> list[CaseResult]:
+    """All results, with the progress on stderr."""
     results, started = [], time.perf_counter()
     for result in read_cases(chosen, processes, runs):
         results.append(result)
@@ -61,7 +65,7 @@ def with_progress(chosen: list[StressCase], processes: int, runs: int) -> list[C
 
 
 def read_one_by_one(chosen: list[StressCase], save: Path | None) -> list[CaseResult]:
-    """Read here, printing a line a case; write its image and overlay."""
+    """Read in this process, print one line per case; write images and overlays into ``save``."""
     import cv2
 
     warm_up()
@@ -82,7 +86,7 @@ def read_one_by_one(chosen: list[StressCase], save: Path | None) -> list[CaseRes
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print the failures, the severest first, and the totals; 1 when a marker is wrong or an image raised."""
+    """Print the failures, the severest first, and the totals. Returns 1 if a marker is wrong or an image raised."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stress", description=__doc__.split("\n")[0])
     parser.add_argument("--quick", action="store_true", help="the patterns take turns, no large images")
     parser.add_argument(
@@ -95,25 +99,27 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw every kind (png, svg or pdf)")
     parser.add_argument("--table", action="store_true", help="print every row, also in a quick run")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
-    asked = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
 
     started = time.perf_counter()
-    if asked.with_one_pass:
-        chosen = matching_cases(asked.with_one_pass)
+    if options.only:
+        chosen = matching_cases(options.only)
         if not chosen:
-            parser.error(f"no case is named {asked.with_one_pass!r}; the kinds are {', '.join(BY_NAME)}")
-        results = read_one_by_one(chosen, asked.save)
+            parser.error(f"no case is named {options.only!r}; the kinds are {', '.join(BY_NAME)}")
+        results = read_one_by_one(chosen, options.save)
     else:
-        results = with_progress(make_cases(quick=asked.quick), asked.processes, 1 if asked.quick else RUNS)
+        results = with_progress(
+            make_cases(quick=options.quick), options.processes, 1 if options.quick else RUNS
+        )
     rows = condition_rows(results, KINDS)
-    if asked.table or not asked.quick:
+    if options.table or not options.quick:
         print(results_table(rows))
     print("\n".join(failure_lines(rows)))
     print(f"{summary_text(rows)}; {len(BY_NAME)} kinds; {time.perf_counter() - started:.0f} s")
-    if asked.json:
-        write_json(rows, asked.json)
-    if asked.plot:
-        plot_conditions(rows, KINDS, asked.plot)
+    if options.json:
+        write_json(rows, options.json)
+    if options.plot:
+        plot_conditions(rows, KINDS, options.plot)
     return int(any(row.wrong or row.raised for row in rows))
 
 

@@ -1,4 +1,4 @@
-"""The conditions of a figure: which machine, which versions. And how a benchmark's results are handed out."""
+"""The conditions of measured figures, machine and versions, and the writing of a benchmark's results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PACKAGES = ("numpy", "opencv-contrib-python-headless", "numba", "scipy")
 
 
 def processor_name() -> str:
-    """The processor's name, as the system gives it."""
+    """The processor's name, as reported by the system."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
@@ -27,25 +27,25 @@ def processor_name() -> str:
 def machine_conditions() -> dict[str, str]:
     """Machine and versions by name."""
     load = f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown"
-    found = {
+    conditions = {
         "cpu": f"{processor_name()}, {os.cpu_count()} cores, load {load}",
         "system": f"{platform.system()} {platform.machine()}",
     }
-    found["python"] = platform.python_version()
-    return found | {name: version(name) for name in PACKAGES}
+    conditions["python"] = platform.python_version()
+    return conditions | {name: version(name) for name in PACKAGES}
 
 
-def conditions_text(found: Mapping[str, str] | None = None) -> str:
-    """The conditions, these or the present ones, on one line, for a table's caption."""
-    found = found or machine_conditions()
-    packages = ", ".join(f"{name.partition('-')[0]} {found[name]}" for name in PACKAGES)
-    return f"{found['cpu']}; {found['system']}; Python {found['python']}, {packages}"
+def conditions_text(conditions: Mapping[str, str] | None = None) -> str:
+    """The given or the present conditions on one line, for a table's caption."""
+    conditions = conditions or machine_conditions()
+    packages = ", ".join(f"{name.partition('-')[0]} {conditions[name]}" for name in PACKAGES)
+    return f"{conditions['cpu']}; {conditions['system']}; Python {conditions['python']}, {packages}"
 
 
 def write_json(path: Path, results: Mapping[str, Any]) -> None:
-    """Conditions and results to a file, whole or not at all."""
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(
+    """Write conditions and results to a file, completely or not at all."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(
         json.dumps({"conditions": machine_conditions(), **results}, indent=1) + "\n", encoding="utf-8"
     )
-    beside.replace(path)
+    partial.replace(path)

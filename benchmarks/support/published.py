@@ -1,7 +1,7 @@
-"""Measured figures that the documentation shows: a JSON file beside it, and blocks of pages written from that.
+"""Measured figures of the documentation: JSON files in docs/measured, and blocks of pages written from these.
 
-A block of a page stands between ``<!-- NAME: written by make bench -->`` and ``<!-- end of NAME -->``. What a page says
-between these lines is replaced; the rest of it is prose.
+A block of a page stands between ``<!-- NAME: written by make bench -->`` and ``<!-- end of NAME -->``. The text
+between these lines is replaced; all other text is kept.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ BLOCK_BEGIN, BLOCK_END = "<!-- {}: written by make bench -->", "<!-- end of {} -
 
 
 def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
-    """The page with those of the blocks that it has written anew.
+    """The page with the text of its blocks replaced.
 
     Raises:
-        ValueError: a block begins and does not end, or begins twice.
+        ValueError: a block has no end, or begins twice.
     """
     for name, lines in blocks.items():
         begin, end = BLOCK_BEGIN.format(name), BLOCK_END.format(name)
@@ -39,7 +39,7 @@ def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
 
 
 def updated_pages(blocks: Mapping[str, str]) -> dict[Path, str]:
-    """README and the pages of docs/ that have one of the blocks: path -> text with them written anew."""
+    """README and the pages of docs/ with one of the blocks: path -> text with replaced blocks."""
     found = {}
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         text = path.read_text(encoding="utf-8")
@@ -49,7 +49,7 @@ def updated_pages(blocks: Mapping[str, str]) -> dict[Path, str]:
 
 
 def write_published(name: str, results: Mapping[str, Any], blocks: Mapping[str, str]) -> list[Path]:
-    """Write docs/measured/NAME.json and the blocks of all pages; what was written."""
+    """Write docs/measured/NAME.json and the blocks of all pages. Returns the written files."""
     from benchmarks.support.machine import machine_conditions
 
     path = MEASURED_FOLDER / f"{name}.json"
@@ -65,6 +65,6 @@ def write_published(name: str, results: Mapping[str, Any], blocks: Mapping[str, 
 
 
 def read_measured(name: str) -> dict[str, Any]:
-    """What docs/measured/NAME.json holds."""
+    """The content of docs/measured/NAME.json."""
     found = json.loads((MEASURED_FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return dict(found)

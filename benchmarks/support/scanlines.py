@@ -1,14 +1,15 @@
-"""A picture of a scene by another way than the renderer's, and how far the renderer is from it.
+"""A reference image of a scene by a method independent of the renderer, and the renderer's error against it.
 
-Every cell's sides are followed by ``POINTS_PER_SIDE`` points each and cut with ``LINES_PER_PX`` scan lines a pixel;
-what a pixel's box
-and the blur make of each crossing is a closed form. No splines, no contour integrals, no adaptive chords: nothing of
-``cmpdesign.scene.coverage`` and ``paths``. It is poor where a side runs along the scan lines.
+Every cell's sides are sampled by ``POINTS_PER_SIDE`` points each and intersected with ``LINES_PER_PX`` scan lines per
+pixel. The effect of the pixel's box and the blur on each crossing is a closed form. The method has no splines, no
+contour integrals and no adaptive chords, unlike ``cmpdesign.scene.drawing.coverage`` and ``paths``. It is inexact for
+sides along the scan lines.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,8 @@ Points = NDArray[np.float64]
 
 POINTS_PER_SIDE, LINES_PER_PX = 512, 48
 REACH_SIGMA = 7.0
-BAND_ROWS = 30  # at once, for the memory's sake
-MIDDLE_PX = 3.5  # around a gridline's middle: the pixels that tell where it lies
+BAND_ROWS = 30  # drawn at once, to limit memory
+MIDDLE_PX = 3.5  # half the box around a gridline's middle in which its offset is fitted
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class ImageWindow:
 
 @dataclass(frozen=True)
 class RenderError:
-    """Of one picture in a window: 8-bit steps and px."""
+    """The renderer's error in a window of one picture, in 8-bit units and px."""
 
     name: str
     blur_px: float
@@ -51,8 +52,16 @@ class RenderError:
     edges: int
 
 
+class CellSides(NamedTuple):
+    """Straight pieces of the sides of cells: (N, 2) px starts and ends, (N,) numbers of the cells."""
+
+    start: Points
+    end: Points
+    owner: NDArray[np.int64]
+
+
 def reference_image(scene: Scene, view: SceneView, window: ImageWindow) -> Points:
-    """(height, width, 3) BGR in 8-bit steps: the inks over black, seen by every pixel of the window."""
+    """(height, width, 3) BGR in 8-bit units: the inks over black in every pixel of the window."""
     bands = []
     for top in range(0, window.height, BAND_ROWS):
         rows = min(BAND_ROWS, window.height - top)
@@ -75,7 +84,7 @@ def _reference_band(scene: Scene, view: SceneView, window: ImageWindow) -> Point
     )
     sign = np.sign((end - start)[crossing, 1]) * -_layout_orientation(layout, view)
     columns = window.x + np.arange(window.width)
-    seen = _blurred_step(columns[None, :] - x[:, None], blur)
+    coverage = _blurred_step(columns[None, :] - x[:, None], blur)
     rows = window.y + np.arange(window.height)
     down = (
         _blurred_box(rows[:, None] - (first + (np.arange(count) + 0.5) / LINES_PER_PX), blur) / LINES_PER_PX
@@ -84,25 +93,25 @@ def _reference_band(scene: Scene, view: SceneView, window: ImageWindow) -> Point
     for channel in range(3):
         weight = sign * over[owner[crossing], channel]
         gathered = csr_array((weight, (line, np.arange(len(line)))), shape=(count, len(line)))
-        image[..., channel] = black[channel] + down @ (gathered @ seen)
+        image[..., channel] = black[channel] + down @ (gathered @ coverage)
     return image
 
 
 def _cell_sides(
     layout: Layout, cells: NDArray[np.int64], view: SceneView, window: ImageWindow, blur_px: float
-) -> tuple[Points, Points, NDArray[np.int64]]:
-    """Straight pieces (N, 2) px of the sides of cells that the window can see; ``owner`` counts ``cells``."""
+) -> CellSides:
+    """The sides of cells that affect the window; ``owner`` is an index of ``cells``."""
     corners = layout.marker_xy_mm[layout.cell_corners[cells]]
     share = (np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE)[:, None]
-    ahead = np.roll(corners, -1, axis=1)
-    around = corners[:, :, None] * (1 - share) + ahead[:, :, None] * share
-    px = view.image_from_layout(around.reshape(-1, 2)).reshape(len(cells), -1, 2)
+    next_corners = np.roll(corners, -1, axis=1)
+    points = corners[:, :, None] * (1 - share) + next_corners[:, :, None] * share
+    px = view.image_from_layout(points.reshape(-1, 2)).reshape(len(cells), -1, 2)
     reach = REACH_SIGMA * blur_px + 2
     near = (px[..., 1].max(axis=1) > window.y - reach) & (
         px[..., 1].min(axis=1) < window.y + window.height + reach
     )
     px, owner = px[near], np.flatnonzero(near)
-    return (
+    return CellSides(
         px.reshape(-1, 2),
         np.roll(px, -1, axis=1).reshape(-1, 2),
         np.repeat(owner, px.shape[1]),
@@ -112,7 +121,7 @@ def _cell_sides(
 def _scan_line_crossings(
     start: Points, end: Points, first: float, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which piece crosses which scan line; the lines lie at first + (i + 0.5) / LINES."""
+    """(K,) pieces and (K,) scan lines of all crossings; line i lies at first + (i + 0.5) / ``LINES_PER_PX``."""
     low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
     begin = np.clip(np.ceil((low - first) * LINES_PER_PX - 0.5), 0, count).astype(np.int64)
     stop = np.clip(np.ceil((high - first) * LINES_PER_PX - 0.5), 0, count).astype(np.int64)
@@ -122,13 +131,13 @@ def _scan_line_crossings(
 
 
 def _layout_orientation(layout: Layout, view: SceneView) -> float:
-    """1 where the cells' corners, counter-clockwise in the layout, go from x to y in the image."""
+    """1 if the cells' corners, counter-clockwise in the layout, turn from x to y in the image, else -1."""
     a, b, c = view.image_from_layout(layout.marker_xy_mm[layout.cell_corners[0, :3]])
     return float(np.sign((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]))
 
 
 def _blurred_step(distance: Points, blur_px: float) -> Points:
-    """What a pixel ``distance`` inside a half plane shows: the integral of ``_blurred_box``."""
+    """The value of a pixel at ``distance`` inside a half plane: the integral of ``_blurred_box``."""
     if blur_px == 0:
         return np.clip(distance + 0.5, 0, 1)
 
@@ -139,7 +148,7 @@ def _blurred_step(distance: Points, blur_px: float) -> Points:
 
 
 def _blurred_box(distance: Points, blur_px: float) -> Points:
-    """A pixel's box, blurred by a Gaussian, along one axis."""
+    """A pixel's box convolved with a Gaussian, along one axis."""
     if blur_px == 0:
         return (np.abs(distance) < 0.5).astype(np.float64)
     return np.asarray(ndtr((distance + 0.5) / blur_px) - ndtr((distance - 0.5) / blur_px))
@@ -148,7 +157,7 @@ def _blurred_box(distance: Points, blur_px: float) -> Points:
 def measure_render_error(
     name: str, scene: Scene, blur_px: float, window: ImageWindow, size: tuple[int, int]
 ) -> RenderError:
-    """The renderer's own error in a window; of several views the first one's."""
+    """The renderer's error in a window; of several views in the first view."""
     clean = replace(scene, sensor=Sensor(bits=16), optics=Optics(blur_px))
     view = scene_views(clean, size)[0]
     rows, columns = slice(window.y, window.y + window.height), slice(window.x, window.x + window.width)
@@ -170,13 +179,13 @@ def measure_render_error(
 def fit_edge_offsets(
     difference: Points, true: Points, layout: Layout, view: SceneView, window: ImageWindow
 ) -> Points:
-    """How far, in px along its normal, every gridline inside the window has moved, by least squares."""
+    """(N,) px: the shift of every gridline inside the window along its normal, by least squares."""
     ends = layout.marker_xy_mm[layout.edges]
     middle = view.image_from_layout(ends.mean(axis=1)) - (window.x, window.y)
-    ahead = view.image_from_layout(0.45 * ends[:, 0] + 0.55 * ends[:, 1]) - (window.x, window.y) - middle
+    direction = view.image_from_layout(0.45 * ends[:, 0] + 0.55 * ends[:, 1]) - (window.x, window.y) - middle
     slope_y, slope_x = np.gradient(true, axis=(0, 1))
     shifts = []
-    for (x, y), (along_x, along_y) in zip(middle, ahead, strict=True):
+    for (x, y), (along_x, along_y) in zip(middle, direction, strict=True):
         left, top = int(np.ceil(x - MIDDLE_PX)), int(np.ceil(y - MIDDLE_PX))
         right, bottom = int(np.floor(x + MIDDLE_PX)) + 1, int(np.floor(y + MIDDLE_PX)) + 1
         if left < 1 or top < 1 or right >= window.width or bottom >= window.height:
@@ -184,6 +193,6 @@ def fit_edge_offsets(
         box = slice(top, bottom), slice(left, right)
         length = np.hypot(along_x, along_y)
         slope = (slope_x[box] * -along_y + slope_y[box] * along_x) / length
-        if (slope**2).sum() > 100.0:  # the outermost gridlines have black on both sides
+        if (slope**2).sum() > 100.0:  # outermost gridlines have black on both sides
             shifts.append(-(difference[box] * slope).sum() / (slope**2).sum())
     return np.array(shifts)

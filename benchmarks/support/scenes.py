@@ -1,4 +1,4 @@
-"""The scenes that figures of accuracy are stated for, and the checkerboard that the rivals read in them."""
+"""The scenes of stated figures of accuracy, and the checkerboard that other detectors read in them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cmpdesign.scene.standard import INKS, STANDARD_LAYERS, STANDARD_SIZE
 from extractor import Extractor, Reference, parse_layout
 from extractor.presets import Preset
 
-WRONG_SHARE = 0.3  # of the shortest edge: farther from the truth a marker is wrong, not imprecise
+WRONG_SHARE = 0.3  # of the shortest edge; a marker with a larger error is wrong
 TILT_DEG = 35.0
 SCENE_KINDS = ("flat", "tilt", "bulge", "twist")
 SURFACES = {
@@ -32,7 +32,7 @@ BOARD_LAYERS = 10  # 21 x 21 squares
 
 @dataclass(frozen=True)
 class SceneCase:
-    """A pattern and how it is seen. Lengths in px of the image, noise in grey levels."""
+    """A pattern and its imaging conditions. Lengths in px of the image, noise in grey levels."""
 
     pattern: str = "honeycomb"
     kind: str = "flat"
@@ -43,10 +43,11 @@ class SceneCase:
 
     @property
     def name(self) -> str:
+        """The pattern's name; of honeycomb patterns the kind of scene."""
         return self.pattern if self.pattern != "honeycomb" else self.kind
 
     def scene(self, layout: Layout | None = None) -> Scene:
-        """The case's scene, of its own pattern or of another layout."""
+        """The case's scene, of its pattern or of another layout."""
         tilt_deg = TILT_DEG if self.kind == "tilt" else 0.0
         return replace(
             standard_scene(layout or standard_layout(self.pattern, self.layers)),
@@ -57,9 +58,9 @@ class SceneCase:
         )
 
     def board(self, plain: bool = True) -> Scene:
-        """A checkerboard of the same edge length seen in the same way, in white surroundings.
+        """A checkerboard of the same edge length under the same conditions, in white surroundings.
 
-        ``plain``: in black and white only; else with the square pattern's red cell.
+        ``plain``: black and white only; else with the square pattern's red cell.
         """
         return replace(self.scene(checkerboard_layout(plain)), background=Plain(INKS["white"]))
 
@@ -78,7 +79,7 @@ def cached_extractor(case: SceneCase, preset: Preset = "balanced") -> Extractor:
 
 @cache
 def checkerboard_layout(plain: bool) -> Layout:
-    """The square pattern without its black border, as detectors of checkerboards need white around the board."""
+    """The square pattern without its black border, because detectors of checkerboards need white around the board."""
     layout = build_layout(load_design("square", {"layers": str(BOARD_LAYERS), "pitch_mm": "1.0"}))
     color = layout.cell_color.copy()
     if plain:
@@ -89,7 +90,7 @@ def checkerboard_layout(plain: bool) -> Layout:
 
 
 def inner_markers(layout: Layout) -> NDArray[np.bool_]:
-    """(M,) the markers with all their gridlines: six within a triangular pattern, four within the board."""
+    """(M,) bool: the markers with all their gridlines, six in a triangular pattern, four in the board."""
     row, column = layout.marker_layer, layout.marker_index
     if layout.cell_corners.shape[1] == 3:
         return np.asarray(row < row.max())
@@ -107,6 +108,6 @@ def shortest_edges(layout: Layout, true_px: NDArray[np.float64]) -> NDArray[np.f
 
 
 def bound_rms_px(scene: Scene, *choices: NDArray[np.bool_]) -> list[float]:
-    """The exact Cramer-Rao bound of choices of markers: RMS per axis, px; those that are not visible are left out."""
+    """The exact Cramer-Rao bound of sets of markers, RMS per axis in px, without markers that are not visible."""
     trace = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
     return [float(np.sqrt(np.nanmean(trace[chosen]) / 2)) for chosen in choices]

@@ -1,4 +1,4 @@
-"""Contact: what an object does to the soft layer that carries the pattern.
+"""Contact of a rigid object with the elastic layer that carries the pattern.
 
 elastomer + object + motion -> displacement and traction of the surface
 """

@@ -1,4 +1,4 @@
-"""The elastic layer: bonded to a rigid support below, touched from above."""
+"""The elastic layer: bonded to a rigid support below, loaded from above."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from cmpdesign.contact.errors import require
 
 @dataclass(frozen=True)
 class Elastomer:
-    """A linear elastic layer of even thickness on a rigid support that it cannot slide on.
+    """A linear elastic layer of uniform thickness, bonded to a rigid support.
 
     Attributes:
         thickness_mm: h, above 0.
-        young_mpa: Young's modulus, above 0. It scales forces; displacements do not depend on it.
+        young_mpa: Young's modulus, above 0. Forces are proportional to it; displacements do not depend on it.
         poisson: 0 to 0.5; silicones are nearly incompressible, 0.5.
 
     Raises:

@@ -6,14 +6,14 @@ from cmpdesign.errors import CmpDesignError
 
 
 class ContactError(CmpDesignError, ValueError):
-    """A layer, an object or a motion whose values are out of range, or that do not meet."""
+    """An elastic layer, an object or a motion has a value out of range, or the object misses the solved area."""
 
 
 def require(good: bool, name: str, value: object, limit: str) -> None:
-    """Raise the error for one value.
+    """Check one value.
 
     Raises:
-        ContactError: ``good`` is false; names the value and its limit.
+        ContactError: ``good`` is false; the message names the value and its limit.
     """
     if not good:
         raise ContactError(f"{name} is {value}; it must be {limit}")

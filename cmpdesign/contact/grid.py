@@ -1,4 +1,4 @@
-"""The grid on which a contact is solved: square cells, centred on the layout frame's origin."""
+"""The grid of a contact: square cells, centred on the layout frame's origin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MIN_CELLS, MAX_CELLS = 8, 2048
 
 @dataclass(frozen=True)
 class ContactGrid:
-    """Centres of square cells of side ``step_mm``: ``x_mm`` (nx,) and ``y_mm`` (ny,), both rising."""
+    """Centres of square cells of side ``step_mm``: ``x_mm`` (nx,) and ``y_mm`` (ny,), both ascending."""
 
     x_mm: Array
     y_mm: Array
@@ -24,7 +24,7 @@ class ContactGrid:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """Rows and columns (ny, nx)."""
         return len(self.y_mm), len(self.x_mm)
 
     @property
@@ -37,7 +37,7 @@ def make_contact_grid(size_mm: tuple[float, float], cells: int) -> ContactGrid:
     """A grid over ``size_mm`` (width, height) with ``cells`` along its longer side.
 
     Raises:
-        ContactError: a size that is not positive, or too few or too many cells.
+        ContactError: a size is not positive, or there are too few or too many cells.
     """
     good = len(size_mm) == 2 and all(math.isfinite(side) and side > 0 for side in size_mm)
     require(good, "size_mm", size_mm, "two lengths above 0 mm, width and height")

@@ -1,4 +1,4 @@
-"""From a solved state to the result that is handed out, with its warnings."""
+"""The public result of a solved state, with its warnings."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ from cmpdesign.contact.result import Contact
 from cmpdesign.contact.strain import LINEAR_STRAIN_LIMIT, largest_strain
 
 Array = NDArray[np.float64]
-# Cells over which a contact's pressure should at least be spread.
+# The smallest number of cells in contact without a warning.
 MIN_CONTACT_CELLS = 12
 
 
 def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: float) -> Contact:
-    """The contact of a state: forces, strain and warnings worked out, fields turned to (ny, nx, 3).
+    """The contact of a state, with forces, strain and warnings; fields become (ny, nx, 3).
 
-    The state is that of a layer of 1 MPa; tractions and forces are scaled to ``young_mpa``.
+    The state is of an elastic layer of 1 MPa; tractions and forces are scaled to ``young_mpa``.
     """
-    grid, traction, moved = problem.grid, state.traction_mpa, state.displacement_mm
-    strain = largest_strain(problem.elastomer, moved, traction, grid.step_mm)
+    grid, traction, displacement = problem.grid, state.traction_mpa, state.displacement_mm
+    strain = largest_strain(problem.elastomer, displacement, traction, grid.step_mm)
     friction = np.hypot(traction[0], traction[1])
-    fields = [np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (moved, young_mpa * traction)]
-    found = Contact(
+    fields = [
+        np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (displacement, young_mpa * traction)
+    ]
+    contact = Contact(
         x_mm=grid.x_mm,
         y_mm=grid.y_mm,
         displacement_mm=fields[0],
@@ -46,13 +48,13 @@ def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: 
         residual_mm=state.residual_mm,
         thickness_mm=problem.elastomer.thickness_mm,
     )
-    for values in (found.displacement_mm, found.traction_mpa, found.in_contact, found.slipping):
+    for values in (contact.displacement_mm, contact.traction_mpa, contact.in_contact, contact.slipping):
         values.setflags(write=False)
-    return found
+    return contact
 
 
 def _contact_moment(problem: ContactProblem, state: ContactState) -> Array:
-    """About the object's centre where it now is, arms in the plane of the flat surface."""
+    """(3,) moment in N mm about the object's current centre, with lever arms in the plane of the flat surface."""
     (x0, y0), (dx, dy) = problem.indenter.centre_mm, state.motion.shear_mm
     x, y = problem.grid.xy_mm + state.displacement_mm[:2] - np.reshape((x0 + dx, y0 + dy), (2, 1, 1))
     fx, fy, fz = state.traction_mpa * problem.grid.step_mm**2
@@ -82,10 +84,10 @@ def _contact_warnings(problem: ContactProblem, state: ContactState, strain: floa
             f"the grid's step of {step:.3g} mm is above the thickness of {thickness:.3g} mm; "
             f"take grid above {math.ceil(max(problem.grid.shape) * step / thickness)} or a smaller size_mm"
         )
-    allowed = (GAP_TOLERANCE_FRICTION if problem.friction > 0 else GAP_TOLERANCE) * state.motion.press_mm
-    if state.residual_mm > allowed:
+    allowed_mm = (GAP_TOLERANCE_FRICTION if problem.friction > 0 else GAP_TOLERANCE) * state.motion.press_mm
+    if state.residual_mm > allowed_mm:
         yield (
-            f"the solver left a gap of {state.residual_mm:.2g} mm, above {allowed:.2g} mm; "
+            f"the solver left a gap of {state.residual_mm:.2g} mm, above {allowed_mm:.2g} mm; "
             "take a coarser grid or rounder edges"
         )
 
@@ -111,7 +113,7 @@ def _grid_warnings(problem: ContactProblem, touched: NDArray[np.bool_]) -> Itera
 
 
 def has_fold(displacement_mm: Array, step_mm: float) -> bool:
-    """Whether the map of the plane by (3, ny, nx) has a Jacobian that is not positive somewhere."""
+    """Whether the Jacobian determinant of the plane's map by a displacement (3, ny, nx) is anywhere not positive."""
     ux_y, ux_x = np.gradient(displacement_mm[0], step_mm)
     uy_y, uy_x = np.gradient(displacement_mm[1], step_mm)
     return bool(((1 + ux_x) * (1 + uy_y) - ux_y * uy_x).min() <= 0)

@@ -1,4 +1,4 @@
-"""What the object does: it presses, then it shears and twists."""
+"""The motion of the object: a press, then shear and twist together."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the object ends up, from the place where it just touches the flat surface.
+    """The object's final pose, relative to the pose in which it just touches the flat surface.
 
     Attributes:
-        press_mm: how far it goes down, along -z; 0 or more.
-        shear_mm: then, how far it moves in x and y.
-        twist_deg: and how far it turns about its own centre, counter-clockwise seen from the front.
+        press_mm: distance along -z; 0 or more.
+        shear_mm: distances in x and y, after the press.
+        twist_deg: rotation about the object's centre, counter-clockwise from the front, together with the shear.
     """
 
     press_mm: float
@@ -38,16 +38,16 @@ class Motion:
 
     @property
     def tangential(self) -> bool:
-        """Whether it shears or twists at all."""
+        """Whether there is shear or twist."""
         return self.twist_deg != 0 or any(self.shear_mm)
 
     def part(self, of_press: float, of_rest: float) -> Motion:
-        """The motion up to a fraction of its press and of its shear and twist."""
+        """The motion up to a fraction of its press, and a fraction of its shear and twist."""
         x, y = self.shear_mm
         return Motion(of_press * self.press_mm, (of_rest * x, of_rest * y), of_rest * self.twist_deg)
 
     def carried(self, xy_mm: Array, centre_mm: tuple[float, float]) -> Array:
-        """Where points (2, ...) that ride on the object are after shear and twist about ``centre_mm``."""
+        """Positions of points (2, ...) fixed to the object after shear and twist about ``centre_mm``."""
         c, s = np.cos(np.radians(self.twist_deg)), np.sin(np.radians(self.twist_deg))
         x, y = xy_mm[0] - centre_mm[0], xy_mm[1] - centre_mm[1]
         moved_x = centre_mm[0] + self.shear_mm[0] + c * x - s * y

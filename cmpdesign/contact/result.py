@@ -1,4 +1,4 @@
-"""What a contact does to the surface."""
+"""The result of a contact: fields on the surface, forces, and the deformed surface."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ class Contact:
 
     Attributes:
         x_mm, y_mm: the cells' centres, (nx,) and (ny,).
-        displacement_mm: of the surface's points, (ny, nx, 3).
-        traction_mpa: what the object does to the surface, (ny, nx, 3); z is minus the pressure.
+        displacement_mm: displacement of the surface's points, (ny, nx, 3).
+        traction_mpa: traction of the object on the surface, (ny, nx, 3); z is minus the pressure.
         in_contact: (ny, nx) bool.
-        slipping: in contact, with all the friction that there is, (ny, nx) bool.
-        force_n: of the object on the layer, (3,); z is negative.
-        moment_nmm: of these tractions about the object's centre at the height of the surface, (3,).
+        slipping: in contact and at the friction limit, (ny, nx) bool.
+        force_n: force of the object on the elastic layer, (3,); z is negative.
+        moment_nmm: moment of the tractions about the object's centre at the height of the surface, (3,).
         largest_strain: the larger of the largest principal strain of the surface and depth over thickness.
-        warnings: what makes the result doubtful, each with value, limit and remedy.
-        iterations: how often the layer's answer was computed.
-        residual_mm: root mean square of the gap that is left in the contact.
-        thickness_mm: of the layer.
+        warnings: reasons to doubt the result, each with value, limit and remedy.
+        iterations: how often the elastic layer's response was computed.
+        residual_mm: root mean square of the remaining gap in the contact.
+        thickness_mm: thickness of the elastic layer.
     """
 
     x_mm: Array
@@ -53,7 +53,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """A surface: (N, 2) mm of the flat layer to (N, 3) mm, by a bicubic spline of the displacement.
+    """A deformed surface: maps (N, 2) mm of the flat surface to (N, 3) mm, by a bicubic spline of the displacement.
 
     Beyond the solved area the displacement falls smoothly to zero within one thickness (at least 6 cells).
     """
@@ -62,38 +62,38 @@ class Relief:
     coefficients: Array = field(repr=False)
 
     def __call__(self, xy_mm: Array, /) -> Array:
-        """Where the points (N, 2) of the flat layer are, (N, 3) mm."""
+        """(N, 3) mm: deformed positions of the points (N, 2) mm of the flat surface."""
         from scipy.ndimage import map_coordinates
 
         xy = np.asarray(xy_mm, dtype=np.float64)
         column = (xy[:, 0] - self.grid.x_mm[0]) / self.grid.step_mm
         row = (xy[:, 1] - self.grid.y_mm[0]) / self.grid.step_mm
-        found = np.empty((len(xy), 3))
+        xyz = np.empty((len(xy), 3))
         for axis in range(3):
-            found[:, axis] = map_coordinates(
+            xyz[:, axis] = map_coordinates(
                 self.coefficients[axis], np.stack([row, column]), order=3, mode="constant", prefilter=False
             )
-        found[:, :2] += xy
-        return found
+        xyz[:, :2] += xy
+        return xyz
 
 
 def make_relief(contact: Contact) -> Relief:
-    """The spline, with the displacement led to zero around the solved area."""
+    """The spline of a contact's displacement, which falls to zero around the solved area."""
     from scipy.ndimage import spline_filter
 
     step = float(contact.x_mm[1] - contact.x_mm[0])
     margin = max(6, int(np.ceil(contact.thickness_mm / step)))
     margin = min(margin, max(contact.in_contact.shape))
-    # Four cells of zeros at the rim, so that the spline ends there without a trace.
+    # Four cells of zeros at the rim, so that the spline ends smoothly.
     ramp = np.concatenate([np.zeros(4), 0.5 - 0.5 * np.cos(np.pi * np.arange(1, margin + 1) / (margin + 1))])
-    rim = len(ramp)
+    rim_cells = len(ramp)
     ny, nx = contact.in_contact.shape
     fade = np.outer(*(np.concatenate([ramp, np.ones(n), ramp[::-1]]) for n in (ny, nx)))
-    padded = [np.pad(contact.displacement_mm[..., axis], rim, mode="edge") * fade for axis in range(3)]
-    around = step * (np.arange(rim) + 1)
+    padded = [np.pad(contact.displacement_mm[..., axis], rim_cells, mode="edge") * fade for axis in range(3)]
+    outside_mm = step * (np.arange(rim_cells) + 1)
     grid = ContactGrid(
-        np.concatenate([contact.x_mm[0] - around[::-1], contact.x_mm, contact.x_mm[-1] + around]),
-        np.concatenate([contact.y_mm[0] - around[::-1], contact.y_mm, contact.y_mm[-1] + around]),
+        np.concatenate([contact.x_mm[0] - outside_mm[::-1], contact.x_mm, contact.x_mm[-1] + outside_mm]),
+        np.concatenate([contact.y_mm[0] - outside_mm[::-1], contact.y_mm, contact.y_mm[-1] + outside_mm]),
         step,
     )
     return Relief(grid, np.stack([spline_filter(values, order=3, mode="mirror") for values in padded]))

@@ -1,4 +1,4 @@
-"""Press, shear and twist an object into the layer."""
+"""Solution of contacts: an object presses, shears and twists on the elastic layer."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ def solve(
     grid: int = 256,
     steps: int = 4,
 ) -> Contact:
-    """Press, then shear and twist, each in ``steps`` equal increments.
+    """Solve a press, then shear and twist, each in ``steps`` equal increments.
 
     Args:
-        elastomer: the layer; it goes on beyond ``size_mm``.
+        elastomer: the elastic layer; it extends beyond ``size_mm``.
         indenter: the object.
-        motion: where it ends up.
-        friction: Coulomb's coefficient; 0 slides freely, ``math.inf`` sticks wherever it presses.
+        motion: the object's motion.
+        friction: Coulomb's coefficient; 0: no friction, ``math.inf``: no slip wherever there is pressure.
         size_mm: width and height of the solved area, centred on the layout frame's origin.
-        grid: cells along its longer side.
-        steps: increments of the press (one without friction), and again of shear and twist.
+        grid: cells along the longer side of the area.
+        steps: increments of the press, and again of shear and twist; without friction one each.
 
     Raises:
-        ContactError: a value out of range, or an object that misses the solved area.
+        ContactError: a value is out of range, or the object misses the solved area.
     """
     require(isinstance(steps, int) and 1 <= steps <= 1000, "steps", steps, "a whole number from 1 to 1000")
-    presses = 1 if friction == 0 or motion.press_mm == 0 else steps
-    way = [motion.part(i / presses, 0.0) for i in range(1, presses + 1)]
+    press_increments = 1 if friction == 0 or motion.press_mm == 0 else steps
+    motions = [motion.part(i / press_increments, 0.0) for i in range(1, press_increments + 1)]
     if motion.tangential:
-        tangential = 1 if friction == 0 or motion.press_mm == 0 else steps
-        way += [motion.part(1.0, i / tangential) for i in range(1, tangential + 1)]
+        tangential_increments = 1 if friction == 0 or motion.press_mm == 0 else steps
+        motions += [motion.part(1.0, i / tangential_increments) for i in range(1, tangential_increments + 1)]
     problem = _make_problem(elastomer, indenter, friction, size_mm, grid)
-    *_, last = _solve_states(problem, way)
+    *_, last = _solve_states(problem, motions)
     return contact_from_state(problem, last, elastomer.young_mpa)
 
 
@@ -66,9 +66,10 @@ def solve_path(
     size_mm: tuple[float, float] = (30.0, 30.0),
     grid: int = 256,
 ) -> Iterator[Contact]:
-    """One contact for each of the motions, each reached from the one before in one increment.
+    """Solve one contact for each motion, each by one increment from the contact before.
 
-    Any way will do: deeper and back, to and fro; what sticks and slips depends on it. Other arguments as in ``solve``.
+    Motions may be in any order, for example deeper and back. Stick and slip depend on the order. The other arguments
+    are those of ``solve``.
     """
     problem = _make_problem(elastomer, indenter, friction, size_mm, grid)
     for state in _solve_states(problem, motions):
@@ -79,9 +80,9 @@ def _make_problem(
     elastomer: Elastomer, indenter: Indenter, friction: float, size_mm: tuple[float, float], grid: int
 ) -> ContactProblem:
     require(friction >= 0, "friction", friction, "0 or more (math.inf sticks)")
-    # Young's modulus scales forces and nothing else: solved with 1 MPa, whatever it is.
-    layer = replace(elastomer, young_mpa=1.0)
-    return ContactProblem(layer, indenter, float(friction), make_contact_grid(size_mm, grid))
+    # Young's modulus only scales forces, so every problem is solved with 1 MPa.
+    unit_elastomer = replace(elastomer, young_mpa=1.0)
+    return ContactProblem(unit_elastomer, indenter, float(friction), make_contact_grid(size_mm, grid))
 
 
 def _solve_states(problem: ContactProblem, motions: Sequence[Motion]) -> Iterator[ContactState]:

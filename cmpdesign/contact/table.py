@@ -1,4 +1,4 @@
-"""The [contact] table of a scene: the same names as in Python, lengths and angles also with units."""
+"""The [contact] table of a scene: the names of the Python API; lengths and angles may have units."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 @dataclass(frozen=True)
 class ContactSetup:
-    """Everything that ``solve`` takes, checked; ``dataclasses.replace`` gives it another motion or place."""
+    """The checked arguments of ``solve``; ``dataclasses.replace`` exchanges the motion or the object."""
 
     elastomer: Elastomer
     indenter: Indenter
@@ -42,10 +42,10 @@ class ContactSetup:
     steps: int
 
     def solve(self) -> Contact:
-        """The contact.
+        """Solve the contact.
 
         Raises:
-            ContactError: the object misses the solved area, or the grid does not fit it.
+            ContactError: the object misses the solved area, or the grid does not fit the area.
         """
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return solve(**given)
@@ -57,7 +57,7 @@ class _ContactTable(BaseModel):
     elastomer: dict[str, Any]
     indenter: dict[str, Any]
     motion: dict[str, Any]
-    # "inf" is a number in TOML, and sticks wherever it presses.
+    # TOML has "inf": no slip wherever there is pressure.
     friction: float = Field(0.5, ge=0, allow_inf_nan=True)
     size_mm: tuple[SignedLength, SignedLength] = (30.0, 30.0)
     grid: int = Field(256, strict=True)
@@ -75,7 +75,7 @@ def contact_from(table: Mapping[str, Any], folder: str | Path = ".") -> ContactS
     Ball(centre_mm=(2.0, 0.0), turn_deg=0.0, radius_mm=10.0)
 
     Raises:
-        ContactError: an unknown, missing or impossible value, on one line with its place in the table.
+        ContactError: an unknown, missing or impossible value; the message names its path in the table.
     """
     read = _validate_table(_ContactTable, table, "contact")
     given = {name: getattr(read, name) for name in ("friction", "size_mm", "grid", "steps")}
@@ -117,7 +117,7 @@ def _make_from_table(kind: type[Any], table: Mapping[str, Any], where: str) -> A
 
 
 def _pydantic_field(kind: type[Any], name: str) -> tuple[Any, Any]:
-    """A field's type and default for pydantic: the unit is in its name, and it is a pair if its default is."""
+    """A field's type and default for pydantic. The name holds the unit; a pair as default makes the type a pair."""
     found = {field.name: field for field in dataclasses.fields(kind)}[name]
     number: Any = {"mm": SignedLength, "deg": SignedAngle}.get(name.rpartition("_")[2], float)
     if isinstance(found.default, tuple):

@@ -1,4 +1,4 @@
-"""A design: the few parameters from which everything else is derived."""
+"""The validated parameters of a design, and their TOML files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cmpdesign.errors import DesignError
 from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS
 
-# An ellipse flatter than 4 : 1 brings cells with corners below 15 degrees, which neither print nor read.
+# An ellipse flatter than 4 : 1 has cells with corners below 15 degrees, which cannot be printed or read.
 ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
 SMALLEST_PITCH_MM = 0.001
 MAX_VIRTUAL_PER_EDGE = 100
@@ -139,7 +139,7 @@ class Design(_StrictModel):
     @field_validator("name")
     @classmethod
     def _one_printable_line(cls, value: str) -> str:
-        # It goes into captions and XML, which has no way to write control characters.
+        # The name appears in captions and XML, and XML cannot hold control characters.
         if not value.isprintable():
             raise ValueError(f"{value!r} has line breaks or control characters; write it on one line")
         return value
@@ -201,12 +201,12 @@ class Design(_StrictModel):
 
 
 def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> Design:
-    """A design from a template's name or a TOML file, with values overridden.
+    """Load a design from a template's name or a TOML file, with values overridden.
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> text, as after ``--set``; "palette.red" reaches into the palette, and the text
-            "none" takes the field out.
+        overrides: field -> text, as after ``--set``. "palette.red" names a field of a table. The text "none"
+            removes the field.
 
     Raises:
         DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.
@@ -235,7 +235,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = 
 
 
 def design_schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML, for editors; ``cmpdesign/design.schema.json`` holds it."""
+    """The JSON Schema of a design's TOML, for editors; it is stored in ``cmpdesign/design.schema.json``."""
     schema = Design.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "cmpdesign design"
@@ -244,11 +244,12 @@ def design_schema() -> dict[str, Any]:
 
 
 def design_schema_text() -> str:
-    """``design_schema`` as the file's text."""
+    """The text of the file ``design.schema.json``."""
     return json.dumps(design_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
+    """Write the overrides into the document."""
     for dotted, text in overrides.items():
         *tables, field = dotted.split(".")
         target = data
@@ -265,7 +266,7 @@ def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> Non
 
 
 def _parse_toml_value(text: str) -> object:
-    """The TOML value that the text spells, or the text itself: "3" is a number, "60mil" is a text."""
+    """The TOML value of a text, or the text itself: "3" becomes a number, "60mil" stays a text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -278,7 +279,7 @@ def _suggest_name(word: str, known: Mapping[str, object]) -> str:
 
 
 def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
-    """What pydantic found, in one line that names each field, its value and what it takes."""
+    """The errors of pydantic in one line that names each field, its value and the allowed values."""
     parts = []
     for item in error.errors():
         path = ".".join(str(part) for part in item["loc"])
@@ -300,7 +301,7 @@ def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _table_fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
-    """The fields of the table that a path of names leads to."""
+    """The fields of the table at a path of names."""
     for name in path:
         table = model.model_fields[str(name)].annotation
         assert isinstance(table, type) and issubclass(table, BaseModel)

@@ -1,10 +1,10 @@
-"""Fiducials: marks outside the pattern by which all passes, prints and molds of a design agree.
+"""Fiducials: marks outside the pattern that align the passes, prints and molds of a design.
 
 +------------------------+
-| o                      |      Three marks in four corners: a pad taken out for filling cannot be put
-|        /\\  /\\          |      back turned. A fourth (count = 4) lets a photo be rectified; it lies a
-|       pattern          |      diameter further out, so that the four still tell the corners apart.
-|        \\/  \\/          |
+| o                      |      Three marks in four corners fix the orientation: a pad that is taken out
+|        /\\  /\\          |      for filling cannot be put back turned. A fourth mark (count = 4) allows
+|       pattern          |      a photo to be rectified. It lies one diameter further out, so that the
+|        \\/  \\/          |      corners still differ.
 | o                    o |
 +------------------------+
 """
@@ -31,14 +31,15 @@ class Fiducials(BaseModel):
 
 
 def fiducial_positions(fiducials: Fiducials, outline_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(F, 2) centres in the layout frame: lower left, lower right, upper left, then upper right.
+    """(F, 2) centres in mm, layout frame: lower left, lower right, upper left, then upper right.
 
     Args:
+        fiducials: the [fiducials] table.
         outline_mm: (K, 2), the ground's outline.
     """
-    away = fiducials.gap_mm + fiducials.diameter_mm / 2
-    left, bottom = outline_mm.min(axis=0) - away
-    right, top = outline_mm.max(axis=0) + away
+    distance_mm = fiducials.gap_mm + fiducials.diameter_mm / 2
+    left, bottom = outline_mm.min(axis=0) - distance_mm
+    right, top = outline_mm.max(axis=0) + distance_mm
     fourth = right + fiducials.diameter_mm, top
     corners = np.array([(left, bottom), (right, bottom), (left, top), fourth])
     return corners[: fiducials.count]

@@ -1,4 +1,4 @@
-"""The [laser] table of a design. What is left out comes from the machine's and the material's files."""
+"""The [laser] table of a design. Missing values come from the machine's and the material's files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where templates are found: beside the package in a checkout, inside it when installed."""
+"""Search for templates: beside the package in a checkout, inside the package when installed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def templates_folder() -> Path:
     """The folder that holds the templates.
 
     Raises:
-        DesignError: the installation has lost them.
+        DesignError: the installation has no templates.
     """
     package = Path(__file__).resolve().parent.parent
     for folder in (package / "templates", package.parent / "templates"):
@@ -32,7 +32,7 @@ def scene_templates() -> dict[str, Path]:
 
 
 def find_design(name_or_path: str | Path) -> Path:
-    """The TOML file of a template's name or of a path.
+    """The TOML file of a design template's name or of a path.
 
     Raises:
         DesignError: neither a template nor a file.
@@ -57,8 +57,8 @@ def _find_template(name_or_path: str | Path, known: dict[str, Path]) -> Path:
         return path
     if path.suffix or len(path.parts) > 1:
         raise DesignError(f"{name_or_path}: no such file")
-    near = difflib.get_close_matches(str(name_or_path), known, n=1, cutoff=0.5)
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    similar = difflib.get_close_matches(str(name_or_path), known, n=1, cutoff=0.5)
+    hint = f" (did you mean {similar[0]}?)" if similar else ""
     raise DesignError(
         f"{name_or_path}: no such template{hint}; there are {', '.join(known)}, or give a TOML file"
     )

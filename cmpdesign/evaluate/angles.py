@@ -1,4 +1,4 @@
-"""``evaluate angles``: how far a cell may deform or turn before it is lost (the article, eqs. 1 and 2)."""
+"""``evaluate angles``: the deformation and rotation at which a cell is lost (the article, eqs. 1 and 2)."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ RECOGNITION_RULE = (
 )
 CELL_SIDES = (3, 4, 6)
 EDGE_LENGTHS_PX = (20, 50, 100, 400)
-STEP_DEG = 1.0
+STEP_DEG = 1.0  # resolution of the measured angles
 
 
 def change_limit_deg(sides: int) -> float:
-    """The article's eq. 1: how much a corner's inner angle may grow."""
+    """The article's eq. 1: the largest growth of a corner's inner angle in degrees."""
     return 360 / sides
 
 
 def turn_limit_deg(sides: int) -> float:
-    """The article's eq. 2: how far a cell may turn."""
+    """The article's eq. 2: the largest rotation of a cell in degrees."""
     return 180 / sides
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """One for every shape of cell, size and deformation; nothing in them is random."""
+    """One trial for every kind of deformation, shape of cell and size. They are not random."""
     return [
         Trial(f"{kind}-{sides}-{edge_px}", {"kind": kind, "sides": sides, "edge_px": edge_px})
         for kind in ("shape", "turn")
@@ -50,15 +50,15 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def first_lost_deg(holds: Callable[[float], bool], until_deg: float) -> float | None:
-    """The first angle from 0, in steps of ``STEP_DEG``, at which it does not hold; None when it always does."""
-    for step in range(int(until_deg / STEP_DEG) + 1):
-        if not holds(step * STEP_DEG):
-            return step * STEP_DEG
+    """The first angle from 0, in steps of ``STEP_DEG``, at which the condition fails; None if it never fails."""
+    for number in range(int(until_deg / STEP_DEG) + 1):
+        if not holds(number * STEP_DEG):
+            return number * STEP_DEG
     return None
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members: by n, the formula's limits and the measured ones by edge length."""
+    """The members of report.json: by number of sides, the formula's limits and the measured limits by edge length."""
     document: dict[str, Any] = {}
     for trial, result in zip(trials, results, strict=True):
         sides = trial.values["sides"]

@@ -1,12 +1,12 @@
-"""What the article reports of the same experiments, on manufactured sensors (its section IV)."""
+"""The article's results of the same experiments, on manufactured sensors (its section IV)."""
 
 from __future__ import annotations
 
-# Section IV-B and Fig. 11a: how much smaller the multicolor pattern's edge fitting error is.
+# Section IV-B and Fig. 11a: change of the edge fitting error from the square to the multicolor pattern.
 EDGE_ERROR_CHANGE_PERCENT = {"press": -61.2, "press_shear": -58.1}
-# Section IV-B and Fig. 11b: how much larger its response is.
+# Section IV-B and Fig. 11b: change of the response from the square to the multicolor pattern.
 RESPONSE_CHANGE_PERCENT = {"shear_x": 17.6, "shear_y": 12.2}
-# Table I: successes in ten trials a mode.
+# Table I: successes in ten trials per mode.
 ARTICLE_TRIALS = 10
 ARTICLE_SUCCESSES = {
     "twist": {"square": 7, "multicolor": 9, "multicolor_repair": 10},
@@ -16,7 +16,7 @@ ARTICLE_SUCCESSES = {
 
 
 def change_percent(square: float | None, multicolor: float | None) -> float | None:
-    """How the multicolor pattern's figure differs from the square one's, in percent of that."""
+    """Change from the square to the multicolor pattern's value, in percent of the square pattern's value."""
     if square is None or multicolor is None or square == 0:
         return None
     return round(100 * (multicolor - square) / square, 2)

@@ -1,4 +1,4 @@
-"""``evaluate designs``: any designs on one sensor, under its set of contacts: error, yield, and what they cost."""
+"""``evaluate designs``: any designs on one sensor, under its set of contacts: error, yield and cost."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface
 from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_for_design
 from cmpdesign.evaluate.simulated.sensor import parse_sensor
 
-CONTACT_REACH_MM = 4.0
+CONTACT_REACH_MM = 4.0  # largest distance of a contact from the pattern's middle, in x and y
 
 
 @dataclass(frozen=True)
 class DesignEntry:
-    """A design that takes part, and what it is called."""
+    """A compared design and its name."""
 
     name: str
     design: Design
@@ -37,7 +37,7 @@ def design_entries(designs: Mapping[str, Design]) -> list[DesignEntry]:
     """The designs in the order given.
 
     Raises:
-        CmpDesignError: none.
+        CmpDesignError: there are no designs.
     """
     if not designs:
         raise CmpDesignError("no design to compare; give templates or TOML files")
@@ -45,7 +45,7 @@ def design_entries(designs: Mapping[str, Design]) -> list[DesignEntry]:
 
 
 def trials(options: RunOptions, designs: Sequence[DesignEntry]) -> list[Trial]:
-    """As many places and lights for every contact of the sensor's set and every design.
+    """The same number of positions and lights for every contact of the sensor's set and every design.
 
     Raises:
         CmpDesignError: the sensor has no contacts.
@@ -68,37 +68,37 @@ def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """One design under one contact; the place and the light are the same for all designs."""
+    """The errors of one design under one contact; position and light are the same for all designs."""
     from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
     from cmpdesign.evaluate.simulated.conditions import sample_conditions
 
-    one = _instrument(values["sensor"], values["design"], values["preset"])
-    load = one.sensor.table.load[values["load"]]
-    random = trial_rng(values["seed"], f"load-{values['load']}", values["index"])
-    x, y = random.uniform(-CONTACT_REACH_MM, CONTACT_REACH_MM, 2)
+    instrument = _instrument(values["sensor"], values["design"], values["preset"])
+    load = instrument.sensor.table.load[values["load"]]
+    rng = trial_rng(values["seed"], f"load-{values['load']}", values["index"])
+    x, y = rng.uniform(-CONTACT_REACH_MM, CONTACT_REACH_MM, 2)
     shear = (float(load.shear_mm[0]), float(load.shear_mm[1]))
-    pressed = place_surface(
+    surface = place_surface(
         values["sensor"], ContactLoad(load.object, load.press_mm, shear, load.twist_deg), (float(x), float(y))
     )
-    clean = one.sensor.table.conditions.model_copy(update={"specks": (0, 0)})
-    drawn = sample_conditions(clean, random, one.half_window_mm)
-    return measure_reconstruction(one, pressed, drawn, int(random.integers(2**31)))
+    clean = instrument.sensor.table.conditions.model_copy(update={"specks": (0, 0)})
+    conditions = sample_conditions(clean, rng, instrument.half_window_mm)
+    return measure_reconstruction(instrument, surface, conditions, int(rng.integers(2**31)))
 
 
 def figures(
     trials: Sequence[Trial], results: Sequence[Mapping[str, Any]], designs: Sequence[DesignEntry]
 ) -> dict[str, Any]:
-    """report.json's members: one entry a design."""
+    """The members of report.json: one entry per design."""
     document = {}
     for entry in designs:
         found = [r for t, r in zip(trials, results, strict=True) if t.values["design"] == entry.text]
-        errors = {name: sample_statistics([one[name] for one in found]).to_json() for name in MEASURES}
+        errors = {name: sample_statistics([result[name] for result in found]).to_json() for name in MEASURES}
         document[entry.name] = {**design_costs(entry.design), **errors}
     return {"designs": document}
 
 
 def design_costs(design: Design) -> dict[str, Any]:
-    """What a design is and what it takes to make: density, smallest feature, laser time."""
+    """Properties and cost of a design: density, smallest feature, laser time."""
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.measures import cell_areas_mm2, cell_widths_mm
 
@@ -115,7 +115,7 @@ def design_costs(design: Design) -> dict[str, Any]:
 
 
 def laser_time_s(design: Design) -> float | None:
-    """How long the design's laser job takes; None where it cannot be made, with its own machine and material."""
+    """Duration of the design's laser job with its machine and material; None if the job cannot be made."""
     from cmpdesign.errors import DesignError
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.laser.figures import pass_timing
@@ -126,4 +126,4 @@ def laser_time_s(design: Design) -> float | None:
         job = make_job(design.name, build_layout(design), complete_setup(design.laser))
     except DesignError:
         return None
-    return round_for_json(sum(pass_timing(job, one).time_s for one in job.passes), 3)
+    return round_for_json(sum(pass_timing(job, laser_pass).time_s for laser_pass in job.passes), 3)

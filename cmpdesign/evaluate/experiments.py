@@ -1,4 +1,4 @@
-"""An experiment from the first trial to the report."""
+"""The experiments, from the first trial to the report."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any
 
 @dataclass(frozen=True)
 class Experiment:
-    """One of the experiments.
+    """One experiment.
 
     Attributes:
-        name: of the command.
-        title: of its report.
-        trials: options -> what is tried.
+        name: the command's name.
+        title: the report's title.
+        trials: options -> trials.
         work: one trial's values -> its result.
         figures: trials and results -> the members of report.json.
-        sections: report.json's document -> what the page shows of it.
+        sections: report.json's document -> the sections of the page.
     """
 
     name: str
@@ -40,25 +40,27 @@ class Experiment:
 
 
 def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experiment:
-    """An experiment by its command's name; ``designs`` are those to compare.
+    """An experiment by its command's name; ``designs`` are the designs to compare.
 
     Raises:
-        CmpDesignError: an unknown name.
+        CmpDesignError: the name is unknown.
     """
     from cmpdesign.evaluate import angles, precision, reliability, responses, sections
     from cmpdesign.evaluate import designs as comparison
 
-    def kind(title: str, module: Any, show: Callable[[Mapping[str, Any]], list[Section]]) -> Experiment:
-        return Experiment(name, title, module.trials, module.work, module.figures, show)
+    def make(
+        title: str, module: Any, page_sections: Callable[[Mapping[str, Any]], list[Section]]
+    ) -> Experiment:
+        return Experiment(name, title, module.trials, module.work, module.figures, page_sections)
 
     if name == "precision":
-        return kind("Precision", precision, sections.precision_sections)
+        return make("Precision", precision, sections.precision_sections)
     if name == "response":
-        return kind("Response capability", responses, sections.response_sections)
+        return make("Response capability", responses, sections.response_sections)
     if name == "reliability":
-        return kind("Reliability", reliability, sections.reliability_sections)
+        return make("Reliability", reliability, sections.reliability_sections)
     if name == "angles":
-        return kind("Angle thresholds", angles, sections.angle_sections)
+        return make("Angle thresholds", angles, sections.angle_sections)
     if name == "designs":
         return Experiment(
             name,
@@ -72,33 +74,41 @@ def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experimen
 
 
 def run_experiment(
-    one: Experiment, options: RunOptions, folder: Path, *, show: bool = True
+    experiment: Experiment, options: RunOptions, folder: Path, *, show: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Run what is left to try, and write ``report.json`` and ``report.html``.
+    """Run the open trials, and write ``report.json`` and ``report.html``.
+
+    Args:
+        experiment: the experiment.
+        options: the user's options.
+        folder: folder of the journal and the report.
+        show: show a progress bar.
 
     Returns:
-        The report's document, and the files written.
+        The report's document, and the written files.
 
     Raises:
-        CmpDesignError: the folder holds a run under other conditions, or a value out of range.
-        OutputError: something cannot be written; the trials done are kept.
+        CmpDesignError: the folder holds a run under other conditions, or a value is out of range.
+        OutputError: a file cannot be written; finished trials are kept.
     """
     from cmpdesign.files.atomic import write_folder
 
-    conditions = {"experiment": one.name, "version": __version__, **options.values}
-    todo = one.trials(options)
+    conditions = {"experiment": experiment.name, "version": __version__, **options.values}
+    trials = experiment.trials(options)
     with Journal(folder, conditions) as journal:
-        results = run_trials(one.work, todo, journal, workers=options.workers, title=one.name, show=show)
+        results = run_trials(
+            experiment.work, trials, journal, workers=options.workers, title=experiment.name, show=show
+        )
     document = {
         "format": "cmp-evaluation",
         "version": 1,
-        "experiment": one.name,
+        "experiment": experiment.name,
         "generator": f"cmpdesign {__version__}",
         "seed": options.seed,
         "trials": options.trials,
         "preset": options.preset,
-        **one.figures(todo, results),
+        **experiment.figures(trials, results),
     }
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    html = report_html(one.title, one.sections(document))
+    html = report_html(experiment.title, experiment.sections(document))
     return document, write_folder(folder, {"report.json": text, "report.html": html})

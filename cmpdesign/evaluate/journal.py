@@ -1,13 +1,13 @@
-"""The journal of a run: one line of JSON a finished trial, so that an interrupted run goes on where it stopped.
+"""The journal of a run: one line of JSON per finished trial, so that an interrupted run can be continued.
 
-It is good for the same conditions and the same code: figures that two versions made in parts would be those of neither.
+A journal is valid for the same conditions and the same code, because results of different code must not be mixed.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,18 +18,22 @@ from cmpdesign.errors import CmpDesignError, OutputError
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_VERSION = 2
-# What the results of trials are made by.
+# Packages and modules that the results of trials depend on.
 HASHED_PACKAGES = (
     "extractor",
     "cmpdesign.evaluate",
     "cmpdesign.scene",
     "cmpdesign.contact",
     "cmpdesign.patterns",
+    "cmpdesign.design",
+    "cmpdesign.layout",
+    "cmpdesign.files",
+    "cmpdesign.units",
 )
 
 
 def fingerprint(conditions: Mapping[str, Any]) -> str:
-    """SHA-256 (hex) of everything that a trial's result depends on, but for the trial itself."""
+    """SHA-256 (hex) of the conditions of a run, on which all results depend."""
     text = json.dumps(conditions, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
@@ -37,26 +41,40 @@ def fingerprint(conditions: Mapping[str, Any]) -> str:
 @lru_cache(maxsize=1)
 def code_digest() -> str:
     """SHA-256 (hex) of the Python files of ``HASHED_PACKAGES``, names and content."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for package in HASHED_PACKAGES:
-        spec = find_spec(package)
-        for folder in (spec.submodule_search_locations or ()) if spec else ():
-            for path in sorted(Path(folder).rglob("*.py")):
-                text = path.read_bytes()
-                found.update(f"{package}/{path.relative_to(folder).as_posix()} {len(text)}\n".encode())
-                found.update(text)
-    return found.hexdigest()
+        for name, path in _source_files(package):
+            text = path.read_bytes()
+            digest.update(f"{package}/{name} {len(text)}\n".encode())
+            digest.update(text)
+    return digest.hexdigest()
+
+
+def _source_files(package: str) -> Iterator[tuple[str, Path]]:
+    """Names and paths of the Python files of a package or of a single module; none if it is not installed."""
+    spec = find_spec(package)
+    if spec is None:
+        return
+    if spec.submodule_search_locations is None:
+        yield "", Path(spec.origin or "")
+    for folder in spec.submodule_search_locations or ():
+        for path in sorted(Path(folder).rglob("*.py")):
+            yield path.relative_to(folder).as_posix(), path
 
 
 class Journal:
     """Results by trial, on disk.
 
-    The first line says under which conditions and with which code; a last line that a crash cut short is dropped.
+    The first line holds the digests of conditions and code. An incomplete last line, left by a crash, is removed.
+
+    Attributes:
+        path: the journal's file.
+        results: the results by the trials' keys.
 
     Raises:
-        CmpDesignError: the folder holds a run under other conditions or of other code, or another file under this
-            name, or another process is at it.
-        OutputError: it cannot be written.
+        CmpDesignError: the folder holds a run under other conditions or of other code, or another file of this
+            name, or another process uses the journal.
+        OutputError: the file cannot be written.
     """
 
     def __init__(self, folder: Path, conditions: Mapping[str, Any]) -> None:
@@ -84,10 +102,10 @@ class Journal:
             raise
 
     def add(self, key: str, result: Any) -> None:
-        """Note one trial's result; it is on disk when this returns.
+        """Append one trial's result and write it to disk.
 
         Raises:
-            OutputError: the disk is full or gone; what was noted before is kept.
+            OutputError: the file cannot be written; earlier results are kept.
         """
         try:
             self._write_line({"trial": key, "result": result})
@@ -96,6 +114,7 @@ class Journal:
         self.results[key] = result
 
     def close(self) -> None:
+        """Close the file and release its lock."""
         self._file.close()
 
     def __enter__(self) -> Journal:
@@ -111,16 +130,16 @@ class Journal:
         self._file.flush()
 
     def _read(self) -> dict[str, Any]:
-        """The results so far; what follows the last whole line is cut off, so that the next one stands alone."""
+        """The results on disk. The file is truncated after its last complete line."""
         data = self.path.read_bytes()
-        whole = data[: data.rfind(b"\n") + 1]
-        if len(whole) < len(data):
+        complete = data[: data.rfind(b"\n") + 1]
+        if len(complete) < len(data):
             with self.path.open("r+b") as file:
-                file.truncate(len(whole))
-        if not whole:
+                file.truncate(len(complete))
+        if not complete:
             return {}
         try:
-            head, *documents = [json.loads(line) for line in whole.decode("utf-8").splitlines()]
+            head, *documents = [json.loads(line) for line in complete.decode("utf-8").splitlines()]
             results = {document["trial"]: document["result"] for document in documents}
         except (ValueError, KeyError, TypeError) as error:
             raise CmpDesignError(
@@ -130,7 +149,7 @@ class Journal:
         return results
 
     def _require_same_conditions(self, head: Any) -> None:
-        """Refuse a journal that this run must not go on with."""
+        """Raise ``CmpDesignError`` for a journal of other conditions or of other code."""
         if head == self._head:
             return
         remedy = "give another folder, or remove that file"
@@ -145,10 +164,10 @@ class Journal:
 
 
 def _lock_journal(file: TextIO, path: Path) -> None:
-    """Keep other processes from this journal until it is closed, where the system can.
+    """Lock the journal against other processes until it is closed, where the system supports locks.
 
     Raises:
-        CmpDesignError: another one has it.
+        CmpDesignError: another process has locked it.
     """
     try:
         import fcntl

@@ -12,7 +12,7 @@ from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
 from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surface
 
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
-PRESS_MM, REACH_MM = 2.0, 4.0
+PRESS_MM, REACH_MM = 2.0, 4.0  # press, and largest distance from the pattern's middle in x and y
 METHODS = cube.COMPARED_METHODS
 EDGE_MODES = ("press", "press_shear")
 MEASURES = (
@@ -23,7 +23,7 @@ VARIANTS = ("read", "with_virtual", "perfect")
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """As many places for every object, and for the cube in both modes."""
+    """The same number of positions for every object, and for the cube in both modes."""
     objects = [
         Trial(f"{name}-{i}", {**options.values, "object": name, "index": i})
         for name in OBJECTS
@@ -33,6 +33,7 @@ def trials(options: RunOptions) -> list[Trial]:
 
 
 def cube_trials(modes: Sequence[str], options: RunOptions) -> list[Trial]:
+    """Trials of the pressed cube: the same number of positions for every mode."""
     return [
         Trial(f"cube-{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in modes
@@ -41,7 +42,7 @@ def cube_trials(modes: Sequence[str], options: RunOptions) -> list[Trial]:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """One object or cube at one place, with both patterns."""
+    """The errors of both patterns for one object or cube at one position."""
     if "mode" in values:
         return cube.work(values)
     from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
@@ -49,70 +50,78 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 
     text = values["sensor"]
-    random = trial_rng(values["seed"], values["object"], values["index"])
-    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
-    pressed = place_surface(text, ContactLoad(values["object"], PRESS_MM), (float(x), float(y)))
-    seed = int(random.integers(2**31))
-    found: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
+    rng = trial_rng(values["seed"], values["object"], values["index"])
+    x, y = rng.uniform(-REACH_MM, REACH_MM, 2)
+    surface = place_surface(text, ContactLoad(values["object"], PRESS_MM), (float(x), float(y)))
+    seed = int(rng.integers(2**31))
+    result: dict[str, Any] = {"centre_mm": [float(x), float(y)]}
     for method in METHODS:
-        one = instrument_for_method(text, method, values["preset"])
-        found[method] = measure_reconstruction(
-            one, pressed, mean_conditions(one.sensor.table.conditions), seed
+        instrument = instrument_for_method(text, method, values["preset"])
+        result[method] = measure_reconstruction(
+            instrument, surface, mean_conditions(instrument.sensor.table.conditions), seed
         )
-    return found
+    return result
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members."""
+    """The members of report.json."""
     pairs = list(zip(trials, results, strict=True))
     shapes = {
         name: {
-            method: _summarise_errors([r[method] for t, r in pairs if t.values.get("object") == name])
+            method: _summarise_errors(
+                [result[method] for trial, result in pairs if trial.values.get("object") == name]
+            )
             for method in METHODS
         }
         for name in OBJECTS
     }
     edges = {
-        mode: summarise_edge_errors([r for t, r in pairs if t.values.get("mode") == mode], mode)
+        mode: summarise_edge_errors(
+            [result for trial, result in pairs if trial.values.get("mode") == mode], mode
+        )
         for mode in EDGE_MODES
     }
     return {"shape_error_mm": shapes, "edge_fit_error_mm": edges}
 
 
-def _summarise_errors(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    return {name: sample_statistics([one[name] for one in found]).to_json() for name in MEASURES}
+def _summarise_errors(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    return {name: sample_statistics([result[name] for result in results]).to_json() for name in MEASURES}
 
 
-def summarise_edge_errors(found: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
-    """The mean edge fitting error of both patterns, its distribution, and what else would have come out."""
+def summarise_edge_errors(results: Sequence[Mapping[str, Any]], mode: str) -> dict[str, Any]:
+    """The mean edge fitting error of both patterns, its distribution, and the results of variants."""
     document: dict[str, Any] = {}
     for method in METHODS:
-        errors = edge_errors_mm(found, method, "read")
+        errors = edge_errors_mm(results, method, "read")
         document[method] = round_for_json(sample_statistics(errors).mean)
     document["change_percent"] = article.change_percent(document["square"], document["multicolor"])
     document["article_change_percent"] = article.EDGE_ERROR_CHANGE_PERCENT[mode]
     document["distribution"] = {
         method: {
-            "error": sample_statistics(edge_errors_mm(found, method, "read")).to_json(),
-            "side_mm": [round_for_json(one[method]["read"]["side_mm"] or float("nan")) for one in found],
+            "error": sample_statistics(edge_errors_mm(results, method, "read")).to_json(),
+            "side_mm": [
+                round_for_json(entry[method]["read"]["side_mm"] or float("nan")) for entry in results
+            ],
         }
         for method in METHODS
     }
-    variants = {variant: {m: edge_errors_mm(found, m, variant) for m in METHODS} for variant in VARIANTS[1:]}
-    for name, measure in (("mean_extent", "mean_extent_mm"), ("by_depth", "side_by_depth_mm")):
-        variants[name] = {m: edge_errors_mm(found, m, "read", measure) for m in METHODS}
-    document["variants"] = {
-        name: {m: round_for_json(sample_statistics(errors).mean) for m, errors in one.items()}
-        for name, one in variants.items()
+    variants = {
+        variant: {m: edge_errors_mm(results, m, variant) for m in METHODS} for variant in VARIANTS[1:]
     }
-    for one in document["variants"].values():
-        one["change_percent"] = article.change_percent(one["square"], one["multicolor"])
+    for name, measure in (("mean_extent", "mean_extent_mm"), ("by_depth", "side_by_depth_mm")):
+        variants[name] = {m: edge_errors_mm(results, m, "read", measure) for m in METHODS}
+    document["variants"] = {
+        name: {m: round_for_json(sample_statistics(errors).mean) for m, errors in entry.items()}
+        for name, entry in variants.items()
+    }
+    for entry in document["variants"].values():
+        entry["change_percent"] = article.change_percent(entry["square"], entry["multicolor"])
     return document
 
 
 def edge_errors_mm(
-    found: Sequence[Mapping[str, Any]], method: str, variant: str, measure: str = "side_mm"
+    results: Sequence[Mapping[str, Any]], method: str, variant: str, measure: str = "side_mm"
 ) -> list[float]:
-    """By how much the fitted square's side misses the cube's, where there is one."""
-    sides = [one[method][variant][measure] for one in found]
+    """Absolute differences in mm between the fitted square's side and the cube's, where a square was fitted."""
+    sides = [result[method][variant][measure] for result in results]
     return [abs(side - cube.CUBE_SIDE_MM) for side in sides if side is not None]

@@ -1,4 +1,7 @@
-"""``evaluate reliability``: how often a pattern is read under a ball that presses, then twists or shears (Table I)."""
+"""``evaluate reliability``: how often a pattern is read under a ball that presses, then twists or shears (Table I).
+
+Every method reads the same contacts. A reading is judged against the truth of the rendered picture.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
     from extractor import Markers
 
 Points = NDArray[np.float64]
-REACH_MM = 4.0  # the ball's centre lies within this of the pattern's middle, in x and y
+REACH_MM = 4.0  # largest distance of the ball's centre from the pattern's middle, in x and y
 CONTACT_LOADS = {
     "twist": ContactLoad("large_ball", 2.0, twist_deg=-30.0),
     "shear_x": ContactLoad("large_ball", 2.0, shear_mm=(1.5, 0.0)),
@@ -29,9 +32,9 @@ CONTACT_LOADS = {
 }
 METHODS = ("square", "square_saddles", "multicolor_unrefined", "multicolor", "multicolor_repair")
 
-# A marker belongs to the contact's area when it moves by at least this share of the largest movement.
+# A marker belongs to the contact's area when its displacement is at least this share of the largest displacement.
 CONTACT_DISPLACEMENT_SHARE = 0.1
-# It is right when it lies this near to its true place, in edges at rest: far below the next marker's.
+# A marker is right within this distance of its true position, in edges at rest.
 PLACE_TOLERANCE_EDGES = 0.25
 SUCCESS_CRITERIA = {
     "strict": "in both views every visible marker of the contact's area has its number and its place, and nowhere does "
@@ -48,7 +51,7 @@ SUCCESS_DEFINITION = (
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """As many random positions and lights for every mode; the same ones for all patterns."""
+    """The same number of random positions and lights for every mode, equal for all patterns."""
     return [
         Trial(f"{mode}-{i}", {**options.values, "mode": mode, "index": i})
         for mode in CONTACT_LOADS
@@ -57,76 +60,89 @@ def trials(options: RunOptions) -> list[Trial]:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """What each method reads of one contact."""
+    """The judged readings of one contact by all methods."""
     from cmpdesign.evaluate.simulated.conditions import sample_conditions
     from extractor.result import Status
 
     text, mode = values["sensor"], values["mode"]
-    random = trial_rng(values["seed"], mode, values["index"])
-    x, y = random.uniform(-REACH_MM, REACH_MM, 2)
-    pressed = place_surface(text, CONTACT_LOADS[mode], (float(x), float(y)))
+    rng = trial_rng(values["seed"], mode, values["index"])
+    x, y = rng.uniform(-REACH_MM, REACH_MM, 2)
+    surface = place_surface(text, CONTACT_LOADS[mode], (float(x), float(y)))
     ranges = instrument_for_method(text, "square", values["preset"]).sensor.table.conditions
-    drawn = sample_conditions(
-        ranges, random, instrument_for_method(text, "square", values["preset"]).half_window_mm
+    conditions = sample_conditions(
+        ranges, rng, instrument_for_method(text, "square", values["preset"]).half_window_mm
     )
-    seed = int(random.integers(2**31))
+    seed = int(rng.integers(2**31))
 
-    found: dict[str, Any] = {}
+    judged: dict[str, Any] = {}
     square, multicolor = (
         instrument_for_method(text, "square", values["preset"]),
         instrument_for_method(text, "multicolor", values["preset"]),
     )
-    picture, dirty = _render_contact(square, drawn, seed, pressed)
+    picture, specks_on_square = _render_contact(square, conditions, seed, surface)
     for method in ("square", "square_saddles"):
         read = instrument_for_method(text, method, values["preset"]).read(picture.image)
-        found[method] = judge_places(square, pressed, picture.truth, np.stack([m.xy_px for m in read]))
-    picture, dirty_too = _render_contact(multicolor, drawn, seed, pressed)
+        judged[method] = judge_places(square, surface, picture.truth, np.stack([m.xy_px for m in read]))
+    picture, specks_on_multicolor = _render_contact(multicolor, conditions, seed, surface)
     read = multicolor.read(picture.image)
     places, status = np.stack([m.xy_px for m in read]), np.stack([m.status for m in read])
     measured = np.where((status == Status.MEASURED)[..., None], places, np.nan)
-    found["multicolor_unrefined"] = judge_places(
-        multicolor, pressed, picture.truth, unrefined_places_px(multicolor, read)
+    judged["multicolor_unrefined"] = judge_places(
+        multicolor, surface, picture.truth, unrefined_places_px(multicolor, read)
     )
-    found["multicolor"] = judge_places(multicolor, pressed, picture.truth, measured)
-    found["multicolor_repair"] = judge_places(multicolor, pressed, picture.truth, places)
-    return {"methods": found, "centre_mm": [float(x), float(y)], "specks_drawn": bool(dirty and dirty_too)}
+    judged["multicolor"] = judge_places(multicolor, surface, picture.truth, measured)
+    judged["multicolor_repair"] = judge_places(multicolor, surface, picture.truth, places)
+    return {
+        "methods": judged,
+        "centre_mm": [float(x), float(y)],
+        "specks_drawn": bool(specks_on_square and specks_on_multicolor),
+    }
 
 
-def unrefined_places_px(one: Instrument, read: Sequence[Markers]) -> Points:
-    """(V, M, 2) the means of the triangles' corners, as the article has them: before this project's refinement."""
-    found = np.full((len(read), len(one.layout.marker_xy_mm), 2), np.nan)
-    for place, view, markers in zip(found, one.sensor.rig.views, read, strict=True):
+def unrefined_places_px(instrument: Instrument, read: Sequence[Markers]) -> Points:
+    """(V, M, 2) px: the means of the triangles' corners, as in the article, before this project's refinement."""
+    xy_px = np.full((len(read), len(instrument.layout.marker_xy_mm), 2), np.nan)
+    for view_xy_px, view, markers in zip(xy_px, instrument.sensor.rig.views, read, strict=True):
         if "place" in markers.stages:
-            place[:] = markers.stages["place"].xy_px + (view.area_px or (0, 0))[:2]
-    return found
+            view_xy_px[:] = markers.stages["place"].xy_px + (view.area_px or (0, 0))[:2]
+    return xy_px
 
 
 def _render_contact(
-    one: Instrument, drawn: ImagingConditions, seed: int, pressed: PlacedSurface
+    instrument: Instrument, conditions: ImagingConditions, seed: int, surface: PlacedSurface
 ) -> tuple[Rendered, bool]:
-    """The picture; without the specks where the surface turns away from a camera, as dirt cannot be drawn there."""
+    """The picture, and whether its specks are drawn: not where the surface turns away from a camera."""
     from dataclasses import replace
 
     from cmpdesign.scene import SceneError
 
     try:
-        return one.picture(drawn, seed, pressed), True
+        return instrument.picture(conditions, seed, surface), True
     except SceneError:
-        if drawn.damage is None:
+        if conditions.damage is None:
             raise
-        return one.picture(replace(drawn, damage=None), seed, pressed), False
+        return instrument.picture(replace(conditions, damage=None), seed, surface), False
 
 
-def judge_places(one: Instrument, pressed: PlacedSurface, truth: Truth, places: Points) -> dict[str, Any]:
-    """What is right and wrong of places (V, M, 2) read in all views together."""
-    moved_mm = np.linalg.norm(pressed.displacement_mm(one.layout.marker_xy_mm), axis=1)
-    area = moved_mm >= CONTACT_DISPLACEMENT_SHARE * moved_mm[one.layout.present].max()
+def judge_places(
+    instrument: Instrument, surface: PlacedSurface, truth: Truth, places: Points
+) -> dict[str, Any]:
+    """Counts of right and wrong markers in all views together.
+
+    Args:
+        instrument: the pattern on its sensor.
+        surface: the deformed surface.
+        truth: the picture's truth.
+        places: (V, M, 2) px, the read positions, NaN where lost.
+    """
+    displacement_mm = np.linalg.norm(surface.displacement_mm(instrument.layout.marker_xy_mm), axis=1)
+    area = displacement_mm >= CONTACT_DISPLACEMENT_SHARE * displacement_mm[instrument.layout.present].max()
     needed = np.asarray(truth.visible) & area
-    away_px = np.linalg.norm(places - truth.marker_xy_px, axis=2)
-    tolerance_px = PLACE_TOLERANCE_EDGES * one.edge_px
-    known = np.isfinite(away_px)
-    right = known & (away_px <= tolerance_px)
-    rms_px = float(np.sqrt(np.mean(away_px[right] ** 2))) if right.any() else None
+    error_px = np.linalg.norm(places - truth.marker_xy_px, axis=2)
+    tolerance_px = PLACE_TOLERANCE_EDGES * instrument.edge_px
+    known = np.isfinite(error_px)
+    right = known & (error_px <= tolerance_px)
+    rms_px = float(np.sqrt(np.mean(error_px[right] ** 2))) if right.any() else None
     return {
         "needed": int(needed.sum()),
         "right": int((needed & right).sum()),
@@ -137,14 +153,14 @@ def judge_places(one: Instrument, pressed: PlacedSurface, truth: Truth, places: 
     }
 
 
-def is_successful(criterion: str, one: Mapping[str, Any]) -> bool:
-    """Whether a method's reading of one contact is successful, by a criterion of ``SUCCESS_CRITERIA``."""
+def is_successful(criterion: str, judged: Mapping[str, Any]) -> bool:
+    """Whether a judged reading of one contact is successful by a criterion of ``SUCCESS_CRITERIA``."""
     share = {"strict": 1.0, "area_95": 0.95, "no_wrong": 0.5}[criterion]
-    return bool(one["wrong"] == 0 and one["right"] >= share * one["needed"])
+    return bool(judged["wrong"] == 0 and judged["right"] >= share * judged["needed"])
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members."""
+    """The members of report.json."""
     modes: dict[str, Any] = {}
     for mode in CONTACT_LOADS:
         found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
@@ -160,18 +176,18 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
     }
 
 
-def _summarise_method(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _summarise_method(readings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     counts = {
-        name: SuccessShare(len(found), sum(is_successful(name, one) for one in found)).to_json()
+        name: SuccessShare(len(readings), sum(is_successful(name, judged) for judged in readings)).to_json()
         for name in SUCCESS_CRITERIA
     }
     return {
         **counts["strict"],
         "by_criterion": counts,
         "right_in_area_percent": sample_statistics(
-            [100 * one["right"] / max(one["needed"], 1) for one in found]
+            [100 * judged["right"] / max(judged["needed"], 1) for judged in readings]
         ).to_json(),
-        "wrong_markers": sum(one["wrong"] for one in found),
-        "trials_with_wrong": sum(one["wrong"] > 0 for one in found),
-        "rms_px": sample_statistics([one["rms_px"] for one in found]).to_json(),
+        "wrong_markers": sum(judged["wrong"] for judged in readings),
+        "trials_with_wrong": sum(judged["wrong"] > 0 for judged in readings),
+        "rms_px": sample_statistics([judged["rms_px"] for judged in readings]).to_json(),
     }

@@ -1,4 +1,4 @@
-"""``evaluate response``: how much of a shear the markers in contact show (Fig. 11b)."""
+"""``evaluate response``: the share of a shear that the markers in contact show (Fig. 11b)."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ work = cube.work
 
 
 def trials(options: RunOptions) -> list[Trial]:
-    """As many places of the cube for both directions."""
+    """The same number of positions of the cube for both directions."""
     return cube_trials(tuple(CASES.values()), options)
 
 
 def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """report.json's members: by direction, mean displacement of the edge points over the shear."""
+    """The members of report.json: by direction, mean displacement of the edge points over the shear."""
     document: dict[str, Any] = {}
     for case, mode in CASES.items():
-        found = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
+        of_mode = [r for t, r in zip(trials, results, strict=True) if t.values["mode"] == mode]
         means = {
-            method: round_for_json(sample_statistics(response_values(found, method, "read")).mean)
+            method: round_for_json(sample_statistics(response_values(of_mode, method, "read")).mean)
             for method in METHODS
         }
         others = {
             variant: {
-                method: round_for_json(sample_statistics(response_values(found, method, variant)).mean)
+                method: round_for_json(sample_statistics(response_values(of_mode, method, variant)).mean)
                 for method in METHODS
             }
             for variant in ("with_virtual", "perfect")
         }
-        for one in others.values():
-            one["change_percent"] = article.change_percent(one["square"], one["multicolor"])
+        for entry in others.values():
+            entry["change_percent"] = article.change_percent(entry["square"], entry["multicolor"])
         document[case] = {
             **means,
             "change_percent": article.change_percent(means["square"], means["multicolor"]),
             "article_change_percent": article.RESPONSE_CHANGE_PERCENT[case],
             "distribution": {
-                method: sample_statistics(response_values(found, method, "read")).to_json()
+                method: sample_statistics(response_values(of_mode, method, "read")).to_json()
                 for method in METHODS
             },
             "variants": others,
@@ -52,6 +52,10 @@ def figures(trials: Sequence[Trial], results: Sequence[Mapping[str, Any]]) -> di
     return {"response": document}
 
 
-def response_values(found: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
-    """The responses of a method, where it has one."""
-    return [one[method][variant]["response"] for one in found if one[method][variant]["response"] is not None]
+def response_values(results: Sequence[Mapping[str, Any]], method: str, variant: str) -> list[float]:
+    """The responses of a method, without trials that have none."""
+    return [
+        result[method][variant]["response"]
+        for result in results
+        if result[method][variant]["response"] is not None
+    ]

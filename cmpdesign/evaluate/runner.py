@@ -1,4 +1,4 @@
-"""Runs trials on several cores, noting each; the figures depend on neither their number nor their order."""
+"""Runs trials on several cores and writes each result to the journal. Results do not depend on number and order."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from cmpdesign.evaluate.journal import Journal
 
 @dataclass(frozen=True)
 class Trial:
-    """One thing to try.
+    """One trial.
 
     Attributes:
-        key: its name in the journal, unique in a run.
-        values: what the work needs to know, as JSON values.
+        key: the name in the journal, unique in a run.
+        values: the arguments of the work, as JSON values.
     """
 
     key: str
@@ -31,14 +31,17 @@ class Trial:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a user chooses for a run.
+    """The user's options of a run.
 
     Attributes:
-        trials: how many of each kind.
-        seed: of everything random.
+        trials: number of trials of each kind.
+        seed: seed of all random values.
         sensor_text: the sensor file's content.
-        preset: the extractor's.
-        workers: processes.
+        preset: the extractor's preset.
+        workers: number of processes.
+
+    Raises:
+        CmpDesignError: a value is out of range.
     """
 
     trials: int
@@ -56,7 +59,7 @@ class RunOptions:
 
     @property
     def values(self) -> dict[str, Any]:
-        """What every trial is told; it decides the results, so the journal is only good for the same."""
+        """The values that every trial receives. A journal is valid for one set of values."""
         return {"sensor": self.sensor_text, "seed": self.seed, "preset": self.preset}
 
 
@@ -64,23 +67,25 @@ Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
 def trial_rng(seed: int, name: str, index: int) -> np.random.Generator:
-    """The stream of random numbers of one trial: the same whichever process draws it, and when."""
+    """The random stream of one trial, the same in every process and at any time."""
     return np.random.default_rng([seed, zlib.crc32(name.encode("utf-8")), index])
 
 
 def run_trials(
     work: Work, trials: Sequence[Trial], journal: Journal, *, workers: int, title: str, show: bool = True
 ) -> list[Mapping[str, Any]]:
-    """The results of all trials, in their order; those that the journal holds are not tried again.
+    """The results of all trials, in their order; trials in the journal are not run again.
 
     Args:
         work: a picklable function of a trial's values -> JSON values.
-        workers: processes; 1 works in this one.
-        title: what the progress bar is called.
-        show: a bar on stderr, where a terminal shows it.
+        trials: the trials.
+        journal: the results of earlier runs; new results are added.
+        workers: number of processes; 1: this process.
+        title: label of the progress bar.
+        show: show a progress bar if stderr is a terminal.
 
     Raises:
-        CmpDesignError: two trials have one key.
+        CmpDesignError: two trials have the same key.
         OutputError: the journal cannot be written.
     """
     if len({trial.key for trial in trials}) < len(trials):
@@ -94,7 +99,7 @@ def run_trials(
 
 
 def _iterate_results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tuple[str, Any]]:
-    """(key, result) as they come in."""
+    """(key, result) in the order of completion."""
     if workers == 1 or len(trials) < 2:
         for trial in trials:
             yield trial.key, _run_trial(work, trial.values)
@@ -112,14 +117,14 @@ def _iterate_results(work: Work, trials: Sequence[Trial], workers: int) -> Itera
 
 
 def _ignore_interrupts() -> None:
-    """Ctrl-C reaches all processes of a terminal; a worker ends its trial, and its parent gives it no other."""
+    """Ignore Ctrl-C in a worker: it reaches all processes of a terminal, and the parent ends the run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
-    """One result, through JSON, so that it is the same whether it comes from here or from the journal.
+    """One result, converted to JSON and back, so that it equals the same result from the journal.
 
-    On one thread: the processes share the cores, and sums come out the same however many there are.
+    The work runs on one thread: processes share the cores, and sums do not depend on the number of threads.
     """
     import cv2
 
@@ -136,7 +141,7 @@ def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
 
 @contextmanager
 def _progress_bar(title: str, total: int, done: int, show: bool) -> Iterator[Callable[[], None]]:
-    """A progress bar on stderr where a terminal shows it."""
+    """A progress bar if stderr is a terminal; yields the function that advances it."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

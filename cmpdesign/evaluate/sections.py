@@ -1,4 +1,4 @@
-"""What each report shows of its figures."""
+"""The sections of each report's page."""
 
 from __future__ import annotations
 
@@ -43,14 +43,17 @@ DIFFERENCES_RELIABILITY = (
 
 
 def format_number(value: float | None, digits: int = 3, unit: str = "") -> str:
+    """A number with fixed digits and its unit; "none" for None."""
     return "none" if value is None else f"{value:.{digits}f}{unit}"
 
 
 def format_percent(value: float | None) -> str:
+    """A signed percentage; "none" for None."""
     return "none" if value is None else f"{value:+.1f} %"
 
 
 def conditions_section(document: Document) -> Section:
+    """The section on the conditions of a run."""
     return Section(
         "Conditions",
         [
@@ -61,21 +64,23 @@ def conditions_section(document: Document) -> Section:
     )
 
 
-def differences_section(more: Sequence[str]) -> Section:
-    return Section(DIFFERENCES_TITLE, points=[*more, *DIFFERENCES])
+def differences_section(own_points: Sequence[str]) -> Section:
+    """The section on differences from the article: an experiment's own points, then the common ones."""
+    return Section(DIFFERENCES_TITLE, points=[*own_points, *DIFFERENCES])
 
 
 def reliability_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate reliability``."""
     modes = document["modes"]
     rows = [
         [
             f"{mode.replace('_', ' ')}: {method.replace('_', ' ')}",
-            *_success_cells(one),
-            *_criteria_cells(one),
-            _article_cell(one),
+            *_success_cells(entry),
+            *_criteria_cells(entry),
+            _article_cell(entry),
         ]
         for mode, methods in modes.items()
-        for method, one in methods.items()
+        for method, entry in methods.items()
     ]
     table = Table(
         "Successful trials; 95 % intervals after Wilson.",
@@ -111,28 +116,29 @@ def reliability_sections(document: Document) -> list[Section]:
     ]
 
 
-def _success_cells(one: Document) -> list[str]:
-    low, high = one["interval_95"]
-    share = one["share"]
-    counts = f"{one['successful']} of {one['trials']}"
+def _success_cells(entry: Document) -> list[str]:
+    low, high = entry["interval_95"]
+    share = entry["share"]
+    counts = f"{entry['successful']} of {entry['trials']}"
     return [counts, f"{100 * share:.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %"]
 
 
-def _criteria_cells(one: Document) -> list[str]:
-    other = one["by_criterion"]
+def _criteria_cells(entry: Document) -> list[str]:
+    variant = entry["by_criterion"]
     return [
-        f"{100 * other['area_95']['share']:.1f} %",
-        f"{100 * other['no_wrong']['share']:.1f} %",
-        format_number(one["right_in_area_percent"]["mean"], 2, " %"),
-        str(one["wrong_markers"]),
+        f"{100 * variant['area_95']['share']:.1f} %",
+        f"{100 * variant['no_wrong']['share']:.1f} %",
+        format_number(entry["right_in_area_percent"]["mean"], 2, " %"),
+        str(entry["wrong_markers"]),
     ]
 
 
-def _article_cell(one: Document) -> str:
-    return f"{one['article']['successful']} of {one['article']['trials']}" if "article" in one else ""
+def _article_cell(entry: Document) -> str:
+    return f"{entry['article']['successful']} of {entry['article']['trials']}" if "article" in entry else ""
 
 
 def precision_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate precision``."""
     return [
         conditions_section(document),
         _edge_section(document["edge_fit_error_mm"]),
@@ -142,27 +148,27 @@ def precision_sections(document: Document) -> list[Section]:
 
 
 def _change_rows(cases: Document) -> list[Sequence[str]]:
-    """Both patterns and the change from one to the other by label, the article's beside, variants below."""
+    """Rows by label: both patterns, the change, and the article's change; variants in further rows."""
     rows: list[Sequence[str]] = []
-    for label, one in cases.items():
+    for label, entry in cases.items():
         cells = [
-            format_number(one["square"]),
-            format_number(one["multicolor"]),
-            format_percent(one["change_percent"]),
+            format_number(entry["square"]),
+            format_number(entry["multicolor"]),
+            format_percent(entry["change_percent"]),
         ]
-        rows.append([label, *cells, format_percent(one["article_change_percent"])])
-        for name, other in one["variants"].items():
+        rows.append([label, *cells, format_percent(entry["article_change_percent"])])
+        for name, variant in entry["variants"].items():
             cells = [
-                format_number(other["square"]),
-                format_number(other["multicolor"]),
-                format_percent(other["change_percent"]),
+                format_number(variant["square"]),
+                format_number(variant["multicolor"]),
+                format_percent(variant["change_percent"]),
             ]
             rows.append([f"{label}, {VARIANTS[name]}", *cells, ""])
     return rows
 
 
 def _edge_section(edges: Document) -> Section:
-    rows = _change_rows({mode.replace("_", " + "): one for mode, one in edges.items()})
+    rows = _change_rows({mode.replace("_", " + "): entry for mode, entry in edges.items()})
     table = Table(
         "Edge fitting error, mm: by how much the fitted square's side misses 15 mm, mean over the places.",
         ("mode", "square", "multicolor", "change", "the article"),
@@ -170,9 +176,9 @@ def _edge_section(edges: Document) -> Section:
     )
     sides = {
         mode: {
-            m: [abs(s - 15) for s in d["side_mm"] if s is not None] for m, d in one["distribution"].items()
+            m: [abs(s - 15) for s in d["side_mm"] if s is not None] for m, d in entry["distribution"].items()
         }
-        for mode, one in edges.items()
+        for mode, entry in edges.items()
     }
     return Section(
         "Edge fitting error",
@@ -200,15 +206,15 @@ def _shape_section(document: Document) -> Section:
         [
             f"{name}: {method}",
             *(
-                format_number(_to_um(one[key]["mean"]), 1)
+                format_number(_to_um(entry[key]["mean"]), 1)
                 for key in ("surface_rms_mm", "depth_rms_mm", "marker_rms_mm")
             ),
-            format_number(_to_um(one["marker_median_mm"]["mean"]), 1),
-            *(format_number(one[key]["mean"], 2) for key in ("over_sigma", "over_sigma_median")),
-            *(_format_whole_percent(one[key]["mean"]) for key in ("covered", "measured")),
+            format_number(_to_um(entry["marker_median_mm"]["mean"]), 1),
+            *(format_number(entry[key]["mean"], 2) for key in ("over_sigma", "over_sigma_median")),
+            *(_format_whole_percent(entry[key]["mean"]) for key in ("covered", "measured")),
         ]
         for name, methods in shapes.items()
-        for method, one in methods.items()
+        for method, entry in methods.items()
     ]
     headings = (
         "object: pattern",
@@ -223,7 +229,7 @@ def _shape_section(document: Document) -> Section:
     )
     table = Table("Errors in micrometres, means over the places.", headings, rows)
     errors = {
-        name: {method: _to_um(one["surface_rms_mm"]["mean"]) for method, one in methods.items()}
+        name: {method: _to_um(entry["surface_rms_mm"]["mean"]) for method, entry in methods.items()}
         for name, methods in shapes.items()
     }
     return Section(
@@ -248,14 +254,15 @@ def _format_whole_percent(share: float | None) -> str:
 
 
 def response_sections(document: Document) -> list[Section]:
-    rows = _change_rows({case.replace("_", " "): one for case, one in document["response"].items()})
+    """The page of ``evaluate response``."""
+    rows = _change_rows({case.replace("_", " "): entry for case, entry in document["response"].items()})
     table = Table(
         "Mean displacement of the edge points over the shear of 1 mm.",
         ("direction", "square", "multicolor", "change", "the article"),
         rows,
     )
     means = {
-        case: {m: one[m] for m in ("square", "multicolor")} for case, one in document["response"].items()
+        case: {m: entry[m] for m in ("square", "multicolor")} for case, entry in document["response"].items()
     }
     plot = Plot("Response by direction.", plots.plot_bars(means, "displacement / shear"))
     return [
@@ -274,17 +281,18 @@ def response_sections(document: Document) -> list[Section]:
 
 
 def angle_sections(document: Document) -> list[Section]:
+    """The page of ``evaluate angles``."""
     sections = []
     for name, title, equation in (
         ("shape_change_deg", "Shape change", "eq. 1: 360 / n"),
         ("rotation_deg", "Rotation", "eq. 2: 180 / n"),
     ):
-        cells = {int(key.removeprefix("n")): one[name] for key, one in document["cells"].items()}
+        cells = {int(key.removeprefix("n")): entry[name] for key, entry in document["cells"].items()}
         measured = {
-            sides: {int(size.removesuffix("px")): angle for size, angle in one["measured"].items()}
-            for sides, one in cells.items()
+            sides: {int(size.removesuffix("px")): angle for size, angle in entry["measured"].items()}
+            for sides, entry in cells.items()
         }
-        formula = {sides: one["formula"] for sides, one in cells.items()}
+        formula = {sides: entry["formula"] for sides, entry in cells.items()}
         sizes = list(next(iter(measured.values())))
         rows = [
             [
@@ -308,22 +316,23 @@ def angle_sections(document: Document) -> list[Section]:
 
 
 def design_sections(document: Document) -> list[Section]:
-    found = document["designs"]
+    """The page of ``evaluate designs``."""
+    designs = document["designs"]
     rows = [
         [
             name,
-            one["pattern"],
-            format_number(one["pitch_mm"]),
-            str(one["markers"]),
-            format_number(one["markers_per_cm2"], 1),
-            format_number(_to_um(one["surface_rms_mm"]["mean"]), 1),
-            format_number(_to_um(one["marker_rms_mm"]["mean"]), 1),
-            format_number(_to_um(one["marker_median_mm"]["mean"]), 1),
-            *(_format_whole_percent(one[key]["mean"]) for key in ("covered", "measured")),
-            format_number(one["smallest_feature_mm"]),
-            format_number(one["laser_time_s"], 0),
+            entry["pattern"],
+            format_number(entry["pitch_mm"]),
+            str(entry["markers"]),
+            format_number(entry["markers_per_cm2"], 1),
+            format_number(_to_um(entry["surface_rms_mm"]["mean"]), 1),
+            format_number(_to_um(entry["marker_rms_mm"]["mean"]), 1),
+            format_number(_to_um(entry["marker_median_mm"]["mean"]), 1),
+            *(_format_whole_percent(entry[key]["mean"]) for key in ("covered", "measured")),
+            format_number(entry["smallest_feature_mm"]),
+            format_number(entry["laser_time_s"], 0),
         ]
-        for name, one in found.items()
+        for name, entry in designs.items()
     ]
     headings = (
         "design",
@@ -340,9 +349,9 @@ def design_sections(document: Document) -> list[Section]:
         "laser, s",
     )
     points = {
-        name: (one["markers_per_cm2"], _to_um(one["surface_rms_mm"]["mean"]) or 0.0)
-        for name, one in found.items()
-        if one["surface_rms_mm"]["mean"] is not None
+        name: (entry["markers_per_cm2"], _to_um(entry["surface_rms_mm"]["mean"]) or 0.0)
+        for name, entry in designs.items()
+        if entry["surface_rms_mm"]["mean"] is not None
     }
     return [
         conditions_section(document),

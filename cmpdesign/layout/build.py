@@ -1,4 +1,4 @@
-"""From a design to its layout."""
+"""Construction of a layout from a design."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from cmpdesign.patterns.numbering import Ints
 
 
 def build_layout(design: Design) -> Layout:
-    """The layout of a design: every marker, cell and edge, in the layout frame (mm).
+    """Build the layout of a design: every marker, cell and edge, in the layout frame (mm).
 
-    A clip outline drops cells and the edges that no cell is left at; markers all stay, because a marker's
-    position in the arrays is its id. ``Layout.present`` says which of them can be seen.
+    A clip outline removes cells, and edges without a remaining cell. All markers stay, because a marker's
+    position in the arrays is its id. ``Layout.present`` marks the markers that can be seen.
 
     Raises:
-        DesignError: the sizes cannot be resolved, or the clip outline drops the reference cell.
+        DesignError: the sizes cannot be resolved, or the clip outline removes the reference cell or one of its
+            neighbours.
 
     >>> from cmpdesign import load_design
     >>> layout = build_layout(load_design("honeycomb", {"layers": "10", "pitch_mm": "1.5"}))
@@ -37,9 +38,9 @@ def build_layout(design: Design) -> Layout:
     """
     shape, pitch_mm = resolve_size(design)
     pattern = registered_patterns()[design.pattern]
-    mesh = pattern.graph.mesh(shape.layers)
+    graph = pattern.graph.make_graph(shape.layers)
     turn = rotation_matrix(design.rotation_deg).T
-    xy_mm = pitch_mm * (pattern.positions(mesh.layer, mesh.index, shape) @ turn)
+    xy_mm = pitch_mm * (pattern.positions(graph.layer, graph.index, shape) @ turn)
     centre_mm = pitch_mm * (pattern_centre(design, shape) @ turn)
 
     if design.clip == "none":
@@ -47,20 +48,20 @@ def build_layout(design: Design) -> Layout:
         outline_mm = pitch_mm * corners + design.border_mm * corner_offsets(corners)
     else:
         outline_mm = clip_outline(design)
-        mesh = _clip_graph(design, mesh, xy_mm - centre_mm)
+        graph = _clip_graph(design, graph, xy_mm - centre_mm)
 
     return Layout(
         pattern=design.pattern,
         parameters=_layout_parameters(design, shape, pitch_mm),
-        marker_layer=mesh.layer.astype(np.int32),
-        marker_index=mesh.index.astype(np.int32),
+        marker_layer=graph.layer.astype(np.int32),
+        marker_index=graph.index.astype(np.int32),
         marker_xy_mm=_round_points(xy_mm),
-        cell_corners=mesh.corners.astype(np.int32),
-        cell_color=mesh.color,
-        edges=_edges(mesh.corners),
+        cell_corners=graph.corners.astype(np.int32),
+        cell_color=graph.color,
+        edges=_edges(graph.corners),
         virtual_per_edge=design.virtual_per_edge,
-        reference_cell=mesh.reference_cell,
-        reference_marker=mesh.reference_marker,
+        reference_cell=graph.reference_cell,
+        reference_marker=graph.reference_marker,
         palette=design.palette.model_dump(),
         border_mm=design.border_mm,
         outline_mm=_round_points(outline_mm + centre_mm),
@@ -69,39 +70,39 @@ def build_layout(design: Design) -> Layout:
     )
 
 
-def _clip_graph(design: Design, mesh: MarkerGraph, xy_mm: Points) -> MarkerGraph:
-    """The mesh without the cells that reach over the clip outline less its border; xy from the centre."""
-    # A picometre of tolerance: a cell that exactly fills the window is inside it.
-    slack_mm = 10**-DECIMALS
+def _clip_graph(design: Design, graph: MarkerGraph, xy_mm: Points) -> MarkerGraph:
+    """The graph without the cells that cross the clip outline less its border; ``xy_mm`` is relative to the centre."""
+    # A tolerance of one picometre keeps a cell that exactly fills the window.
+    tolerance_mm = 10**-DECIMALS
     if design.clip == "circle":
-        reach_mm = clip_outline(design, design.border_mm)[0, 0]
-        inside = np.hypot(*xy_mm.T) <= reach_mm + slack_mm
+        limit_mm = clip_outline(design, design.border_mm)[0, 0]
+        inside = np.hypot(*xy_mm.T) <= limit_mm + tolerance_mm
     else:
-        reach_mm = clip_outline(design, design.border_mm).max(axis=0)
-        inside = (np.abs(xy_mm) <= reach_mm + slack_mm).all(axis=1)
-    keep = inside[mesh.corners].all(axis=1)
-    if not keep[mesh.reference_cell]:
+        limit_mm = clip_outline(design, design.border_mm).max(axis=0)
+        inside = (np.abs(xy_mm) <= limit_mm + tolerance_mm).all(axis=1)
+    keep = inside[graph.corners].all(axis=1)
+    if not keep[graph.reference_cell]:
         raise DesignError(
             f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts the reference "
             "cell away: nothing could be numbered; make the outline larger or the pitch smaller"
         )
-    if not _is_reference_surrounded(mesh, keep):
+    if not _is_reference_surrounded(graph, keep):
         raise DesignError(
             f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts cells around "
             "the reference cell away; make the outline larger or the pitch smaller"
         )
-    reference = int(np.count_nonzero(keep[: mesh.reference_cell]))
-    return replace(mesh, corners=mesh.corners[keep], color=mesh.color[keep], reference_cell=reference)
+    reference = int(np.count_nonzero(keep[: graph.reference_cell]))
+    return replace(graph, corners=graph.corners[keep], color=graph.color[keep], reference_cell=reference)
 
 
-def _is_reference_surrounded(mesh: MarkerGraph, keep: NDArray[np.bool_]) -> bool:
-    """True when every cell that shares a side with the reference cell is kept: numbering starts from them."""
-    shared = np.isin(mesh.corners, mesh.corners[mesh.reference_cell]).sum(axis=1)
+def _is_reference_surrounded(graph: MarkerGraph, keep: NDArray[np.bool_]) -> bool:
+    """True when every cell that shares a side with the reference cell is kept. Numbering starts from these cells."""
+    shared = np.isin(graph.corners, graph.corners[graph.reference_cell]).sum(axis=1)
     return bool(keep[shared >= 2].all())
 
 
 def _edges(corners: Ints) -> NDArray[np.int32]:
-    """(E, 2) the cells' sides, each once, from the smaller to the larger id, in ascending order."""
+    """(E, 2) int32: the sides of all cells, each once, from the smaller to the larger id, in ascending order."""
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
     low, high = sides.min(axis=1), sides.max(axis=1)
     base = int(high.max()) + 1
@@ -109,7 +110,7 @@ def _edges(corners: Ints) -> NDArray[np.int32]:
 
 
 def _layout_parameters(design: Design, shape: PatternShape, pitch_mm: float) -> dict[str, Any]:
-    """What the design came to: layers, pitch_mm, mirrored, rotation_deg always, the rest where it applies."""
+    """The resolved parameters: always layers, pitch_mm, mirrored, rotation_deg; others where they apply."""
     parameters: dict[str, Any] = {
         "name": design.name,
         "layers": shape.layers,
@@ -126,5 +127,5 @@ def _layout_parameters(design: Design, shape: PatternShape, pitch_mm: float) -> 
 
 
 def _round_points(points: Points) -> Points:
-    """Rounded as layouts are, and without negative zeros, so that every machine writes the same digits."""
+    """Points rounded to ``DECIMALS``, without negative zeros, so that every machine writes the same digits."""
     return np.round(points, DECIMALS) + 0.0

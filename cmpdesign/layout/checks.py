@@ -1,4 +1,4 @@
-"""What of a design cannot be made or read: each finding with its value, limit, unit and remedy."""
+"""Checks of a design: features that cannot be made or read, each with its value, limit, unit and remedy."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
 from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
 
-# A desktop CO2 laser removes a kerf of 0.1 to 0.2 mm and an inkjet dot on film spreads to about 0.1 mm: a
-# cell whose inscribed circle is no wider comes out as a dot, and up to three times that with round corners.
+# A desktop CO2 laser removes a kerf of 0.1 to 0.2 mm, and an inkjet dot on film spreads to about 0.1 mm. A cell
+# with an inscribed circle of this diameter becomes a dot; up to three times that, its corners become round.
 CELL_ERROR_MM, CELL_WARNING_MM = 0.1, 0.3
 # A corner rounded to the radius r is missing over r / sin(angle / 2): 2 r at 60 degrees, 6 r at 20 degrees.
 CORNER_WARNING_DEG = 20.0
-# The three inks are told apart by hue alone, at best 120 degrees apart. LEDs and white balance shift each by
-# some 20 degrees, so that two inks less than 45 degrees apart may change places.
+# The three inks are distinguished by hue alone; at best they are 120 degrees apart. LEDs and white balance shift
+# each hue by about 20 degrees, so that two inks less than 45 degrees apart may be confused.
 HUE_ERROR_DEG = 45.0
 # Below this saturation, noise of 2/255 turns the hue of a mid-bright ink by several degrees.
 SATURATION_ERROR = 0.35
-# The error of a corner goes with the inverse contrast between ink and black; in steps of 255.
+# The error of a corner is inversely proportional to the contrast between ink and black, in 1/255.
 CONTRAST_ERROR, CONTRAST_WARNING = 40, 80
-# White must be brighter than the inks' dark channels and without a hue of its own.
+# White must be brighter than the inks' dark channels and must have no hue.
 WHITE_SATURATION_ERROR, WHITE_VALUE_ERROR = 0.2, 0.6
-# A triangle of 6 px edge covers 16 px, most of them blurred by its border; 12 px is the least that is
-# tested at every rotation and tilt.
+# A triangle with edges of 6 px covers 16 px, and most of these are blurred by its border. 12 px is the smallest
+# edge that is tested at every rotation and tilt.
 CAMERA_PX = (640, 480)
 EDGE_ERROR_PX, EDGE_WARNING_PX = 6.0, 12.0
-# Without a black frame the rim's gridlines have whatever lies behind the pattern as their other side.
+# Without a black border, the other side of the rim's gridlines is whatever lies behind the pattern.
 BORDER_WARNING_PITCHES = 0.25
-# Markers that the clip outline took away still fill every array. A hexagon around a rectangle loses half.
+# Markers removed by the clip outline still occupy every array. A hexagon around a rectangle loses half.
 PRESENT_WARNING = 0.33
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that cannot be made or read.
+    """One feature that cannot be made or read.
 
     Attributes:
-        subject: what was checked.
-        value, limit: the measured value and the one that it should not pass.
-        unit: of both; "" for a plain number.
-        remedy: what to change.
+        subject: the checked quantity.
+        value, limit: the measured value and its limit.
+        unit: the unit of both; "" for a plain number.
+        remedy: the change to make.
         severity: "error" (will not work) or "warning" (works under good conditions only).
     """
 
@@ -67,12 +67,12 @@ class Finding:
 def check_design(
     design: Design, layout: Layout | None = None, camera_px: tuple[int, int] = CAMERA_PX
 ) -> list[Finding]:
-    """Findings, errors first; an empty list when there is nothing to say.
+    """Check a design. Returns the findings, errors first; an empty list when there are none.
 
     Args:
         design: the design.
-        layout: its layout, if it is at hand.
-        camera_px: width and height of a camera whose picture the pattern just fills.
+        layout: its layout; None: it is built.
+        camera_px: width and height of a camera image that the pattern just fills.
 
     Raises:
         DesignError: the design has no layout.
@@ -114,14 +114,14 @@ def _size_findings(layout: Layout) -> Iterator[Finding]:
 
 def _camera_findings(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:
     width_mm, height_mm = layout.size_mm
-    # The picture may lie across the pattern.
-    scale = max(
+    # The image's longer side may lie along the pattern's shorter side.
+    scale_px_per_mm = max(
         min(camera_px[0] / width_mm, camera_px[1] / height_mm),
         min(camera_px[1] / width_mm, camera_px[0] / height_mm),
     )
     yield from _findings_below(
         f"shortest edge in a {camera_px[0]}x{camera_px[1]} picture filled by the pattern",
-        scale * float(edge_lengths_mm(layout).min()),
+        scale_px_per_mm * float(edge_lengths_mm(layout).min()),
         EDGE_ERROR_PX,
         EDGE_WARNING_PX,
         "px",
@@ -163,10 +163,10 @@ def _color_findings(layout: Layout) -> Iterator[Finding]:
     inks = [RED, GREEN, BLUE] if layout.cell_corners.shape[1] == 3 else [RED]
     hsv = {color: _hsv(layout, color) for color in range(len(COLORS))}
     for first, second in combinations(inks, 2):
-        apart = abs(hsv[first][0] - hsv[second][0])
+        hue_distance_deg = abs(hsv[first][0] - hsv[second][0])
         yield from _findings_below(
             f"hue distance of {COLORS[first]} and {COLORS[second]}",
-            min(apart, 360 - apart),
+            min(hue_distance_deg, 360 - hue_distance_deg),
             HUE_ERROR_DEG,
             None,
             "deg",
@@ -204,7 +204,7 @@ def _color_findings(layout: Layout) -> Iterator[Finding]:
 def _findings_below(
     subject: str, value: float, error: float | None, warning: float | None, unit: str, remedy: str
 ) -> Iterator[Finding]:
-    """A finding when the value lies below a limit; the stricter limit that it passes is the one named."""
+    """A finding when the value is below a limit. An error takes precedence over a warning."""
     if error is not None and value < error:
         yield Finding(subject, value, error, unit, remedy, "error")
     elif warning is not None and value < warning:

@@ -1,4 +1,4 @@
-"""The layout: every marker, cell and edge of a pattern, in frozen arrays. It knows no file format."""
+"""The layout: every marker, cell and edge of a pattern, in frozen arrays, independent of file formats."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.patterns.colors import BLACK
 
-# Coordinates are held to a picometre, so that every machine writes the same digits.
+# Coordinates are rounded to a picometre, so that every machine writes the same digits.
 DECIMALS = 9
 
 
@@ -24,20 +24,20 @@ class Layout:
 
     Attributes:
         pattern: the registered pattern's name.
-        parameters: the design's parameters, resolved; ``mirrored`` says from which side the camera looks.
+        parameters: the design's parameters, resolved; ``mirrored``: the camera looks at the pattern's back.
         marker_layer, marker_index: (M,) int32; a marker's position in the arrays is its id.
         marker_xy_mm: (M, 2) float64, rounded to 1e-9 mm.
         cell_corners: (C, 3) int32 (square: (C, 4)), marker ids counter-clockwise from the front.
         cell_color: (C,) uint8, an index into ``COLORS``.
         edges: (E, 2) int32, each from its smaller to its larger marker id, in ascending order.
         virtual_per_edge: virtual markers on every edge.
-        reference_cell, reference_marker: the reference cell and the marker where numbering starts.
+        reference_cell, reference_marker: the reference cell and the marker at which numbering starts.
         palette: color name -> "#rrggbb".
         border_mm: width of the black border around the pattern.
         outline_mm: (K, 2) float64, the ground's closed outline (border included), counter-clockwise, the
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
-        fiducial_diameter_mm: their diameter.
+        fiducial_diameter_mm: the marks' diameter.
     """
 
     pattern: str
@@ -85,15 +85,15 @@ class Layout:
 
     @cached_property
     def present(self) -> NDArray[np.bool_]:
-        """(M,) True where a marker touches a colored or white cell; the others cannot be seen."""
-        seen = np.zeros(len(self.marker_xy_mm), dtype=np.bool_)
-        seen[self.cell_corners[self.cell_color != BLACK]] = True
-        seen.setflags(write=False)
-        return seen
+        """(M,) bool: the marker touches a colored or white cell. Other markers cannot be seen."""
+        present = np.zeros(len(self.marker_xy_mm), dtype=np.bool_)
+        present[self.cell_corners[self.cell_color != BLACK]] = True
+        present.setflags(write=False)
+        return present
 
     @cached_property
     def virtual_xy_mm(self) -> NDArray[np.float64]:
-        """(E, m, 2) virtual markers: j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""
+        """(E, m, 2) float64 mm: virtual marker j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""
         start, end = self.marker_xy_mm[self.edges[:, 0]], self.marker_xy_mm[self.edges[:, 1]]
         share = (np.arange(self.virtual_per_edge) + 1) / (self.virtual_per_edge + 1)
         points = start[:, None] + share[:, None] * (end - start)[:, None]
@@ -104,7 +104,7 @@ class Layout:
     def digest(self) -> str:
         """SHA-256 (hex) of the geometry: int32 layer, index, corners, color, edges, then float64 x, y.
 
-        All little-endian, in C order.
+        All arrays are little-endian and in C order.
         """
         digest = hashlib.sha256()
         for column, dtype in (

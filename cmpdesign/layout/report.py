@@ -22,19 +22,19 @@ class DesignReport:
     """Key figures.
 
     Attributes:
-        name, pattern, source: of the design.
-        layers, pitch_mm: as resolved.
-        markers: ids in the layout.
-        present_markers: those that touch a colored or white cell.
+        name, pattern, source: the design's fields.
+        layers, pitch_mm: the resolved values.
+        markers: number of ids in the layout.
+        present_markers: number of markers that touch a colored or white cell.
         cells: color -> number of cells.
-        edges, virtual_markers: edges, and virtual markers on all of them.
-        points: present and virtual markers together.
+        edges, virtual_markers: numbers of edges and of virtual markers on all edges.
+        points: number of present and virtual markers together.
         size_mm: overall width and height, border included.
-        shortest_edge_mm: the shortest edge.
-        smallest_feature_mm: diameter of the largest circle that the narrowest cell holds.
-        sharpest_corner_deg: the sharpest corner of any cell.
-        digest: the layout's.
-        findings: what ``check_design`` found.
+        shortest_edge_mm: length of the shortest edge.
+        smallest_feature_mm: diameter of the largest circle inside the narrowest cell.
+        sharpest_corner_deg: the smallest inner angle of all cells.
+        digest: the layout's digest.
+        findings: the findings of ``check_design``.
     """
 
     name: str
@@ -61,7 +61,7 @@ def design_report(design: Design, layout: Layout) -> DesignReport:
 
     >>> from cmpdesign import build_layout, load_design
     >>> design = load_design("tac3d")
-    >>> report(design, build_layout(design)).points
+    >>> design_report(design, build_layout(design)).points
     4981
     """
     counts = np.bincount(layout.cell_color, minlength=len(COLORS)).tolist()
@@ -89,7 +89,7 @@ def design_report(design: Design, layout: Layout) -> DesignReport:
 
 
 def report_to_json(figures: DesignReport, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
-    """report.json's text; ``products`` (name -> figures) are what the products measured of themselves."""
+    """The text of report.json; ``products`` (name -> figures) are the key figures of the products."""
     document = {
         "format": "cmp-report",
         "version": 1,

@@ -1,4 +1,4 @@
-"""From the sizes that a design gives to those that it needs: layers, pitch and aspect."""
+"""Resolution of a design's sizes to layers, pitch and aspect."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cmpdesign.patterns import PatternShape, registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS
 
 DEFAULT_ASPECT = 0.75
-# Fine enough that 200 layers of it still end on the asked size to a picometre; the same on every machine.
+# With this rounding 200 layers still meet the requested size to a picometre, equally on every machine.
 _SIZE_DECIMALS = 12
 
 
@@ -29,7 +29,7 @@ def resolve_size(design: Design) -> tuple[PatternShape, float]:
     """The pattern's shape and its pitch in mm.
 
     Raises:
-        DesignError: the overall size holds no pattern, or the clip outline needs too many layers.
+        DesignError: no pattern fits the overall size, or the clip outline needs too many layers.
     """
     if design.layers is not None and design.pitch_mm is not None:
         return _make_shape(design, design.layers), design.pitch_mm
@@ -40,7 +40,7 @@ def resolve_size(design: Design) -> tuple[PatternShape, float]:
 
 
 def rim_corners(design: Design, shape: PatternShape) -> Points:
-    """The rim's corners around the pattern's centre for a pitch of one, rotated, counter-clockwise."""
+    """(K, 2): the rim's corners relative to the pattern's centre, for a pitch of one, rotated, counter-clockwise."""
     pattern = registered_patterns()[design.pattern]
     corners = drop_collinear_points(pattern.positions(*pattern.graph.rim(shape.layers), shape))
     return (corners - pattern_centre(design, shape)) @ rotation_matrix(design.rotation_deg).T
@@ -53,7 +53,11 @@ def pattern_centre(design: Design, shape: PatternShape) -> Points:
 
 
 def fitting_pitch_mm(design: Design, shape: PatternShape) -> float:
-    """The largest pitch with which the pattern and its border stay within the overall size."""
+    """The largest pitch in mm at which the pattern and its border fit the overall size.
+
+    Raises:
+        DesignError: the border alone exceeds the overall size.
+    """
     corners = rim_corners(design, shape)
     border = design.border_mm * corner_offsets(corners)
     pitches = []
@@ -72,7 +76,7 @@ def fitting_pitch_mm(design: Design, shape: PatternShape) -> float:
 
 
 def _largest_pitch(corner: Points, border: Points, limit_mm: float) -> float:
-    """The pitch at which the extent of ``pitch * corner + border`` is the limit.
+    """The pitch in mm at which the extent of ``pitch * corner + border`` equals the limit.
 
     The extent is convex and piecewise linear in the pitch, so Newton's method ends on the exact piece.
     """
@@ -81,10 +85,10 @@ def _largest_pitch(corner: Points, border: Points, limit_mm: float) -> float:
         position = pitch * corner + border
         high, low = int(position.argmax()), int(position.argmin())
         slope, offset = corner[high] - corner[low], border[high] - border[low]
-        following = float((limit_mm - offset) / slope)
-        if following >= pitch * (1 - 1e-15):
+        next_pitch = float((limit_mm - offset) / slope)
+        if next_pitch >= pitch * (1 - 1e-15):
             break
-        pitch = following
+        pitch = next_pitch
     return pitch
 
 
@@ -99,38 +103,38 @@ def _make_shape(design: Design, layers: int) -> PatternShape:
 
 
 def _filling_aspect(design: Design, layers: int, spacing: str) -> float:
-    """The aspect with which a pattern fills the width and the height at once, by bisection."""
+    """The aspect at which a pattern fills both the width and the height, by bisection."""
     if design.rotation_deg % 180 != 0:
         raise DesignError(
             f"with rotation_deg = {design.rotation_deg:g} the aspect does not follow from width_mm and "
             "height_mm; add aspect"
         )
 
-    def too_tall(aspect: float) -> bool:
+    def is_too_tall(aspect: float) -> bool:
         shape = PatternShape(layers, aspect, spacing)
         by_width = design.model_copy(update={"height_mm": None})
         by_height = design.model_copy(update={"width_mm": None})
         return fitting_pitch_mm(by_height, shape) < fitting_pitch_mm(by_width, shape)
 
     low, high = ASPECT_MIN, ASPECT_MAX
-    if too_tall(low) or not too_tall(high):
+    if is_too_tall(low) or not is_too_tall(high):
         raise DesignError(
             f"no ellipse with an aspect of {ASPECT_MIN:g} to {ASPECT_MAX:g} fills {design.width_mm:g} x "
             f"{design.height_mm:g} mm less the border; change the sizes, or add aspect to stay within them"
         )
     for _ in range(50):
         middle = (low + high) / 2
-        low, high = (low, middle) if too_tall(middle) else (middle, high)
+        low, high = (low, middle) if is_too_tall(middle) else (middle, high)
     return round((low + high) / 2, _SIZE_DECIMALS)
 
 
 def _fitting_layers(design: Design) -> int:
-    """As many layers as fit the overall size, or as cover the clip outline."""
+    """The most layers that fit the overall size, or the fewest that cover the clip outline."""
     if design.width_mm is None and design.height_mm is None:
         return _covering_layers(design)
 
     def fits(layers: int) -> bool:
-        # A picometre of tolerance: 1.5 mm * 10 layers must fit into 30 mm.
+        # A tolerance of one picometre: 1.5 mm * 10 layers must fit into 30 mm.
         return bool(
             fitting_pitch_mm(design, _make_shape(design, layers))
             >= _require_given(design.pitch_mm) - 10**-DECIMALS
@@ -147,13 +151,13 @@ def _fitting_layers(design: Design) -> int:
 def _covering_layers(design: Design) -> int:
     window = clip_outline(design, design.border_mm)
 
-    def leaves_a_gap(layers: int) -> bool:
+    def has_gap(layers: int) -> bool:
         corners = _require_given(design.pitch_mm) * rim_corners(design, _make_shape(design, layers))
         side = np.roll(corners, -1, axis=0) - corners
         to_window = window[:, None, :] - corners[None, :, :]
         return bool((side[:, 0] * to_window[..., 1] - side[:, 1] * to_window[..., 0]).min() < 0)
 
-    layers = _largest_layers(leaves_a_gap) + 1 if leaves_a_gap(1) else 1
+    layers = _largest_layers(has_gap) + 1 if has_gap(1) else 1
     if layers > MAX_LAYERS:
         raise DesignError(
             f"covering the clip outline with pitch_mm = {design.pitch_mm:g} mm takes more than {MAX_LAYERS} "
@@ -163,7 +167,7 @@ def _covering_layers(design: Design) -> int:
 
 
 def clip_outline(design: Design, inset_mm: float = 0.0) -> Points:
-    """The clip outline around the pattern's centre, every side moved inward by ``inset_mm``."""
+    """(K, 2) mm: the clip outline around the pattern's centre, every side moved inward by ``inset_mm``."""
     if design.clip == "circle":
         return circle_outline(_require_given(design.clip_diameter_mm) - 2 * inset_mm)
     return rectangle_outline(
@@ -173,7 +177,10 @@ def clip_outline(design: Design, inset_mm: float = 0.0) -> Points:
 
 
 def _largest_layers(holds: Callable[[int], bool]) -> int:
-    """The largest number of layers for which it holds; it holds for 1 and, once it fails, for no more."""
+    """The largest number of layers for which the condition holds, by bisection.
+
+    The condition must hold for 1 and, from some number on, must fail for all larger ones.
+    """
     low, high = 1, MAX_LAYERS + 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -182,6 +189,6 @@ def _largest_layers(holds: Callable[[int], bool]) -> int:
 
 
 def _require_given(value: float | None) -> float:
-    """A value that ``Design`` has made sure of."""
+    """A value whose presence ``Design`` has checked."""
     assert value is not None
     return value

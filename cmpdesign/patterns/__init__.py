@@ -1,4 +1,8 @@
-"""The registry of patterns. A module in this folder that calls ``register_pattern`` is tested, drawn and offered."""
+"""The registry of patterns.
+
+In: a pattern's name and a ``PatternShape``. Out: its graph and the positions of its markers for a pitch of one.
+A module in this folder that calls ``register_pattern`` is tested, drawn and offered to users.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,12 @@ from cmpdesign.patterns.numbering import Ints
 
 @dataclass(frozen=True)
 class PatternShape:
-    """What a pattern may ask about a design.
+    """The parameters of a design that a pattern's positions depend on.
 
     Attributes:
         layers: the number of layers, 1 to 200.
-        aspect: height over width (b / a), for patterns that take it.
-        spacing: "angle" or "arc", for patterns that take it.
+        aspect: height over width (b / a), for patterns with this option.
+        spacing: "angle" or "arc", for patterns with this option.
     """
 
     layers: int
@@ -37,7 +41,14 @@ PositionFunction = Callable[[Ints, Ints, PatternShape], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Pattern:
-    """A registered pattern: its graph, where its markers lie, the options that only some patterns take."""
+    """A registered pattern.
+
+    Attributes:
+        name: the name in designs.
+        graph: the family of graphs that the pattern embeds.
+        positions: the function of marker positions.
+        options: the fields of ``PatternShape`` that this pattern uses besides ``layers``.
+    """
 
     name: str
     graph: GraphFamily
@@ -56,19 +67,19 @@ _PATTERNS: dict[str, Pattern] = {}
 def register_pattern(
     name: str, graph: GraphFamily, options: tuple[str, ...] = ()
 ) -> Callable[[PositionFunction], PositionFunction]:
-    """Decorate the function that returns a pattern's positions.
+    """Decorate the function that returns a pattern's positions, and register the pattern.
 
     Raises:
-        ValueError: the name is taken.
+        ValueError: the name is registered already.
     """
 
-    def enter(positions: PositionFunction) -> PositionFunction:
+    def register(positions: PositionFunction) -> PositionFunction:
         if name in _PATTERNS:
             raise ValueError(f"the pattern {name!r} is registered twice")
         _PATTERNS[name] = Pattern(name, graph, positions, frozenset(options))
         return positions
 
-    return enter
+    return register
 
 
 @cache

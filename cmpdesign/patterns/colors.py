@@ -1,4 +1,4 @@
-"""The colors that a cell may have, by number."""
+"""The colors of cells and their numbers."""
 
 from __future__ import annotations
 

@@ -31,22 +31,23 @@ def elliptical_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArr
 
 
 def _angle_from_arc(turn: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:
-    """The parameter angle t at which the arc from 0 to t is the share ``turn`` of the perimeter.
+    """The parameter angle t in rad at which the arc from 0 to t is the share ``turn`` of the perimeter.
 
     For (cos t, aspect sin t), the arc from the top down to t is E(pi/2 - t | 1 - aspect^2), Legendre's
-    incomplete integral of the second kind (DLMF 19.30.2). Newton's method: the speed never vanishes.
+    incomplete integral of the second kind (DLMF 19.30.2). Newton's method applies because the derivative of the
+    arc never vanishes.
     """
     from scipy.special import ellipe, ellipeinc
 
     m = 1 - aspect**2
-    quarter = ellipe(m)
-    target = 4 * quarter * turn
+    quarter_arc = ellipe(m)
+    target_arc = 4 * quarter_arc * turn
     angle = 2 * np.pi * turn
     for _ in range(50):
-        arc = quarter - ellipeinc(np.pi / 2 - angle, m)
-        step = (arc - target) / np.hypot(np.sin(angle), aspect * np.cos(angle))
-        # Half a radian at most: a flat ellipse's speed is nearly zero at its tips.
-        angle = angle - np.clip(step, -0.5, 0.5)
-        if np.abs(step).max(initial=0.0) < 1e-14:
+        arc = quarter_arc - ellipeinc(np.pi / 2 - angle, m)
+        correction = (arc - target_arc) / np.hypot(np.sin(angle), aspect * np.cos(angle))
+        # At most half a radian: the arc's derivative is nearly zero at the tips of a flat ellipse.
+        angle = angle - np.clip(correction, -0.5, 0.5)
+        if np.abs(correction).max(initial=0.0) < 1e-14:
             break
     return np.asarray(angle, dtype=np.float64)

@@ -1,6 +1,6 @@
-"""What is connected to what, before anything has a position: markers, cells, colors, the rim.
+"""Graphs of patterns: markers, cells, colors and the rim, without positions.
 
-A pattern embeds one of these graphs; ``TRIANGULAR_GRAPHS`` is the multicolor CMP, ``SQUARE_GRAPHS`` the former one.
+A pattern embeds one of these graphs. ``TRIANGULAR_GRAPHS`` is the multicolor CMP, ``SQUARE_GRAPHS`` its predecessor.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class MarkerGraph:
     """The graph of a given number of layers.
 
     Attributes:
-        layer, index: (M,) int64, by marker id.
+        layer, index: (M,) int64, by marker id. In square graphs they are row and column.
         corners: (C, 3) or (C, 4) int64, marker ids counter-clockwise from the front.
-        color: (C,) uint8, an index into ``layout.COLORS``.
-        reference_cell, reference_marker: where numbering starts.
+        color: (C,) uint8, an index into ``colors.COLORS``.
+        reference_cell, reference_marker: the cell and the marker at which numbering starts.
     """
 
     layer: Ints
@@ -38,17 +38,17 @@ class MarkerGraph:
 
 @dataclass(frozen=True)
 class GraphFamily:
-    """A family of meshes, one for every number of layers.
+    """A family of graphs, one for every number of layers.
 
     Attributes:
         name: "triangular" or "square".
-        mesh: layers -> ``MarkerGraph``.
+        make_graph: layers -> ``MarkerGraph``.
         rim: layers -> (layer, index) arrays of the outermost markers, counter-clockwise, each once.
         centre: layers -> (layer, index) arrays of the markers whose mean is the pattern's centre.
     """
 
     name: str
-    mesh: Callable[[int], MarkerGraph]
+    make_graph: Callable[[int], MarkerGraph]
     rim: Callable[[int], tuple[Ints, Ints]]
     centre: Callable[[int], tuple[Ints, Ints]]
 
@@ -59,18 +59,18 @@ def _triangular_graph(layers: int) -> MarkerGraph:
     q, r = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
     up = np.stack([q, r, q + 1, r, q, r + 1], axis=-1)
     down = np.stack([q, r, q, r + 1, q - 1, r + 1], axis=-1)
-    # Colors repeat along (q - r) mod 3: every inner marker then meets red, green and blue once each.
+    # Colors repeat along (q - r) mod 3, so that every inner marker touches one red, one green and one blue cell.
     up_color = RED + (q - r) % 3
     down_color = np.where((q == 0) & (r == 0), WHITE, BLACK)
 
     axial = np.concatenate([up, down]).reshape(-1, 3, 2)
     color = np.concatenate([up_color, down_color]).astype(np.uint8)
     corner_q, corner_r = axial[..., 0], axial[..., 1]
-    reach = np.maximum(np.maximum(np.abs(corner_q), np.abs(corner_r)), np.abs(corner_q + corner_r))
-    whole = (reach <= layers).all(axis=1)
-    corners, color = id_from_axial(corner_q[whole], corner_r[whole]), color[whole]
+    corner_layer = np.maximum(np.maximum(np.abs(corner_q), np.abs(corner_r)), np.abs(corner_q + corner_r))
+    within = (corner_layer <= layers).all(axis=1)
+    corners, color = id_from_axial(corner_q[within], corner_r[within]), color[within]
 
-    # From the centre outward, so that a cell's number says roughly where it is.
+    # Cells are sorted from the centre outward.
     order = np.lexsort(np.sort(corners, axis=1).T)
     corners, color = corners[order], color[order]
     return MarkerGraph(layer, index, corners, color, int(np.flatnonzero(color == WHITE)[0]), 0)
@@ -91,7 +91,7 @@ def _square_graph(layers: int) -> MarkerGraph:
     i, j = (grid.ravel() for grid in np.divmod(np.arange((side - 1) ** 2), side - 1))
     top_left = i * side + j
     corners = np.stack([top_left, top_left + side, top_left + side + 1, top_left + 1], axis=-1)
-    # White corners: then every marker of the rim touches a white cell and shows against a black border.
+    # Corner cells are white, so that every marker of the rim touches a white cell inside the black border.
     color = np.where((i + j) % 2 == 0, WHITE, BLACK).astype(np.uint8)
     reference = layers * (side - 1) + layers
     color[reference] = RED
@@ -100,10 +100,10 @@ def _square_graph(layers: int) -> MarkerGraph:
 
 def _square_rim(layers: int) -> tuple[Ints, Ints]:
     last = 2 * layers + 1
-    step = np.arange(last)
-    zero, full = np.zeros_like(step), np.full_like(step, last)
-    row = np.concatenate([step, full, last - step, zero])
-    column = np.concatenate([zero, step, full, last - step])
+    place = np.arange(last)
+    zero, full = np.zeros_like(place), np.full_like(place, last)
+    row = np.concatenate([place, full, last - place, zero])
+    column = np.concatenate([zero, place, full, last - place])
     return row, column
 
 

@@ -1,4 +1,4 @@
-"""The one definition of numbering: axial (q, r) <-> (layer, index) <-> id, for whole arrays.
+"""The definition of numbering: axial (q, r) <-> (layer, index) <-> id, for whole arrays.
 
     index 0 -> *---*         position = pitch * (q + r / 2, r * sqrt(3) / 2)
               / \\ / \\        spokes, clockwise from 120 degrees:
@@ -27,15 +27,15 @@ def marker_count(layers: int) -> int:
 
 
 def id_from_layer(layer: Ints, index: Ints) -> Ints:
-    """Ids of the markers (layer, index); any matching shapes."""
+    """Ids of the markers (layer, index). Shapes must match."""
     return np.where(layer > 0, 3 * layer * (layer - 1) + 1 + index, 0)
 
 
 def layer_from_id(ids: Ints) -> tuple[Ints, Ints]:
     """Layer and index of every id; the inverse of ``id_from_layer``."""
     ids = np.asarray(ids, dtype=np.int64)
-    # First id of layer k: 3k(k-1) + 1. The root is exact enough for far more than 200 layers; both
-    # neighbours are tried all the same, so that rounding can never shift a layer.
+    # The first id of layer k is 3k(k-1) + 1. The next lower and higher layers are tested too, so that rounding
+    # of the root cannot shift a layer.
     layer = np.rint(0.5 + np.sqrt(np.maximum(12 * ids - 3, 0)) / 6).astype(np.int64)
     layer = np.where(3 * layer * (layer - 1) + 1 > ids, layer - 1, layer)
     layer = np.where(3 * layer * (layer + 1) + 1 <= ids, layer + 1, layer)
@@ -46,11 +46,11 @@ def layer_from_id(ids: Ints) -> tuple[Ints, Ints]:
 
 def axial_from_layer(layer: Ints, index: Ints) -> tuple[Ints, Ints]:
     """Axial coordinates (q, r) of the markers (layer, index)."""
-    ring = np.maximum(layer, 1)
-    sextant, step = index // ring % 6, index % ring
-    # Along sextant s the ring runs parallel to the spoke after next.
-    here, along = SPOKE_DIRECTIONS[sextant], SPOKE_DIRECTIONS[(sextant + 2) % 6]
-    axial = layer[..., None] * here + step[..., None] * along
+    divisor = np.maximum(layer, 1)
+    sextant, step = index // divisor % 6, index % divisor
+    # In sextant s the layer runs parallel to spoke s + 2.
+    spoke, along = SPOKE_DIRECTIONS[sextant], SPOKE_DIRECTIONS[(sextant + 2) % 6]
+    axial = layer[..., None] * spoke + step[..., None] * along
     return axial[..., 0], axial[..., 1]
 
 
@@ -58,7 +58,7 @@ def layer_from_axial(q: Ints, r: Ints) -> tuple[Ints, Ints]:
     """Layer and index of the axial coordinates; the inverse of ``axial_from_layer``."""
     q, r = np.asarray(q, dtype=np.int64), np.asarray(r, dtype=np.int64)
     layer = np.maximum(np.maximum(np.abs(q), np.abs(r)), np.abs(q + r))
-    # The side of the ring that a marker lies on, clockwise; a spoke belongs to the side that it opens.
+    # The side of the layer on which a marker lies, clockwise. A spoke belongs to the side that starts there.
     sides = [
         (r == layer) & (q < 0),
         (q + r == layer) & (r > 0),

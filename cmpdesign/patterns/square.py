@@ -1,4 +1,4 @@
-"""The square pattern: the former CMP, kept as the baseline."""
+"""The square pattern: the former CMP, the baseline of comparisons."""
 
 from __future__ import annotations
 

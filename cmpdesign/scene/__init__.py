@@ -1,4 +1,4 @@
-"""Scenes: what a camera sees of a pattern, with the exact truth. They make test images and evaluate designs.
+"""Scenes: rendered images of a pattern with exact ground truth, for tests and for the evaluation of designs.
 
 layout + surface + camera + light + optics + sensor + damage -> image + truth
 """
@@ -69,9 +69,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Scene files need pydantic, which scenes made in Python do not."""
+    """Load scene files at their first use: they need pydantic, scenes made in Python do not."""
     if name not in ("SceneFile", "load_scene"):
         raise AttributeError(f"module 'cmpdesign.scene' has no attribute {name!r}")
-    from cmpdesign.scene.files import scene_file as file
+    from cmpdesign.scene.files import scene_file
 
-    return getattr(file, name)
+    return getattr(scene_file, name)

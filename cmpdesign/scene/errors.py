@@ -1,4 +1,4 @@
-"""The error of a scene that cannot be drawn, and how strictly its parts are read from a file."""
+"""The error of a scene that cannot be drawn, and the strictness of tables in scene files."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from cmpdesign.errors import CmpDesignError
 
 
 class SceneError(CmpDesignError, ValueError):
-    """A scene whose values are out of range, or whose surface folds or turns away from the camera."""
+    """A value of a scene is out of range, or its surface folds or turns away from the camera."""
 
 
-# For pydantic, which reads the parts' tables: no unknown names, no texts for numbers, no NaN.
+# Configuration of pydantic for the parts' tables: no unknown names, no texts for numbers, no NaN.
 STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}

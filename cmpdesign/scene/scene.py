@@ -1,4 +1,4 @@
-"""A scene: the parts that make an image. What is absent is neither asked for nor computed."""
+"""A scene: the parts of an image. Absent parts are not computed."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that makes one image.
+    """All parts of one image.
 
     Attributes:
         layout: the pattern.
-        camera: where it is seen from; a tuple of pinholes are views that share one image.
-        surface: the surface's state, a map of (N, 2) mm onto (N, 2) or (N, 3) mm; None: flat, as designed.
-        light: None: white and even.
-        background: behind the pattern's outline.
-        optics: the blur; None: none.
-        sensor: None: perfect, 8 bits.
-        damage: None: none.
-        inks: RGB 0 to 255 by color name, over the layout's palette.
-        seed: of everything random; the same scene gives the same bytes.
-        frame: its number in a sequence; only the noise depends on it.
-        warnings: what makes its parts doubtful, handed on with the image.
+        camera: the camera; a tuple of pinholes are views that share one image.
+        surface: the surface's state, a map of (N, 2) mm to (N, 2) or (N, 3) mm; None: flat, as designed.
+        light: None: white and uniform.
+        background: the background behind the pattern's outline.
+        optics: the blur; None: no blur.
+        sensor: None: no noise, 8 bits.
+        damage: None: no damage.
+        inks: RGB 0 to 255 by color name; replaces colors of the layout's palette.
+        seed: seed of all random parts; the same scene gives the same bytes.
+        frame: number in a sequence; only the noise depends on it.
+        warnings: reasons to doubt the parts, passed on with the image.
     """
 
     layout: Layout

@@ -1,4 +1,4 @@
-"""The standard scene: the conditions under which figures of accuracy and speed are stated."""
+"""The standard scene: the conditions of stated figures of accuracy and speed."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def standard_layout(pattern: str = "honeycomb", layers: int = STANDARD_LAYERS) -
 
 
 def standard_scene(layout: Layout | None = None, *, seed: int = 0) -> Scene:
-    """Pitch 20 px, turned by 7.3 degrees, blur 1 px, noise 2/255, on black; meant for ``STANDARD_SIZE``.
+    """Pitch 20 px, rotation 7.3 degrees, blur 1 px, noise 2/255, black background; for images of ``STANDARD_SIZE``.
 
-    The standard layout overflows that image: only the truth's visible markers count.
+    The standard layout is larger than that image: only the truth's visible markers count.
     """
     return Scene(
         layout=layout if layout is not None else standard_layout(),

@@ -16,21 +16,20 @@ from cmpdesign.scene.errors import SceneError
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Where everything is, exactly. Its fields' names are the .npz file's.
+    """The exact ground truth of an image. The fields are named as in the .npz file.
 
-    Where the scene's camera is a tuple of V views, the fields that a view has its own values of, marked *, have a
-    leading axis of V.
+    Where the scene's camera is a tuple of V views, the fields marked * have a leading axis of V.
 
     Attributes:
         marker_xy_px*: (M, 2) float64, image frame ((0, 0) is the centre of the top-left pixel).
         visible*: (M,) bool: inside the image, touching at least one undamaged colored or white cell, and not
-            itself under dirt or glare.
+            under dirt or glare.
         virtual_xy_px*: (E, m, 2) float64, on the true, curved gridlines; from the smaller marker id.
         cell_visible*: (C,) bool: all corners inside the image and the cell undamaged: not missing, and less
             than half of it under dirt or glare.
-        mirrored*: the pattern's back is seen.
+        mirrored*: the camera looks at the pattern's back.
         H*: (3, 3) float64 image-from-layout; None when a surface is not flat or a lens distorts.
-        marker_xyz_mm: (M, 3) float64, the surface in the layout frame; z is 0 on a flat one.
+        marker_xyz_mm: (M, 3) float64, the surface in the layout frame; z is 0 on a flat surface.
         virtual_xyz_mm: (E, m, 3) float64.
     """
 
@@ -45,10 +44,10 @@ class Truth:
 
 
 def save_truth(truth: Truth, path: str | Path) -> Path:
-    """Write a .npz; ``H`` is left out where there is none.
+    """Write the truth of one image as .npz, without ``H`` where it is None.
 
     Raises:
-        OutputError: the file cannot be written; what stood there before is unchanged.
+        OutputError: the file cannot be written; an existing file is unchanged.
     """
     return _save_npz(_truth_columns(truth), path)
 
@@ -57,7 +56,7 @@ def save_truths(truths: Sequence[Truth], time_s: Sequence[float], path: str | Pa
     """Write a sequence as one .npz: every field with a leading axis of F frames, and ``time_s`` (F,).
 
     Raises:
-        OutputError: the file cannot be written; what stood there before is unchanged.
+        OutputError: the file cannot be written; an existing file is unchanged.
     """
     columns = {"time_s": np.asarray(time_s, dtype=np.float64)}
     for item in fields(Truth):
@@ -68,25 +67,25 @@ def save_truths(truths: Sequence[Truth], time_s: Sequence[float], path: str | Pa
 
 
 def _truth_columns(truth: Truth) -> dict[str, Any]:
-    found = {item.name: getattr(truth, item.name) for item in fields(truth)}
-    return {name: value for name, value in found.items() if value is not None}
+    columns = {item.name: getattr(truth, item.name) for item in fields(truth)}
+    return {name: value for name, value in columns.items() if value is not None}
 
 
 def _save_npz(columns: dict[str, Any], path: str | Path) -> Path:
     path = Path(path)
-    beside = path.with_name(path.name + ".part")
+    partial = path.with_name(path.name + ".part")
     try:
-        with beside.open("wb") as file:
+        with partial.open("wb") as file:
             np.savez_compressed(file, **columns)
-        beside.replace(path)
+        partial.replace(path)
     except OSError as error:
-        beside.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror or error}; choose another place") from error
     return path
 
 
 def load_truth(path: str | Path) -> Truth:
-    """Read what ``save_truth`` wrote.
+    """Read a file of ``save_truth``.
 
     Raises:
         SceneError: the file is not a truth file.
@@ -98,7 +97,7 @@ def load_truth(path: str | Path) -> Truth:
 
 
 def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
-    """Read what ``save_truths`` wrote: the truth of every frame, and their times (F,) in s.
+    """Read a file of ``save_truths``: the truth of every frame, and the frames' times (F,) in s.
 
     Raises:
         SceneError: the file is not the truth file of a sequence.

@@ -8,7 +8,7 @@ from .everything import IMAGES, pages, pictures
 
 
 def main() -> None:
-    """Write them and say so."""
+    """Write all pictures and pages, and print their names."""
     for name, data in pictures().items():
         write_file(IMAGES / name, data)
         print(f"docs/images/{name}: {len(data) / 1000:.0f} kB")

@@ -1,4 +1,4 @@
-"""All that is drawn and written: file name -> content."""
+"""All pictures and generated pages: file name -> content."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def pictures() -> dict[str, bytes]:
 
 
 def pages() -> dict[Path, str]:
-    """Generated pages; docs/design-files.md keeps its prose, and only its tables are written."""
+    """Path -> text of generated pages. Of docs/design-files.md only the tables are generated."""
     design_files = DOCS / "design-files.md"
     return {
         DOCS / "gallery.md": gallery.page(),

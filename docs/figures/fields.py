@@ -15,10 +15,14 @@ BEGIN, END = "<!-- {}: written by python -m docs.figures -->", "<!-- end of {} -
 
 
 def filled(text: str) -> str:
-    """The page with its tables written anew."""
-    written = {"fields": fields(), "palette": palette(), "units": units()}
-    written |= {name: table(model) for name, model in tables().items()}
-    for name, lines in written.items():
+    """The page with its tables replaced.
+
+    Raises:
+        ValueError: the page has no place for a table.
+    """
+    generated = {"fields": fields(), "palette": palette(), "units": units()}
+    generated |= {name: table(model) for name, model in tables().items()}
+    for name, lines in generated.items():
         begin, end = BEGIN.format(name), END.format(name)
         before, _, rest = text.partition(begin)
         _, found, after = rest.partition(end)
@@ -29,12 +33,12 @@ def filled(text: str) -> str:
 
 
 def fields() -> str:
-    """Every field of a design: what it takes, its default, what it means."""
+    """Every field of a design: its values, its default, its meaning."""
     return _rows(Design, design_schema()["properties"])
 
 
 def tables() -> dict[str, type[BaseModel]]:
-    """The tables of a design, but for the palette, which has a shorter one: name -> model."""
+    """The tables of a design without the palette, which has a shorter form: name -> model."""
     found = {name: field.annotation for name, field in Design.model_fields.items()}
     return {
         name: model
@@ -44,7 +48,7 @@ def tables() -> dict[str, type[BaseModel]]:
 
 
 def table(model: type[BaseModel]) -> str:
-    """Every field of a table of a design, as ``fields`` shows those of the design itself."""
+    """Every field of a table of a design, in the form of ``fields``."""
     return _rows(model, model.model_json_schema()["properties"])
 
 

@@ -13,7 +13,7 @@ from cmpdesign.patterns import registered_patterns
 from cmpdesign.products.drawing.preview import MARGIN_PX, TITLE_PX, draw_preview
 
 WIDTH_PX = 520
-PATTERN_LAYERS = 4  # few enough that ids can be read
+PATTERN_LAYERS = 4  # few enough for readable ids
 HEAD = """# Gallery
 
 Everything below is written by `python -m docs.figures` from the registry and the templates: a new pattern or template
@@ -61,12 +61,12 @@ def page() -> str:
 
 def _template(name: str) -> str:
     design = load_design(name)
-    figures = design_report(design, build_layout(design))
-    width, height = figures.size_mm
+    report = design_report(design, build_layout(design))
+    width, height = report.size_mm
     return (
         f"\n### {name}\n\n{design.description}\n\n"
-        f"- {figures.pattern}, {figures.layers} layers, pitch {figures.pitch_mm:.4g} mm\n"
-        f"- {figures.present_markers} markers, {figures.virtual_markers} virtual ones on {figures.edges} edges\n"
+        f"- {report.pattern}, {report.layers} layers, pitch {report.pitch_mm:.4g} mm\n"
+        f"- {report.present_markers} markers, {report.virtual_markers} virtual ones on {report.edges} edges\n"
         f"- {width:.2f} x {height:.2f} mm with its border; seen from the {'back' if design.mirrored else 'front'}\n"
         f"- source: {design.source}\n\n"
         f"![The template {name}](images/template-{name}.png)\n"
@@ -74,7 +74,7 @@ def _template(name: str) -> str:
 
 
 def _preview(name: str, overrides: dict[str, str]) -> bytes:
-    # The title's facts stand in the text; what is cut off is the title.
+    # The title is cut off, because the text states the same facts.
     picture = draw_preview(build_layout(load_design(name, overrides)))[MARGIN_PX + TITLE_PX - 35 :]
     height = round(picture.shape[0] * WIDTH_PX / picture.shape[1])
     small = cv2.resize(picture, (WIDTH_PX, height), interpolation=cv2.INTER_AREA)

@@ -1,4 +1,4 @@
-"""What the benchmarks measured, drawn and tabled from docs/measured: the same on every machine."""
+"""Pictures and tables of benchmark results, from docs/measured: the same on every machine."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def figures() -> dict[str, bytes]:
 
 
 def pages() -> dict[Path, str]:
-    """README and the pages of docs/ that show a measured table."""
+    """README and the pages of docs/ with a measured table."""
     precise = [accuracy.AccuracyResult(**row) for row in read_measured("accuracy")["results"]]
     conditions = conditions_text(read_measured("comparison")["conditions"])
     blocks = {"comparison": comparison_markdown(_compared()), "conditions": conditions}

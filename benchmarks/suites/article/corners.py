@@ -1,6 +1,8 @@
-"""The article's corners: triangles fitted to the contours of the regions that its AGA has grown, nothing finer."""
+"""The article's corners: triangles fitted to the contours of the regions grown by AGA, without refinement."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -10,18 +12,28 @@ from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import Triangles
 
 MIN_AREA_PX = 4.0
-MIN_FILL = 0.6  # of the triangle by its contour: what fills less is no triangle ("area, perimeter")
+MIN_FILL = 0.6  # smallest share of a triangle's area that its contour fills ("area, perimeter")
+
+
+class RegionBoxes(NamedTuple):
+    """First and last columns and rows of regions, (count,) px each."""
+
+    left: NDArray[np.intp]
+    top: NDArray[np.intp]
+    right: NDArray[np.intp]
+    bottom: NDArray[np.intp]
 
 
 def fit_plain_triangles(regions: Regions) -> Triangles:
-    """The smallest triangle around every region, where the region fills it."""
+    """The smallest triangle around every region that fills its triangle."""
     corners, kept = [], []
-    left, top, right, bottom = _region_boxes(regions.owner, len(regions.ink))
+    boxes = _region_boxes(regions.region_map, len(regions.ink))
     for number in range(len(regions.ink)):
-        if right[number] < left[number]:
+        left, top, right, bottom = (int(side[number]) for side in boxes)
+        if right < left:
             continue
-        low = np.array([left[number], top[number]])
-        part = regions.owner[top[number] : bottom[number] + 1, left[number] : right[number] + 1]
+        low = np.array([left, top])
+        part = regions.region_map[top : bottom + 1, left : right + 1]
         contour = _largest_contour((part == number + 1).astype(np.uint8))
         area, corner = cv2.minEnclosingTriangle(contour)
         if corner is None or area < MIN_AREA_PX or cv2.contourArea(contour) < MIN_FILL * area:
@@ -32,18 +44,15 @@ def fit_plain_triangles(regions: Regions) -> Triangles:
     return Triangles(np.array(corners).reshape(-1, 3, 2), regions.ink[region], region)
 
 
-def _region_boxes(owner: NDArray[np.int32], count: int) -> tuple[NDArray[np.intp], ...]:
-    """Left, top, right and bottom of every region, each (count,) px."""
+def _region_boxes(owner: NDArray[np.int32], count: int) -> RegionBoxes:
+    """The boxes of all regions; an empty region has left > right."""
     y, x = np.nonzero(owner)
     number = owner[y, x] - 1
-    found = []
-    for at, join, start in ((x, np.minimum, 1 << 30), (y, np.minimum, 1 << 30)):
-        found.append(np.full(count, start, np.intp))
-        join.at(found[-1], number, at)
-    for at in (x, y):
-        found.append(np.full(count, -1, np.intp))
-        np.maximum.at(found[-1], number, at)
-    return tuple(found)
+    low, high = np.full((2, count), 1 << 30, np.intp), np.full((2, count), -1, np.intp)
+    for axis, pixel in enumerate((x, y)):
+        np.minimum.at(low[axis], number, pixel)
+        np.maximum.at(high[axis], number, pixel)
+    return RegionBoxes(low[0], low[1], high[0], high[1])
 
 
 def _largest_contour(mask: NDArray[np.uint8]) -> NDArray[np.int32]:

@@ -1,6 +1,6 @@
-"""The article's own connection: triangles whose corners meet are joined into a graph of markers (eqs. 4-5).
+"""The article's connection of triangles: corners that meet are merged into a graph of markers (eqs. 4-5).
 
-The extractor numbers the mesh of cell centers instead; this is what it is compared with.
+The extractor numbers the cell mesh instead and is compared with this graph.
 """
 
 from __future__ import annotations
@@ -13,23 +13,22 @@ from numpy.typing import NDArray
 from extractor.cells.triangle_fit import Triangles
 from extractor.numeric.compilation import compiled
 
-# L of eq. 5 in units of the shortest edge that leaves either corner. Corners that do not belong together are at
-# least such an edge apart.
+# L of eq. 5 in units of the shortest edge at either corner. Corners of different markers are at least one edge apart.
 MERGE_SHARE = 0.4
-# Two triangles that meet at a corner look away from each other; those on one side of it do not.
+# Two triangles that meet at a corner lie in different directions from it: the cosine between these is below this.
 MAX_SAME_SIDE_COSINE = 0.8
 NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class CornerGraph:
-    """Stage 6: nodes (candidate markers) and the triangles around each.
+    """The result of stage 6: nodes (candidate markers) and the triangles around each node.
 
     Attributes:
         node_of_corner: (T, 3) int32, the node of each triangle's corners.
         corner_of_node: (N, 3) int32 by ink (red, green, blue): 3 * triangle + corner, or -1.
         xy_px: (N, 2) float64, the mean of the merged corners.
-        mirrored: True when red, green and blue run counter-clockwise around the nodes, as seen in the image.
+        mirrored: red, green and blue run counter-clockwise around the nodes, as seen in the image.
     """
 
     node_of_corner: NDArray[np.int32]
@@ -40,21 +39,21 @@ class CornerGraph:
 
 @compiled
 def _candidate_pairs(corner_px, ink):  # type: ignore[no-untyped-def]
-    """Pairs of corners of different inks that are near enough to be one marker, with distance / L."""
+    """(P, 2) int32 pairs of corners of different inks within L of each other, and (P,) distance / L."""
     count = corner_px.shape[0]
     flat = corner_px.reshape(-1, 2)
     reach = np.empty(3 * count)
-    center = np.empty((count, 2))
+    centre = np.empty((count, 2))
     for i in range(count):
-        center[i, 0] = corner_px[i, :, 0].mean()
-        center[i, 1] = corner_px[i, :, 1].mean()
+        centre[i, 0] = corner_px[i, :, 0].mean()
+        centre[i, 1] = corner_px[i, :, 1].mean()
         for k in range(3):
             a, b = corner_px[i, (k + 1) % 3], corner_px[i, (k + 2) % 3]
             p = corner_px[i, k]
             reach[3 * i + k] = MERGE_SHARE * min(
                 np.hypot(a[0] - p[0], a[1] - p[1]), np.hypot(b[0] - p[0], b[1] - p[1])
             )
-    # a grid of buckets as wide as the longest reach: candidates stand in the 3 x 3 buckets around
+    # A grid of buckets as wide as the longest reach: candidates lie in the 3 x 3 buckets around a corner.
     width = max(reach.max(), 1e-9)
     low_x, low_y = flat[:, 0].min(), flat[:, 1].min()
     width = max(width, (flat[:, 0].max() - low_x) / 2000.0, (flat[:, 1].max() - low_y) / 2000.0)
@@ -79,7 +78,7 @@ def _candidate_pairs(corner_px, ink):  # type: ignore[no-untyped-def]
                     if j > i and ink[i // 3] != ink[j // 3] and found < pairs.shape[0]:
                         limit = min(reach[i], reach[j])
                         distance = np.hypot(flat[i, 0] - flat[j, 0], flat[i, 1] - flat[j, 1])
-                        if distance <= limit and not _is_same_side(flat, center, i, j):
+                        if distance <= limit and not _is_same_side(flat, centre, i, j):
                             pairs[found, 0] = i
                             pairs[found, 1] = j
                             ratio[found] = distance / limit
@@ -89,17 +88,21 @@ def _candidate_pairs(corner_px, ink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_same_side(flat, center, i, j):  # type: ignore[no-untyped-def]
-    """True when the triangles of two corners lie on the same side of where the corners meet."""
+def _is_same_side(flat, centre, i, j):  # type: ignore[no-untyped-def]
+    """Whether the triangles of two corners lie on the same side of the corners' common point."""
     x, y = 0.5 * (flat[i, 0] + flat[j, 0]), 0.5 * (flat[i, 1] + flat[j, 1])
-    ax, ay = center[i // 3, 0] - x, center[i // 3, 1] - y
-    bx, by = center[j // 3, 0] - x, center[j // 3, 1] - y
+    ax, ay = centre[i // 3, 0] - x, centre[i // 3, 1] - y
+    bx, by = centre[j // 3, 0] - x, centre[j // 3, 1] - y
     return ax * bx + ay * by > MAX_SAME_SIDE_COSINE * np.hypot(ax, ay) * np.hypot(bx, by)
 
 
 @compiled
 def _merge_corners(pairs, order, ink):  # type: ignore[no-untyped-def]
-    """Join corners, nearest pairs first, so that no node holds two corners of one ink; corner -> node."""
+    """Merge corners, nearest pairs first, so that no node has two corners of one ink.
+
+    Returns:
+        (3 T,) int32, the node of every corner, and the number of nodes.
+    """
     corners = 3 * ink.shape[0]
     parent = np.arange(corners).astype(np.int32)
     inks = np.empty(corners, np.uint8)
@@ -129,7 +132,7 @@ def _merge_corners(pairs, order, ink):  # type: ignore[no-untyped-def]
 
 
 def connect_corners(triangles: Triangles) -> CornerGraph:
-    """Stage 6: merge corners nearer than L (eq. 5), at most one red, one green and one blue each (eq. 4)."""
+    """Stage 6: merge corners within L (eq. 5), at most one red, one green and one blue corner per node (eq. 4)."""
     count = len(triangles.ink)
     if count == 0:
         empty = np.empty((0, 3), np.int32)
@@ -147,11 +150,11 @@ def connect_corners(triangles: Triangles) -> CornerGraph:
 
 
 def _is_mirrored(triangles: Triangles, corner_of_node: NDArray[np.int32], xy: NDArray[np.float64]) -> bool:
-    """The turn of red, green, blue around the complete nodes, by majority; clockwise (y down) is the front."""
-    full = np.flatnonzero((corner_of_node >= 0).all(axis=1))
-    if len(full) == 0:
+    """Whether red, green, blue run counter-clockwise (y down) around most complete nodes: the pattern's back."""
+    complete = np.flatnonzero((corner_of_node >= 0).all(axis=1))
+    if len(complete) == 0:
         return False
-    away = triangles.corner_px.mean(axis=1)[corner_of_node[full] // 3] - xy[full, None]
-    x, y = away[..., 0], away[..., 1]
+    offset = triangles.corner_px.mean(axis=1)[corner_of_node[complete] // 3] - xy[complete, None]
+    x, y = offset[..., 0], offset[..., 1]
     turn = sum(np.sign(x[:, a] * y[:, b] - y[:, a] * x[:, b]) for a, b in ((0, 1), (1, 2), (2, 0)))
     return bool(np.sum(turn) < 0)

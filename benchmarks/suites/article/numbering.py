@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +16,19 @@ from extractor.layout.reference import BLACK, WHITE, Reference
 from extractor.numeric.bilinear import fill_patch_mean
 from extractor.numeric.compilation import compiled
 
-# The interior of the white cell against the inks of the cells beside it, both as sums over the channels.
-# Black stays below a quarter; the white of a dim print is still brighter than any ink.
+# Smallest ratio of the white cell's interior to the inks of its neighbours, both as sums over the channels.
+# The ratio of black is below a quarter; white is brighter than any ink even in a dim print.
 MIN_WHITE_RATIO = 0.75
 MAX_ROUNDS = 8
 MAX_WHITES = 8
 
-# Clockwise around a marker the inks turn red, green, blue, with black in the gaps between. Where the white cell
+# Clockwise around a marker the inks are red, green, blue, with black in the gaps between. If the white cell
 # lies in the gap after blue, red or green, the marker is the white cell's corner (0, 0), (0, 1) or (-1, 1).
 GAP_AXIAL = np.array([[0, 1], [-1, 1], [0, 0]], np.int32)
 
 
-@dataclass(frozen=True, eq=False)
-class LatticeTables:
-    """What numbering needs of the layout.
+class LatticeTables(NamedTuple):
+    """Tables of the layout.
 
     Attributes:
         layers: the layout's layers.
@@ -39,16 +39,57 @@ class LatticeTables:
     cell_of: NDArray[np.int32]
 
 
+class SpinGraph(NamedTuple):
+    """A graph of corners for the compiled search.
+
+    Attributes:
+        ink: (T,) uint8, the ink of each triangle.
+        node_of_corner: (T, 3) int32, the node of each triangle's corners.
+        corner_of_node: (N, 3) int32 by ink: 3 * triangle + corner, or -1.
+        sense: 1 from the front, -1 mirrored.
+    """
+
+    ink: NDArray[np.uint8]
+    node_of_corner: NDArray[np.int32]
+    corner_of_node: NDArray[np.int32]
+    sense: int
+
+
+class SpinResult(NamedTuple):
+    """The result of one search.
+
+    Attributes:
+        marker: (T, 3) int32, the marker at each corner of each triangle, or -1.
+        cell: (T,) int32, the layout's cell of each triangle, or -1.
+        bad: (N,) bool, nodes with contradictory numbers.
+        outside: triangles outside the layout's outline.
+    """
+
+    marker: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    bad: NDArray[np.bool_]
+    outside: int
+
+
+class NumberedTriangles(NamedTuple):
+    """The numbers from one start: ``marker`` and ``cell`` as in ``SpinResult``, and counts of contradictions."""
+
+    marker: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    outside: int
+    conflicts: int
+
+
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """Stage 7.
+    """The result of stage 7.
 
     Attributes:
         marker_of_corner: (T, 3) int32, the marker at each corner of each triangle, or -1.
-        cell_of_triangle: (T,) int32, the layout's cell that each triangle shows, or -1.
-        white_px: (2,) the center of the white cell, or NaN.
-        conflicts: nodes that were taken apart because their neighbours disagreed about them.
-        ambiguous: two white cells could be the reference and nothing tells them apart.
+        cell_of_triangle: (T,) int32, the layout's cell of each triangle, or -1.
+        white_px: (2,) the centre of the white cell, or NaN.
+        conflicts: nodes that were split because their neighbours gave them different numbers.
+        ambiguous: two white cells fit the reference equally well.
     """
 
     marker_of_corner: NDArray[np.int32]
@@ -71,16 +112,16 @@ def make_lattice_tables(reference: Reference) -> LatticeTables:
 
 @compiled
 def _measure_gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ignore[no-untyped-def]
-    """Brightness of the gap after each ink of each node, relative to the inks beside it, and its center.
+    """(N, 3) brightness of the gap after each ink of each node over the neighbouring inks, and (N, 3, 2) its centre.
 
-    Clockwise from the triangle of one ink to that of the next, the gap's corners are the node, the first
-    triangle's corner before the node and the second one's after it.
+    Clockwise from the triangle of one ink to the triangle of the next, the gap's corners are the node, the first
+    triangle's corner before the node and the second triangle's corner after it.
     """
     nodes = corner_of_node.shape[0]
     ratio = np.zeros((nodes, 3))
-    center = np.full((nodes, 3, 2), np.nan)
+    centre = np.full((nodes, 3, 2), np.nan)
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    beyond, one, other = np.zeros(3), np.zeros(3), np.zeros(3)
+    gap_levels, first_levels, second_levels = np.zeros(3), np.zeros(3), np.zeros(3)
     for n in range(nodes):
         for ink in range(3):
             a, b = corner_of_node[n, ink], corner_of_node[n, (ink + 1) % 3]
@@ -92,28 +133,51 @@ def _measure_gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # t
             x = (corner_px[ta, ka, 0] + corner_px[tb, kb, 0]) / 6 + (pa[0] + pb[0]) / 3
             y = (corner_px[ta, ka, 1] + corner_px[tb, kb, 1]) / 6 + (pa[1] + pb[1]) / 3
             radius = 0.2 * np.hypot(pa[0] - x, pa[1] - y)
-            inside = fill_patch_mean(flat, height, width, x, y, radius, beyond)
+            inside = fill_patch_mean(flat, height, width, x, y, radius, gap_levels)
             inside &= fill_patch_mean(
-                flat, height, width, corner_px[ta, :, 0].mean(), corner_px[ta, :, 1].mean(), radius, one
+                flat,
+                height,
+                width,
+                corner_px[ta, :, 0].mean(),
+                corner_px[ta, :, 1].mean(),
+                radius,
+                first_levels,
             )
             inside &= fill_patch_mean(
-                flat, height, width, corner_px[tb, :, 0].mean(), corner_px[tb, :, 1].mean(), radius, other
+                flat,
+                height,
+                width,
+                corner_px[tb, :, 0].mean(),
+                corner_px[tb, :, 1].mean(),
+                radius,
+                second_levels,
             )
             if inside:
-                ratio[n, ink] = 2.0 * beyond.sum() / max(one.sum() + other.sum(), 1.0)
-                center[n, ink, 0] = x
-                center[n, ink, 1] = y
-    return ratio, center
+                ratio[n, ink] = 2.0 * gap_levels.sum() / max(first_levels.sum() + second_levels.sum(), 1.0)
+                centre[n, ink, 0] = x
+                centre[n, ink, 1] = y
+    return ratio, centre
 
 
 @compiled
-def _spin_search(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell_of, layers):  # type: ignore[no-untyped-def]
-    """Number triangles from one node outwards, the smallest id first; who contradicts whom.
+def _spin_search(start, q0, r0, graph, lattice):  # type: ignore[no-untyped-def]
+    """Number triangles outward from one node, the smallest id first.
 
-    At a marker with the color phase (q - r) mod 3 the ink of a triangle says which of the three cells around it
-    that is; its clockwise neighbours then give the other two corners. Every corner that is reached twice must be
-    reached as the same marker.
+    At a marker with the color phase (q - r) mod 3 the ink of a triangle determines which of the three cells around the
+    marker it shows. The cell's other two corners follow clockwise. Every corner that is reached twice must get the same
+    marker both times.
+
+    Args:
+        start: the first node.
+        q0, r0: the first node's axial coordinates.
+        graph: a ``SpinGraph``.
+        lattice: a ``LatticeTables``.
+
+    Returns:
+        A ``SpinResult``.
     """
+    ink, sense, cell_of, layers = graph.ink, graph.sense, lattice.cell_of, lattice.layers
+    node_of_corner, corner_of_node = graph.node_of_corner, graph.corner_of_node
     triangles, nodes = ink.shape[0], corner_of_node.shape[0]
     unknown = -(1 << 20)
     node_q = np.full(nodes, unknown, np.int32)
@@ -138,7 +202,7 @@ def _spin_search(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell
             if c < 0:
                 continue
             t, k = c // 3, c % 3
-            # roles 0, 1, 2: the node is the cell's corner (0, 0), (1, 0), (0, 1)
+            # Roles 0, 1, 2: the node is the cell's corner (0, 0), (1, 0), (0, 1).
             role = 0 if turn == 0 else 1 if turn == 2 else 2
             cq = q - 1 if role == 1 else q
             cr = r - 1 if role == 2 else r
@@ -157,7 +221,7 @@ def _spin_search(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell
             cell[t] = cell_of[up]
             holder[up] = t
             for j in range(3):
-                # clockwise the roles run 0, 2, 1
+                # Clockwise the roles are 0, 2, 1.
                 at = (role - sense * j) % 3
                 corner = (k + j) % 3
                 mq = cq + 1 if at == 1 else cq
@@ -172,48 +236,48 @@ def _spin_search(start, q0, r0, sense, ink, node_of_corner, corner_of_node, cell
                     heapq.heappush(heap, m * nodes + other)
                 elif node_q[other] != mq or node_r[other] != mr:
                     bad[other] = True
-    return marker, cell, bad, outside
+    return SpinResult(marker, cell, bad, outside)
 
 
 def _split_nodes(graph: CornerGraph, bad: NDArray[np.bool_]) -> CornerGraph:
-    """The graph with the bad nodes taken apart: each of their corners becomes a node of its own."""
+    """The graph with every corner of the bad nodes as a separate node."""
     corner_of_node = graph.corner_of_node.copy()
-    loose = corner_of_node[bad]
-    loose = loose[loose >= 0]
+    corners = corner_of_node[bad]
+    corners = corners[corners >= 0]
     corner_of_node[bad] = -1
     node_of_corner = graph.node_of_corner.copy()
-    node_of_corner.reshape(-1)[loose] = -1
+    node_of_corner.reshape(-1)[corners] = -1
     count = len(corner_of_node)
-    node_of_corner.reshape(-1)[loose] = count + np.arange(len(loose))
-    alone = np.full((len(loose), 3), -1, np.int32)
-    hue = np.zeros(node_of_corner.size, np.int64)
-    at, ink = np.nonzero(graph.corner_of_node >= 0)
-    hue[graph.corner_of_node[at, ink]] = ink
-    alone[np.arange(len(loose)), hue[loose]] = loose
-    xy = np.concatenate([graph.xy_px, np.full((len(loose), 2), np.nan)])
+    node_of_corner.reshape(-1)[corners] = count + np.arange(len(corners))
+    single_nodes = np.full((len(corners), 3), -1, np.int32)
+    ink_of_corner = np.zeros(node_of_corner.size, np.int64)
+    nodes, ink = np.nonzero(graph.corner_of_node >= 0)
+    ink_of_corner[graph.corner_of_node[nodes, ink]] = ink
+    single_nodes[np.arange(len(corners)), ink_of_corner[corners]] = corners
+    xy = np.concatenate([graph.xy_px, np.full((len(corners), 2), np.nan)])
     return CornerGraph(
-        node_of_corner, np.concatenate([corner_of_node, alone]).astype(np.int32), xy, graph.mirrored
+        node_of_corner, np.concatenate([corner_of_node, single_nodes]).astype(np.int32), xy, graph.mirrored
     )
 
 
 def _number_from(
     graph: CornerGraph, triangles: Triangles, lattice: LatticeTables, node: int, coordinate: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], int, int]:
-    """Spin from one node; nodes that are contradicted are taken apart and the search is run again."""
+) -> NumberedTriangles:
+    """Number from one node. Nodes with contradictions are split, and the search is repeated."""
     sense = -1 if graph.mirrored else 1
     conflicts = 0
     for _ in range(MAX_ROUNDS):
-        marker, cell, bad, outside = _spin_search(
-            node, int(coordinate[0]), int(coordinate[1]), sense, triangles.ink,
-            graph.node_of_corner, graph.corner_of_node, lattice.cell_of, lattice.layers,
-        )  # fmt: skip
-        if not bad.any():
-            return marker, cell, outside, conflicts
-        conflicts += int(bad.sum())
-        graph = _split_nodes(graph, bad)
-        if bad[node]:
+        spin_graph = SpinGraph(triangles.ink, graph.node_of_corner, graph.corner_of_node, sense)
+        found = _spin_search(node, int(coordinate[0]), int(coordinate[1]), spin_graph, lattice)
+        if not found.bad.any():
+            return NumberedTriangles(found.marker, found.cell, found.outside, conflicts)
+        conflicts += int(found.bad.sum())
+        graph = _split_nodes(graph, found.bad)
+        if found.bad[node]:
             break
-    return np.full_like(marker, -1), np.full_like(cell, -1), outside, conflicts
+    return NumberedTriangles(
+        np.full_like(found.marker, -1), np.full_like(found.cell, -1), found.outside, conflicts
+    )
 
 
 def number_triangles(
@@ -221,27 +285,27 @@ def number_triangles(
 ) -> Numbering | None:
     """Stage 7: number every triangle that is connected with the white cell; None without a white cell.
 
-    A bright gap between cells is the white cell; where several are bright, the one that puts the most cells
-    inside the layout's outline and the fewest outside is, unless two do so equally well.
+    A bright gap between cells is a candidate of the white cell. The candidate with the most cells inside the layout's
+    outline and the fewest outside is used. The result is ambiguous if two candidates are equal.
     """
     sense = -1 if graph.mirrored else 1
-    ratio, center = _measure_gaps(
+    ratio, centre = _measure_gaps(
         image, triangles.corner_px, graph.node_of_corner, graph.corner_of_node, sense
     )
     bright = np.argwhere(ratio > MIN_WHITE_RATIO)
     bright = bright[np.argsort(-ratio[bright[:, 0], bright[:, 1]], kind="stable")][: 3 * MAX_WHITES]
     best: tuple[int, Numbering] | None = None
     tie = False
-    tried: list[NDArray[np.float64]] = []
+    tried_px: list[NDArray[np.float64]] = []
     for node, ink in bright:
-        where = center[node, ink]
-        reach = 0.5 * np.hypot(*(where - graph.xy_px[node]))
-        if any(np.hypot(*(where - other)) < reach for other in tried):
+        white_px = centre[node, ink]
+        reach = 0.5 * np.hypot(*(white_px - graph.xy_px[node]))
+        if any(np.hypot(*(white_px - other)) < reach for other in tried_px):
             continue
-        tried.append(where)
-        marker, cell, outside, conflicts = _number_from(graph, triangles, lattice, int(node), GAP_AXIAL[ink])
-        score = int((cell >= 0).sum()) - 3 * outside - conflicts
-        found = Numbering(marker, cell, where, conflicts, False)
+        tried_px.append(white_px)
+        numbered = _number_from(graph, triangles, lattice, int(node), GAP_AXIAL[ink])
+        score = int((numbered.cell >= 0).sum()) - 3 * numbered.outside - numbered.conflicts
+        found = Numbering(numbered.marker, numbered.cell, white_px, numbered.conflicts, False)
         if best is None or score > best[0]:
             tie = best is not None and score - best[0] < 2
             best = (score, found)

@@ -1,1 +1,1 @@
-"""Our extractor and other detectors on the same scenes."""
+"""The extractor and other detectors on the same scenes."""

@@ -1,4 +1,4 @@
-"""The methods: each from an image to points, timed. What they read is either the pattern or the checkerboard."""
+"""The compared methods: each reads points from an image of the pattern or of the checkerboard, with its time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Points = NDArray[np.float64]
 INNER_CORNERS = (2 * BOARD_LAYERS, 2 * BOARD_LAYERS)
 SB_FLAGS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
 HALF_WINDOW_PX = (
-    5  # of cornerSubPix: 11 px, the largest that holds one corner only at a pitch of 20 px, tilted
+    5  # of cornerSubPix: 11 px, the largest window with one corner only at a pitch of 20 px, tilted
 )
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
 REFERENCE_METHOD = "OpenCV findChessboardCornersSB"
@@ -38,9 +38,11 @@ MEASURING_STAGES = ("refine", "repair", "virtual")  # the stages after the 7th
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a method found in one image, by marker id with NaN where lost, or as a list without numbers.
+    """The points of a method in one image.
 
-    ``ms`` is processor time: methods take turns on one core, and what else the machine does is not theirs.
+    Attributes:
+        points: (M, 2) px by marker id, NaN where lost, or (N, 2) px without numbers.
+        ms: processor time, which excludes other processes.
     """
 
     points: Points
@@ -49,7 +51,14 @@ class Reading:
 
 @dataclass(frozen=True)
 class Method:
-    """A method by its name; ``board``: it reads the checkerboard; ``numbered``: its points are by marker id."""
+    """A method.
+
+    Attributes:
+        name: the method's name in tables.
+        board: the method reads the checkerboard.
+        numbered: the points are by marker id.
+        read: the function that reads an image.
+    """
 
     name: str
     board: bool
@@ -59,13 +68,14 @@ class Method:
 
 @cache
 def method_extractor(case: SceneCase, preset: Preset, points: bool = True) -> Extractor:
+    """An extractor of the case's pattern, with or without virtual markers (``points``)."""
     if points:
         return cached_extractor(case, preset)
     return Extractor(replace(cached_reference(case.pattern, case.layers), virtual_per_edge=0), preset)
 
 
 def extractor_method(preset: Preset, points: bool = True) -> Method:
-    """A preset; without the ``points`` between markers it measures what the other detectors do."""
+    """A preset; without virtual markers (``points``) the extractor measures the same points as other detectors."""
 
     def read(case: SceneCase, image: Image) -> Reading:
         reader = method_extractor(case, preset, points)
@@ -77,7 +87,7 @@ def extractor_method(preset: Preset, points: bool = True) -> Method:
 
 
 def read_numbered_corners(case: SceneCase, image: Image) -> Reading:
-    """Stages 1 to 7: corners fitted to the edges of each triangle alone, and merged."""
+    """Stages 1 to 7: corners fitted to the edges of each triangle separately, and merged."""
     reader = method_extractor(case, "fast")
     started = time.process_time()
     markers = reader.extract(image)
@@ -97,7 +107,7 @@ def read_subpix_by_id(case: SceneCase, image: Image) -> Reading:
 
 
 def read_by_article(case: SceneCase, image: Image) -> Reading:
-    """The article's way: regions grown by AGA, triangles fitted to their contours, corners merged and averaged, SSA."""
+    """The article's method: regions by AGA, triangles fitted to contours, merged and averaged corners, SSA."""
     layout = cached_reference(case.pattern, case.layers)
     lattice, hues_deg = make_lattice_tables(layout), nominal_hues_deg(dict(layout.palette))
     started = time.process_time()
@@ -118,6 +128,7 @@ def read_by_article(case: SceneCase, image: Image) -> Reading:
 
 
 def read_chessboard_sb(case: SceneCase, image: Image) -> Reading:
+    """OpenCV's findChessboardCornersSB."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     _, corners = cv2.findChessboardCornersSB(gray, INNER_CORNERS, None, SB_FLAGS)
@@ -125,6 +136,7 @@ def read_chessboard_sb(case: SceneCase, image: Image) -> Reading:
 
 
 def read_chessboard(case: SceneCase, image: Image) -> Reading:
+    """OpenCV's findChessboardCorners with cornerSubPix."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     found, corners = cv2.findChessboardCorners(gray, INNER_CORNERS)
@@ -133,7 +145,7 @@ def read_chessboard(case: SceneCase, image: Image) -> Reading:
 
 
 def chess_corners_reader(refiner: str) -> Callable[[SceneCase, Image], Reading]:
-    """The package chess-corners, its ChESS detector with one of its refiners."""
+    """The ChESS detector of the package chess-corners with one of its refiners."""
 
     @cache
     def detector() -> Any:

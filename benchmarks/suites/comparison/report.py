@@ -38,7 +38,7 @@ COLORS = {
     "chess-corners, its default": "#8bc34a",
     "chess-corners, saddle point": "#2e7d32",
 }
-MIN_FOUND = 0.5  # of the markers; what finds less is not drawn
+MIN_FOUND = 0.5  # of the markers; methods with a smaller share are not drawn
 
 
 def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") -> Table:
@@ -59,18 +59,18 @@ def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") 
 
 
 def comparison_markdown(results: Sequence[MethodResult]) -> str:
-    """One row a method: the standard scene, and the worst of all scenes."""
+    """One row per method: the standard scene, and the worst of all scenes."""
     lines = [
         "| method | reads | found | wrong | RMS px | of the bound | worst scene | ms | of SB's time |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for method in METHODS:
-        mine = [r for r in results if r.method == method.name]
-        flat = next(r for r in mine if r.scene == "flat")
-        worst = max(mine, key=lambda r: r.inner_px / r.bound_px)
+        of_method = [r for r in results if r.method == method.name]
+        flat = next(r for r in of_method if r.scene == "flat")
+        worst = max(of_method, key=lambda r: r.inner_px / r.bound_px)
         cells = (
-            method.name, "checkerboard" if method.board else "pattern", f"{min(r.found_share for r in mine):.0%}",
-            str(sum(r.wrong for r in mine)), f"{flat.inner_px:.4f}", f"{flat.inner_px / flat.bound_px:.2f}",
+            method.name, "checkerboard" if method.board else "pattern", f"{min(r.found_share for r in of_method):.0%}",
+            str(sum(r.wrong for r in of_method)), f"{flat.inner_px:.4f}", f"{flat.inner_px / flat.bound_px:.2f}",
             f"{worst.inner_px / worst.bound_px:.2f}, {worst.scene}", f"{flat.ms:.1f}", f"{flat.ratio:.2f}",
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
@@ -78,7 +78,7 @@ def comparison_markdown(results: Sequence[MethodResult]) -> str:
 
 
 def comparison_picture(results: Sequence[MethodResult]) -> bytes:
-    """PNG: time against error, both logarithmic; a color a method, a mark a scene, the bounds as lines."""
+    """PNG: time against error, both logarithmic; one color per method, one mark per scene, the bounds as lines."""
     import matplotlib
 
     matplotlib.use("Agg")

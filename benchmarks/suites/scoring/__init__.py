@@ -1,1 +1,1 @@
-"""How the stress suite is read, scored and reported."""
+"""Reading, scoring and reporting of the stress suite."""

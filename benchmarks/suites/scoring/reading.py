@@ -1,4 +1,4 @@
-"""Reading one case: its image, the extraction, its time beside the plain frame's, its score."""
+"""Reading of one case: its image, the extraction, its time relative to the plain frame's time, its score."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +32,15 @@ Image = NDArray[Any]
 
 @dataclass(frozen=True)
 class CaseResult:
-    """One image read.
+    """The result of one image.
 
     Attributes:
-        ms: processor time of the best run. ratio: to the plain frame's, the runs' median; NaN for other sizes of image.
-        reason: the extractor's; an exception's text where it raised one.
+        case: the case.
+        score: counts of markers.
+        ms: processor time of the best run.
+        ratio: median ratio of times to the plain frame's time; NaN for other sizes of image.
+        reason: the extractor's reason, or the text of its exception.
+        raised: the extractor raised an exception.
     """
 
     case: StressCase
@@ -45,6 +49,14 @@ class CaseResult:
     ratio: float
     reason: str
     raised: bool
+
+
+class CaseReading(NamedTuple):
+    """A case's result, its image, and the markers; None if the extractor raised an exception."""
+
+    result: CaseResult
+    shot: CaseImage
+    markers: Markers | None
 
 
 @cache
@@ -58,51 +70,52 @@ def render_plain_image(pattern: str) -> Image:
 
 
 def time_extraction(extractor: Extractor, image: Image) -> tuple[Markers, float]:
-    """The markers, and ms of processor time."""
+    """The markers, and the processor time in ms."""
     started = time.process_time()
     markers = extractor.extract(image)
     return markers, 1e3 * (time.process_time() - started)
 
 
 def layout_layers(shot: CaseImage) -> int:
-    """Of the layout to look for: the scene's; the standard one's in images without a pattern."""
+    """Layers of the layout to search: the scene's layers, or 11 in images without a pattern."""
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
 
 
-def read_case(
-    case: StressCase, runs: int, *, timing: bool = True
-) -> tuple[CaseResult, CaseImage, Markers | None]:
-    """Shoot a case's image, extract, compare; an exception is a result, so that the suite goes on.
+def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReading:
+    """Render a case's image, extract and score. An exception of the extractor is a result.
 
     Args:
-        runs: how often it is read.
-        timing: also read the plain frame, right before each run, to state the ratio.
+        case: the case.
+        runs: number of extractions.
+        timing: read the plain frame before each extraction, to measure the ratio of times.
     """
     kind = BY_NAME[case.kind]
     shot = make_frame(case, kind).shoot()
     pixels = shot.image.shape[0] * shot.image.shape[1]
     comparable = timing and shot.image.shape[:2] == STANDARD_SIZE[::-1]
-    taken, ratios = [], []
+    times_ms, ratios = [], []
     try:
         extractor = cached_extractor(case.pattern, layout_layers(shot))
         for _ in range(1 if pixels > LARGE_PX else runs):
-            beside = math.nan
+            plain_ms = math.nan
             if comparable:
-                beside = time_extraction(
+                plain_ms = time_extraction(
                     cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
                 )[1]
             markers, ms = time_extraction(extractor, shot.image)
-            taken.append(ms)
-            ratios.append(ms / beside)
+            times_ms.append(ms)
+            ratios.append(ms / plain_ms)
     except Exception as error:
-        return CaseResult(case, EMPTY_SCORE, math.nan, math.nan, repr(error), True), shot, None
-    figures = score_markers(markers, shot, promised=kind.promised)
+        failed = CaseResult(case, EMPTY_SCORE, math.nan, math.nan, repr(error), True)
+        return CaseReading(failed, shot, None)
+    score = score_markers(markers, shot, promised=kind.promised)
     reason = str(markers.reason) if markers.reason else ""
-    return CaseResult(case, figures, min(taken), float(np.median(ratios)), reason, False), shot, markers
+    result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False)
+    return CaseReading(result, shot, markers)
 
 
 def warm_up() -> None:
-    """Compile, so that no time of it is counted."""
+    """Compile before times are measured."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -110,7 +123,7 @@ def warm_up() -> None:
 
 
 def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
-    """Every wrong marker with its place and error, and the first of those that should not be lost."""
+    """Lines on every wrong marker with position and error, and on the first markers that should not be lost."""
     if markers is None or shot.scene is None:
         return []
     wrong, truth = find_wrong_markers(shot, markers)
@@ -120,8 +133,8 @@ def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
     for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MOST_LOST_LINES]]:
         x, y = truth.marker_xy_px[marker]
         status = Status(markers.status[marker]).name.lower()
-        seen = "visible" if truth.visible[marker] else "not visible"
-        line = f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {seen}, edge {edge_px[marker]:.1f} px"
+        visibility = "visible" if truth.visible[marker] else "not visible"
+        line = f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {visibility}, edge {edge_px[marker]:.1f} px"
         if wrong[marker]:
             error = np.linalg.norm(markers.xy_px[marker] - truth.marker_xy_px[marker])
             line += f": WRONG by {error:.1f} px"
@@ -130,7 +143,7 @@ def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
 
 
 def find_wrong_markers(shot: CaseImage, markers: Markers) -> tuple[NDArray[np.bool_], Truth]:
-    """(M,) bool, and the truth of the pattern in the image that fits best."""
+    """(M,) bool: the wrong markers, and the truth of the pattern with the fewest wrong markers."""
     assert shot.scene is not None
     layout = shot.scene.layout
     both = [(wrong_markers(markers, layout, truth), truth) for truth in shot.truths]
@@ -138,7 +151,7 @@ def find_wrong_markers(shot: CaseImage, markers: Markers) -> tuple[NDArray[np.bo
 
 
 def draw_overlay(shot: CaseImage, case: StressCase, markers: Markers) -> NDArray[np.uint8]:
-    """The extractor's own overlay, with a red line from every wrong marker to its true place."""
+    """The extractor's overlay with a red line from every wrong marker to its true position."""
     import cv2
 
     from extractor.draw import draw_markers

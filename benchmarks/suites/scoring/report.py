@@ -1,4 +1,4 @@
-"""What a run of the stress suite says: failures by severity, a row a condition, a plot, a file."""
+"""Reports of the stress suite: failures by severity, one row per condition, a plot, a file."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ COLORS = {
 
 @dataclass(frozen=True)
 class ConditionRow:
-    """All images of one condition. Counts are of markers, see ``Score``; times are medians.
+    """All images of one condition. Counts are of markers, see ``MarkerScore``; times are medians.
 
     Attributes:
-        promised: yes, no, or how many of the images.
+        promised: yes, no, or the number of images with a promise.
         worst, slowest: names of images.
     """
 
@@ -60,51 +60,51 @@ class ConditionRow:
 
     @property
     def kept_share(self) -> float:
-        """Of the promised markers."""
+        """The share of the promised markers that is kept."""
         return self.kept / self.sure if self.sure else math.nan
 
     def share(self, name: str) -> float:
-        """Of the visible markers; wrong ones of the reported where none is visible."""
-        whole = self.visible or self.reported
-        return float(getattr(self, name)) / whole if whole else 0.0
+        """A count over the visible markers, or over the reported markers if none is visible."""
+        total = self.visible or self.reported
+        return float(getattr(self, name)) / total if total else 0.0
 
 
 def condition_rows(results: Iterable[CaseResult], kinds: Sequence[ConditionKind]) -> list[ConditionRow]:
-    """In the order of the conditions."""
+    """One row per condition, in the order of the conditions."""
     results = list(results)
     rows = []
     for kind in kinds:
         for step in kind.steps:
-            own = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
-            if own:
-                rows.append(_condition_row(kind, sorted(own, key=lambda r: r.case.name)))
+            of_condition = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
+            if of_condition:
+                rows.append(_condition_row(kind, sorted(of_condition, key=lambda r: r.case.name)))
     return rows
 
 
-def _condition_row(kind: ConditionKind, own: list[CaseResult]) -> ConditionRow:
-    promised = [r for r in own if r.score.promised]
+def _condition_row(kind: ConditionKind, of_condition: list[CaseResult]) -> ConditionRow:
+    promised = [r for r in of_condition if r.score.promised]
     counted = ("visible", "measured", "repaired", "fitted", "lost", "reported", "wrong", "outside", "hidden")
-    reasons = sorted({r.reason for r in own if r.reason})
+    reasons = sorted({r.reason for r in of_condition if r.reason})
     return ConditionRow(
-        condition=own[0].case.condition,
+        condition=of_condition[0].case.condition,
         group=kind.group,
-        images=len(own),
-        **{name: sum(getattr(r.score, name) for r in own) for name in counted},
+        images=len(of_condition),
+        **{name: sum(getattr(r.score, name) for r in of_condition) for name in counted},
         sure=sum(r.score.sure for r in promised),
         kept=sum(r.score.kept for r in promised),
-        promised=f"{len(promised)}/{len(own)}"
-        if 0 < len(promised) < len(own)
+        promised=f"{len(promised)}/{len(of_condition)}"
+        if 0 < len(promised) < len(of_condition)
         else ("yes" if promised else "no"),
-        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in own]),
+        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in of_condition]),
         repaired_rms_px=_pooled_rms(
-            [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in own]
+            [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in of_condition]
         ),
-        ms=_median([r.ms for r in own]),
-        ratio=_median([r.ratio for r in own]),
-        raised=sum(r.raised for r in own),
+        ms=_median([r.ms for r in of_condition]),
+        ratio=_median([r.ratio for r in of_condition]),
+        raised=sum(r.raised for r in of_condition),
         reasons=", ".join(reasons),
-        worst=max(own, key=_severity).case.name,
-        slowest=max(own, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
+        worst=max(of_condition, key=_severity).case.name,
+        slowest=max(of_condition, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
     )
 
 
@@ -127,7 +127,7 @@ def _median(values: list[float]) -> float:
 
 
 def failure_lines(rows: list[ConditionRow]) -> list[str]:
-    """A line each, the severest first: raised, wrong, outside the image, promise broken, slow."""
+    """One line per failure, the severest first: raised, wrong, outside the image, promise broken, slow."""
     found: list[tuple[int, float, str]] = []
     for row in rows:
         if row.raised:
@@ -153,6 +153,7 @@ HEAD = (
 
 
 def results_table(rows: list[ConditionRow]) -> str:
+    """The table of all rows, with headings by group."""
     lines, group = [HEAD], ""
     for row in rows:
         if row.group != group:
@@ -179,7 +180,7 @@ def _or_dash(value: float, width: int, digits: int) -> str:
 
 
 def result_line(result: CaseResult) -> str:
-    """One image."""
+    """The line of one image."""
     figures = result.score
     return (
         f"{result.case.name:<44} visible {figures.visible:>5} measured {figures.measured:>5} repaired "
@@ -197,31 +198,31 @@ def summary_text(rows: list[ConditionRow]) -> str:
     }
     empty = [row for row in rows if row.group == "nothing"]
     promised = [row for row in rows if row.sure]
-    held = sum(row.kept_share >= PROMISED_SHARE for row in promised)
+    kept_promises = sum(row.kept_share >= PROMISED_SHARE for row in promised)
     slow = sum(row.ratio > SLOWEST_RATIO for row in rows)
     images = sum(row.images for row in empty)
     return (
         f"{len(rows)} conditions, {total['images']} images, {total['visible']} visible markers\n"
         f"{total['wrong']} wrong of {total['reported']} reported, {sum(row.wrong for row in empty)} of them on "
         f"{images} images without a pattern\n"
-        f"promise (99 % measured or repaired) held in {held} of {len(promised)} conditions, "
+        f"promise (99 % measured or repaired) held in {kept_promises} of {len(promised)} conditions, "
         f"{100 * total['kept'] / max(total['sure'], 1):.2f} % together; slower than {SLOWEST_RATIO} x plain: {slow}"
     )
 
 
 def write_json(rows: list[ConditionRow], path: Path) -> None:
-    """Every row as an object; NaN as null."""
+    """Write every row as an object, NaN as null."""
     columns = [{k: None if v != v else v for k, v in asdict(row).items()} for row in rows]
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
-    beside.replace(path)
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)
 
 
 def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], path: Path) -> None:
-    """A small panel a kind, a bar a step: shares of the visible markers; wrong ones in red, with their count."""
+    """Plot one panel per kind, one bar per step: shares of the visible markers; wrong ones in red, with their count."""
     import matplotlib
 
-    matplotlib.weight("Agg")
+    matplotlib.use("Agg")
     from matplotlib import pyplot
 
     shown = [kind for kind in kinds if any(_is_of_kind(row, kind) for row in rows)]
@@ -235,15 +236,15 @@ def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], pa
     handles = [matplotlib.patches.Patch(color=color, label=name) for name, color in COLORS.items()]
     figure.legend(handles=handles, loc="upper center", ncols=len(handles), frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.98))
-    beside = path.with_name(path.name + ".part")
+    partial = path.with_name(path.name + ".part")
     figure.savefig(
-        beside,
+        partial,
         format=path.suffix[1:] or "png",
         dpi=110,
         metadata={"Software": None} if path.suffix == ".png" else None,
     )
     pyplot.close(figure)
-    beside.replace(path)
+    partial.replace(path)
 
 
 def _is_of_kind(row: ConditionRow, kind: ConditionKind) -> bool:

@@ -1,4 +1,4 @@
-"""An extraction against the truth: what was found, what is wrong, and whether the promise applies."""
+"""Scores of extractions against the truth: found and wrong markers, and whether the promise applies."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from cmpdesign.scene import Scene, Truth
 from cmpdesign.scene.parts.light import light_gain
 from extractor.result import Markers, Status
 
-WRONG_SHARE = 0.3  # of the shortest edge at a marker: farther off, it carries another's id or none's
-PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10
-MIN_RIM_DISTANCE_PX = 2.0  # nearer to the image's rim a corner is not seen from all sides
-PITCH_ROUNDING = 1e-6  # so that a pitch of 8 px is one
+WRONG_SHARE = 0.3  # of the shortest edge at a marker; a marker with a larger error is wrong
+PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10  # px, of the edge, of the contrast
+MIN_RIM_DISTANCE_PX = 2.0  # nearer to the image's rim a marker's surroundings are incomplete
+PITCH_ROUNDING = 1e-6  # tolerance of the smallest edge
 Bools = NDArray[np.bool_]
 
 
@@ -26,13 +26,16 @@ class MarkerScore:
     """Counts of markers.
 
     Attributes:
-        visible: as the truth says; measured, repaired, fitted, lost are among them.
-        reported: visible or not.
-        wrong: reported and farther from its true place than 0.3 of the shortest edge there.
-        outside: reported, its true place outside the image. hidden: inside, but not visible.
-        sure: see ``promised_markers``; kept: measured or repaired of these.
-        promised: at least 99 % of the sure ones must be kept.
-        rms_px, repaired_rms_px: per axis, of the measured / repaired and fitted ones that are not wrong.
+        visible: visible by the truth; of these measured, repaired, fitted, lost.
+        reported: not lost, visible or not.
+        wrong: reported with an error above 0.3 of the shortest edge.
+        outside: reported with a true position outside the image.
+        hidden: reported with a true position inside the image, but not visible.
+        sure: markers of ``promised_markers``.
+        kept: measured or repaired markers of ``promised_markers``, not wrong.
+        promised: at least 99 % of the promised markers must be kept.
+        rms_px: per axis, of measured markers that are not wrong.
+        repaired_rms_px: per axis, of repaired and fitted markers that are not wrong.
     """
 
     visible: int
@@ -52,7 +55,7 @@ class MarkerScore:
 
 
 def score_markers(markers: Markers, shot: CaseImage, *, promised: bool) -> MarkerScore:
-    """The best score over the patterns in the image; without a pattern every reported marker is wrong."""
+    """The best score over the patterns in the image; without a pattern all reported markers are wrong."""
     if shot.scene is None:
         reported = int((markers.status != Status.LOST).sum())
         nan = float("nan")
@@ -64,14 +67,14 @@ def score_markers(markers: Markers, shot: CaseImage, *, promised: bool) -> Marke
 
 
 def wrong_markers(markers: Markers, layout: Layout, truth: Truth) -> Bools:
-    """(M,) bool."""
+    """(M,) bool: reported markers with an error above 0.3 of the shortest edge."""
     error = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
-    near = error <= WRONG_SHARE * shortest_edges(layout, truth)
-    return np.asarray((markers.status != Status.LOST) & ~near)
+    is_right = error <= WRONG_SHARE * shortest_edges(layout, truth)
+    return np.asarray((markers.status != Status.LOST) & ~is_right)
 
 
 def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
-    """(M,) px: the distance from every marker to its nearest neighbour."""
+    """(M,) px: the length of the shortest edge at every marker."""
     ends = truth.marker_xy_px[layout.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     shortest = np.full(len(truth.marker_xy_px), np.inf)
@@ -81,7 +84,7 @@ def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
 
 
 def promised_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
-    """(M,) bool: visible, off the image's rim, and a corner of a colored or white cell that is visible itself."""
+    """(M,) bool: visible markers off the image's rim that are corners of a visible colored or white cell."""
     touching = np.zeros(len(truth.visible), dtype=np.bool_)
     touching[layout.cell_corners[truth.cell_visible & (layout.cell_color != BLACK)]] = True
     from_rim = np.minimum(truth.marker_xy_px, np.array(shape[1::-1]) - 1 - truth.marker_xy_px).min(axis=1)
@@ -96,21 +99,21 @@ def _score_pattern(
     reported = status != Status.LOST
     true_px = truth.marker_xy_px
     inside = np.all((true_px >= -0.5) & (true_px < np.array(shape[1::-1]) - 0.5), axis=1)
-    sure = promised_markers(layout, truth, shape)
-    seen = {name: int((status[visible] == name).sum()) for name in Status}
+    promised_mask = promised_markers(layout, truth, shape)
+    counts = {name: int((status[visible] == name).sum()) for name in Status}
     return MarkerScore(
         visible=int(visible.sum()),
-        measured=seen[Status.MEASURED],
-        repaired=seen[Status.REPAIRED],
-        fitted=seen[Status.FITTED],
-        lost=seen[Status.LOST],
+        measured=counts[Status.MEASURED],
+        repaired=counts[Status.REPAIRED],
+        fitted=counts[Status.FITTED],
+        lost=counts[Status.LOST],
         reported=int(reported.sum()),
         wrong=int(wrong.sum()),
         outside=int((reported & ~inside).sum()),
         hidden=int((reported & inside & ~visible).sum()),
-        sure=int(sure.sum()),
-        kept=int((sure & ~wrong & np.isin(status, (Status.MEASURED, Status.REPAIRED))).sum()),
-        promised=promised and bool(sure.any()) and _is_promised(scene, truth, sure, shape),
+        sure=int(promised_mask.sum()),
+        kept=int((promised_mask & ~wrong & np.isin(status, (Status.MEASURED, Status.REPAIRED))).sum()),
+        promised=promised and bool(promised_mask.any()) and _is_promised(scene, truth, promised_mask, shape),
         rms_px=_rms(markers, truth, (status == Status.MEASURED) & ~wrong),
         repaired_rms_px=_rms(markers, truth, (status > Status.MEASURED) & ~wrong),
     )
@@ -121,9 +124,9 @@ def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
     return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
-def _is_promised(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]) -> bool:
-    """The white cell in view, edges of 8 px, blur to a fifth of the edge, noise to a tenth of the contrast."""
-    edge_px = float(shortest_edges(scene.layout, truth)[sure].min()) * (1 + PITCH_ROUNDING)
+def _is_promised(scene: Scene, truth: Truth, promised_mask: Bools, shape: tuple[int, ...]) -> bool:
+    """Whether the promise applies: visible white cell, edges of 8 px, limits of blur and noise."""
+    edge_px = float(shortest_edges(scene.layout, truth)[promised_mask].min()) * (1 + PITCH_ROUNDING)
     noise = scene.sensor.noise if scene.sensor else 0.0
     return (
         bool(truth.cell_visible[scene.layout.reference_cell])
@@ -134,7 +137,7 @@ def _is_promised(scene: Scene, truth: Truth, sure: Bools, shape: tuple[int, ...]
 
 
 def smallest_contrast(scene: Scene, truth: Truth, size: tuple[int, int]) -> float:
-    """Over the visible colored cells: the largest channel's step to black, under the light there, 8-bit units."""
+    """The smallest contrast of the visible colored cells to black under the light, largest channel, 8-bit units."""
     layout = scene.layout
     cells = np.flatnonzero(truth.cell_visible & (layout.cell_color != BLACK) & (layout.cell_color != WHITE))
     if not len(cells):
@@ -146,8 +149,8 @@ def smallest_contrast(scene: Scene, truth: Truth, size: tuple[int, int]) -> floa
         centre = truth.marker_xy_px[layout.cell_corners[cells]].mean(axis=1)
         x, y = np.clip(np.rint(centre), 0, np.asarray(size) - 1).astype(int).T
         light = light_gain(scene.light, size)[:, y, x].T.astype(np.float64)
-    step = np.minimum(light * ink, 255) - np.minimum(light * black, 255)
-    return float(step.max(axis=1).min())
+    contrast = np.minimum(light * ink, 255) - np.minimum(light * black, 255)
+    return float(contrast.max(axis=1).min())
 
 
 EMPTY_SCORE = MarkerScore(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))

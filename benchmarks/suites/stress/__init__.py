@@ -1,1 +1,1 @@
-"""The images of the stress suite: every kind of damage and distortion at graded strength, every one repeatable."""
+"""The repeatable images of the stress suite: every kind of damage and distortion at graded strength."""

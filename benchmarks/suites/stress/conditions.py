@@ -1,4 +1,4 @@
-"""Every kind of condition. A new one is a line in a table of its group's file; all else takes it from here."""
+"""All kinds of conditions. A new kind is one line in the table of its group's file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LARGE_PX = 3_000_000
 
 
 def make_cases(*, quick: bool) -> list[StressCase]:
-    """All patterns and seeds; in a quick run the patterns take turns, and large images are left out."""
+    """Cases of all patterns and seeds. A quick run has one pattern per step, in turn, and no large images."""
     chosen, turn = [], 0
     for kind in KINDS:
         for step in kind.steps:
@@ -44,10 +44,10 @@ def make_cases(*, quick: bool) -> list[StressCase]:
 
 
 def case_pixels(case: StressCase) -> int:
-    """Of the case's image."""
+    """Pixels of the case's image."""
     frame = make_frame(case, BY_NAME[case.kind])
     width, height = frame.size
-    return width * height * (2 if isinstance(frame, PatternFrame) and frame.beside else 1)
+    return width * height * (2 if isinstance(frame, PatternFrame) and frame.second else 1)
 
 
 def matching_cases(text: str) -> list[StressCase]:

@@ -13,93 +13,98 @@ from cmpdesign.scene import Blob, Glare, Press, Scratch
 from cmpdesign.scene.standard import INKS
 
 Cells = NDArray[np.intp]
-CLUSTER = 6  # cells that fall out together
+CLUSTER = 6  # neighbouring cells that are missing together
 DIRT = (90.0, 80.0, 70.0)
 
 
 def without_cells(frame: PatternFrame, cells: Cells) -> PatternFrame:
+    """The frame with these cells missing."""
     return frame.damaged(missing_cells=tuple(int(cell) for cell in cells))
 
 
 def droppable_cells(layout: Layout) -> Cells:
-    """Colored cells but the reference."""
+    """Numbers of the colored cells without the reference cell."""
     colored = layout.cell_color != BLACK
     colored[layout.reference_cell] = False
     return np.flatnonzero(colored)
 
 
 def cell_centres_mm(layout: Layout) -> NDArray[np.float64]:
+    """(C, 2) centres of all cells."""
     return np.asarray(layout.marker_xy_mm[layout.cell_corners].mean(axis=1))
 
 
 def cell_rings(layout: Layout) -> NDArray[np.int32]:
-    """(C,) the layer on each cell's outer side, from 1."""
+    """(C,) int32: the layer at each cell's outer side, from 1."""
     return np.asarray(layout.marker_layer[layout.cell_corners].max(axis=1))
 
 
 def missing_cell_clusters(frame: PatternFrame, share: float) -> PatternFrame:
-    """Groups of neighbours fall out until the share is reached."""
-    free, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
-    gone: set[int] = set()
-    order, turn = frame.rng.permuted(free), 0
-    while len(gone) < share * len(free):
+    """Groups of neighbouring cells are missing, up to a share."""
+    droppable, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
+    missing: set[int] = set()
+    order, turn = frame.rng.permuted(droppable), 0
+    while len(missing) < share * len(droppable):
         middle = centre[order[turn]]
-        distance = np.linalg.norm(centre[free] - middle, axis=1)
-        gone.update(int(cell) for cell in free[np.argsort(distance)[:CLUSTER]])
-        turn = max(turn + 1, len(gone))  # a group may have been gone before
-    return without_cells(frame, np.array(sorted(gone)))
+        distance = np.linalg.norm(centre[droppable] - middle, axis=1)
+        missing.update(int(cell) for cell in droppable[np.argsort(distance)[:CLUSTER]])
+        turn = max(turn + 1, len(missing))  # a group may be missing already
+    return without_cells(frame, np.array(sorted(missing)))
 
 
 def missing_hole(frame: PatternFrame, share: float) -> PatternFrame:
-    """A share of the cells falls out around one place."""
-    free, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
+    """A share of the cells is missing around one position."""
+    droppable, centre = droppable_cells(frame.layout), cell_centres_mm(frame.layout)
     middle = frame.rng.uniform(-4, 4, 2)
-    distance = np.linalg.norm(centre[free] - middle, axis=1)
-    return without_cells(frame, free[np.argsort(distance)[: round(share * len(free))]])
+    distance = np.linalg.norm(centre[droppable] - middle, axis=1)
+    return without_cells(frame, droppable[np.argsort(distance)[: round(share * len(droppable))]])
 
 
 def layer_missing(frame: PatternFrame, layer: float) -> PatternFrame:
-    free = droppable_cells(frame.layout)
-    return without_cells(frame, free[cell_rings(frame.layout)[free] == layer])
+    """The cells inside one layer are missing."""
+    droppable = droppable_cells(frame.layout)
+    return without_cells(frame, droppable[cell_rings(frame.layout)[droppable] == layer])
 
 
 def outer_layers_missing(frame: PatternFrame, count: float) -> PatternFrame:
-    free = droppable_cells(frame.layout)
-    ring = cell_rings(frame.layout)[free]
-    return without_cells(frame, free[ring > ring.max() - count])
+    """The cells of the outermost layers are missing."""
+    droppable = droppable_cells(frame.layout)
+    layer = cell_rings(frame.layout)[droppable]
+    return without_cells(frame, droppable[layer > layer.max() - count])
 
 
 def sector_missing(frame: PatternFrame, degrees: float) -> PatternFrame:
-    """A wedge from the centre to the rim."""
-    free = droppable_cells(frame.layout)
-    x, y = cell_centres_mm(frame.layout)[free].T
-    away = (np.degrees(np.arctan2(y, x)) - frame.rng.uniform(0, 360)) % 360
-    return without_cells(frame, free[(away < degrees) & (np.hypot(x, y) > 1.2)])
+    """The cells of a sector are missing."""
+    droppable = droppable_cells(frame.layout)
+    x, y = cell_centres_mm(frame.layout)[droppable].T
+    angle_deg = (np.degrees(np.arctan2(y, x)) - frame.rng.uniform(0, 360)) % 360
+    return without_cells(frame, droppable[(angle_deg < degrees) & (np.hypot(x, y) > 1.2)])
 
 
 def white_neighbours_missing(frame: PatternFrame, count: float) -> PatternFrame:
-    """Of the colored cells around the white one, some are missing."""
+    """Some colored cells around the white cell are missing."""
     corners = frame.layout.cell_corners
     white = corners[frame.layout.reference_cell]
-    free = droppable_cells(frame.layout)
-    touching = free[np.isin(corners[free], white).any(axis=1)]
+    droppable = droppable_cells(frame.layout)
+    touching = droppable[np.isin(corners[droppable], white).any(axis=1)]
     return without_cells(frame, frame.rng.permuted(touching)[: int(count)])
 
 
 def one_ink_missing(frame: PatternFrame, share: float) -> PatternFrame:
-    """A share of the red cells fell out, nothing else."""
+    """A share of the red cells is missing."""
     red = np.flatnonzero(frame.layout.cell_color == RED)
     return without_cells(frame, frame.rng.permuted(red)[: round(share * len(red))])
 
 
 def sample_places(frame: PatternFrame, count: int, least_mm: float = 2.0) -> NDArray[np.float64]:
-    """(count, 2) mm over the pattern, off the white cell."""
+    """(count, 2) mm: random positions on the pattern, at least ``least_mm`` from the centre."""
     rng, reach = frame.rng, 0.42 * min(frame.layout.size_mm)
     angle, radius = rng.uniform(0, 2 * np.pi, count), rng.uniform(least_mm, reach, count)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
 def with_blobs(frame: PatternFrame, count: int, radius_mm: float, rgb: RGB = DIRT) -> PatternFrame:
+    """Blobs at random positions."""
     spots = tuple(Blob((x, y), radius_mm, rgb) for x, y in sample_places(frame, count, 1.5 + radius_mm))
     return frame.damaged(blobs=spots)
 
@@ -107,7 +112,7 @@ def with_blobs(frame: PatternFrame, count: int, radius_mm: float, rgb: RGB = DIR
 def with_scratches(
     frame: PatternFrame, count: int, width_mm: float, rgb: RGB = (150.0, 150.0, 150.0), aside: float = 2.5
 ) -> PatternFrame:
-    """Bands across the whole pattern, ``aside`` mm or more from the centre."""
+    """Bands across the whole pattern, at least ``aside`` mm from the centre."""
     reach, rng = max(frame.layout.size_mm), frame.rng
     bands = []
     for turn in rng.uniform(0, 2 * np.pi) + np.pi * np.arange(count) / count * 2:
@@ -119,7 +124,7 @@ def with_scratches(
 
 
 def with_glare(frame: PatternFrame, count: int, sigma_px: float, least_px: float) -> PatternFrame:
-    """Reflections beside the image's centre."""
+    """Reflections at least ``least_px`` from the image's centre."""
     rng = frame.rng
     angle, radius = rng.uniform(0, 2 * np.pi, count), rng.uniform(least_px, least_px + 80, count)
     x, y = 319.5 + radius * np.cos(angle), 239.5 + radius * np.sin(angle)
@@ -128,21 +133,23 @@ def with_glare(frame: PatternFrame, count: int, sigma_px: float, least_px: float
 
 
 def white_covered(frame: PatternFrame, rgb: RGB, radius_mm: float) -> PatternFrame:
+    """A blob covers the white cell."""
     x, y = cell_centres_mm(frame.layout)[frame.layout.reference_cell]
     return frame.damaged(blobs=(Blob((x, y), radius_mm, rgb),))
 
 
 def white_in_ink(frame: PatternFrame, ink: str) -> PatternFrame:
-    """The white cell was printed in another ink."""
-    return frame.having(inks={**INKS, "white": INKS[ink]})
+    """The white cell is printed in another ink."""
+    return frame.with_parts(inks={**INKS, "white": INKS[ink]})
 
 
 def white_missing(frame: PatternFrame) -> PatternFrame:
+    """The white cell is missing."""
     return without_cells(frame, np.array([frame.layout.reference_cell]))
 
 
 def white_elsewhere(frame: PatternFrame, radius_mm: float) -> PatternFrame:
-    """The white cell is missing, and a white drop lies on another black cell: a wrong reference is offered."""
+    """The white cell is missing, and a white blob on a black cell is a wrong candidate of the reference."""
     black = np.flatnonzero((frame.layout.cell_color == BLACK) & (cell_rings(frame.layout) <= 4))
     x, y = cell_centres_mm(frame.layout)[frame.rng.choice(black)]
     drop = Blob((x, y), radius_mm, INKS["white"])
@@ -150,11 +157,12 @@ def white_elsewhere(frame: PatternFrame, radius_mm: float) -> PatternFrame:
 
 
 def with_bulge(frame: PatternFrame) -> PatternFrame:
-    return frame.formed(Press(4, 1.2))
+    """A pressed surface."""
+    return frame.with_surface(Press(4, 1.2))
 
 
 def white_glared(frame: PatternFrame, sigma_px: float) -> PatternFrame:
-    """A reflection on the white cell, which lies near the image's centre."""
+    """A reflection on the white cell, near the image's centre."""
     return frame.damaged(glare=(Glare((319.5, 239.5), sigma_px),))
 
 
@@ -176,7 +184,10 @@ MISSING_KINDS = group_kinds(
         "missing, bulged", "1", (0.02, 0.05, 0.1), lambda f, s: with_bulge(f.damaged(missing_share=s))
     ),
     ConditionKind(
-        "missing, tilted", "1", (0.02, 0.05, 0.1), lambda f, s: f.damaged(missing_share=s).seen(tilt_deg=40)
+        "missing, tilted",
+        "1",
+        (0.02, 0.05, 0.1),
+        lambda f, s: f.damaged(missing_share=s).with_camera(tilt_deg=40),
     ),
 )
 

@@ -1,4 +1,4 @@
-"""Images without a pattern, or with one that is not ours: nothing may be reported on them."""
+"""Images without a pattern, or with another pattern: nothing may be reported on them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ImageSampler = Callable[[np.random.Generator, Size], Pixels]
 
 
 def noise_image(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:
-    """Colored noise of a grain."""
+    """Colored noise with a grain of ``sigma_px``."""
     grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
     if sigma_px:
         grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), sigma_px))
@@ -29,7 +29,7 @@ def noise_image(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels
 
 
 def uniform_image(rng: np.random.Generator, size: Size, sigma: float) -> Pixels:
-    """One color, with the sensor's noise."""
+    """One color with sensor noise."""
     grain = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
     return np.asarray(rng.uniform(0, 255, 3) + sigma * grain, dtype=np.float32)
 
@@ -40,13 +40,13 @@ def clutter_image(rng: np.random.Generator, size: Size, shapes: float, *, triang
 
 
 def photo_like_image(rng: np.random.Generator, size: Size, steps: float) -> Pixels:
-    """Smooth areas with sharp rims, as in a photograph: quantised noise of two grains."""
+    """Smooth areas with sharp borders, as in a photograph: quantised noise of two grains."""
     coarse, fine = noise_image(rng, size, 30), noise_image(rng, size, 2)
     return np.asarray(np.round(coarse / (255 / steps)) * (255 / steps) + 0.2 * (fine - 127), dtype=np.float32)
 
 
 def checkerboard_image(rng: np.random.Generator, size: Size, pitch_px: float) -> Pixels:
-    """Squares in red, green, blue, white and black, turned."""
+    """Rotated squares in red, green, blue, white and black."""
     turn = rng.uniform(0, np.pi)
     y, x = np.mgrid[: size[1], : size[0]]
     u = np.floor((np.cos(turn) * x - np.sin(turn) * y) / pitch_px).astype(int)
@@ -65,7 +65,7 @@ def _ink_colors() -> list[tuple[float, float, float]]:
 def recolored_pattern_image(
     rng: np.random.Generator, size: Size, pitch_px: float, recolor: Callable[..., Layout]
 ) -> Pixels:
-    """A lattice of triangles as ours, in colors that are not."""
+    """The honeycomb pattern's triangles in other colors."""
     layout = recolor(cached_layout("honeycomb", 11), rng)
     scene = standard_scene(layout, seed=int(rng.integers(1 << 30)))
     camera = replace(scene.camera, pitch_px=pitch_px, rotation_deg=float(rng.uniform(0, 360)))
@@ -74,7 +74,7 @@ def recolored_pattern_image(
 
 
 def shuffle_colors(layout: Layout, rng: np.random.Generator) -> Layout:
-    """The colored cells and the white one in random order."""
+    """The colors of the colored cells and the white cell in random order."""
     color = layout.cell_color.copy()
     up = color != BLACK
     color[up] = rng.permuted(color[up])
@@ -82,7 +82,7 @@ def shuffle_colors(layout: Layout, rng: np.random.Generator) -> Layout:
 
 
 def recolor_to_one_ink(layout: Layout, rng: np.random.Generator) -> Layout:
-    """All colored cells alike, with the white one."""
+    """All colored cells in one ink, with the white cell."""
     color = layout.cell_color.copy()
     color[(color != BLACK) & (color != WHITE)] = rng.integers(3)
     return replace(layout, cell_color=color)
@@ -91,7 +91,7 @@ def recolor_to_one_ink(layout: Layout, rng: np.random.Generator) -> Layout:
 def _empty_change(
     draw: Callable[..., Pixels], **fixed: object
 ) -> Callable[[PatternFrame, float], EmptyFrame]:
-    """A kind's change: the image is drawn from the frame's seed, small and standard in turn."""
+    """A kind's change: the image is drawn from the frame's seed, in small and standard size in turn."""
 
     def change(frame: PatternFrame, step: float) -> EmptyFrame:
         seed = frame.scene.seed

@@ -1,4 +1,4 @@
-"""Frames of the stress suite: a scene and its size, or an image without a pattern; each shoots its image and truth."""
+"""Frames of the stress suite: a scene and its size, or an image without a pattern; ``shoot`` renders the image."""
 
 from __future__ import annotations
 
@@ -34,10 +34,12 @@ PATTERNS = ("honeycomb", "round", "elliptical")
 
 @dataclass(frozen=True, eq=False)
 class CaseImage:
-    """An image and the truths (M of the layout) of every pattern in it: none, one or two.
+    """An image and the truths of all patterns in it: none, one or two.
 
     Attributes:
-        scene: of the first pattern; None where there is none.
+        image: (H, W, 3) BGR, uint8 or uint16.
+        truths: one truth per pattern.
+        scene: the scene of the first pattern; None without a pattern.
     """
 
     image: Image
@@ -47,11 +49,11 @@ class CaseImage:
 
 @dataclass(frozen=True, eq=False)
 class PatternFrame:
-    """One pattern, or two beside each other, in an image of ``size`` (width, height) each."""
+    """One pattern, or two side by side, in an image of ``size`` (width, height) px each."""
 
     scene: Scene
     size: Size = STANDARD_SIZE
-    beside: Scene | None = None
+    second: Scene | None = None
 
     @property
     def layout(self) -> Layout:
@@ -63,50 +65,53 @@ class PatternFrame:
 
     @property
     def rng(self) -> np.random.Generator:
-        """A fresh stream of the scene's seed, for places and choices."""
+        """A new random stream of the scene's seed, for positions and choices."""
         return np.random.default_rng([self.scene.seed, 77])
 
-    def having(self, **changes: Any) -> PatternFrame:
-        """With other parts of the scene."""
+    def with_parts(self, **changes: Any) -> PatternFrame:
+        """The frame with other parts of the scene."""
         return replace(self, scene=replace(self.scene, **changes))
 
-    def seen(self, **changes: Any) -> PatternFrame:
-        """With other settings of the camera."""
-        return self.having(camera=replace(self.scene.camera, **changes))
+    def with_camera(self, **changes: Any) -> PatternFrame:
+        """The frame with other parameters of the camera."""
+        return self.with_parts(camera=replace(self.scene.camera, **changes))
 
-    def lit(self, **light: Any) -> PatternFrame:
-        """Under another light."""
-        return self.having(light=Light(**light))
+    def with_light(self, **light: Any) -> PatternFrame:
+        """The frame with another light."""
+        return self.with_parts(light=Light(**light))
 
-    def taken(self, **sensor: Any) -> PatternFrame:
-        """By another sensor; noise 2 unless told."""
-        return self.having(sensor=Sensor(**{"noise": 2.0, **sensor}))
+    def with_sensor(self, **sensor: Any) -> PatternFrame:
+        """The frame with another sensor; the default noise is 2."""
+        return self.with_parts(sensor=Sensor(**{"noise": 2.0, **sensor}))
 
     def blurred(self, blur_px: float) -> PatternFrame:
-        return self.having(optics=Optics(blur_px))
+        """The frame with another blur."""
+        return self.with_parts(optics=Optics(blur_px))
 
-    def inked(self, **inks: RGB) -> PatternFrame:
-        """With some inks of another color."""
-        return self.having(inks={**self.scene.inks, **inks})
+    def with_inks(self, **inks: RGB) -> PatternFrame:
+        """The frame with other colors of some inks."""
+        return self.with_parts(inks={**self.scene.inks, **inks})
 
-    def formed(self, *deformations: Deformation) -> PatternFrame:
-        """On a deformed surface."""
-        return self.having(surface=composed(*deformations))
+    def with_surface(self, *deformations: Deformation) -> PatternFrame:
+        """The frame with a deformed surface."""
+        return self.with_parts(surface=composed(*deformations))
 
     def damaged(self, **damage: Any) -> PatternFrame:
-        return self.having(damage=Damage(**damage))
+        """The frame with damage."""
+        return self.with_parts(damage=Damage(**damage))
 
     def scaled(self, pitch_px: float) -> PatternFrame:
-        """Another pitch, in an image that grows with it."""
+        """The frame with another pitch, in an image of proportional size."""
         ratio = pitch_px / self.pitch_px
         size = (round(self.size[0] * ratio), round(self.size[1] * ratio))
-        return replace(self.seen(pitch_px=pitch_px), size=size)
+        return replace(self.with_camera(pitch_px=pitch_px), size=size)
 
     def shoot(self) -> CaseImage:
+        """Render the image."""
         first = render(self.scene, size=self.size)
-        if self.beside is None:
+        if self.second is None:
             return CaseImage(first.image, (first.truth,), self.scene)
-        second = render(self.beside, size=self.size)
+        second = render(self.second, size=self.size)
         moved = replace(second.truth, marker_xy_px=second.truth.marker_xy_px + [self.size[0], 0])
         image = np.ascontiguousarray(np.hstack([first.image, second.image]))
         return CaseImage(image, (first.truth, moved), self.scene)
@@ -121,18 +126,19 @@ class EmptyFrame:
     seed: int
 
     def shoot(self) -> CaseImage:
+        """Draw the image."""
         drawn = self.draw(np.random.default_rng([self.seed, 78]), self.size)
         return CaseImage(np.clip(np.rint(drawn), 0, 255).astype(np.uint8), (), None)
 
 
 @cache
 def cached_layout(pattern: str, layers: int = 11) -> Layout:
-    """The standard scene's layout, built once."""
+    """The layout of the standard scene, built once."""
     return standard_layout(pattern, layers)
 
 
 def plain_frame(pattern: str, seed: int, layers: int = 11, size: Size = STANDARD_SIZE) -> PatternFrame:
-    """The standard scene, turned at random."""
+    """The standard scene with a random rotation."""
     frame = PatternFrame(standard_scene(cached_layout(pattern, layers), seed=seed), size)
     turn = float(np.random.default_rng([seed, 79]).uniform(0, 360))
-    return frame.seen(rotation_deg=turn)
+    return frame.with_camera(rotation_deg=turn)

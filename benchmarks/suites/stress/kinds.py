@@ -1,4 +1,4 @@
-"""A kind of condition, and the single cases that a run is made of."""
+"""Kinds of conditions, and the single cases of a run."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ FrameChange = Callable[[PatternFrame, float], "PatternFrame | EmptyFrame"]
 
 @dataclass(frozen=True)
 class ConditionKind:
-    """One way to make reading harder, in graded steps.
+    """One kind of degradation, in graded steps.
 
     Attributes:
-        name: of the kind.
-        unit: of its steps.
-        steps: from mild to hard.
-        change: from the plain frame and a step to the condition's frame.
-        promised: False where a share of read markers can not be asked for (ambiguous, or no white cell).
+        name: the kind's name.
+        unit: the steps' unit.
+        steps: strengths from mild to hard.
+        change: plain frame and step -> the condition's frame.
+        promised: False where no share of markers is promised (ambiguous, or no white cell).
         repeats: seeds for each pattern in a full run.
-        group: set by ``group_kinds``.
+        group: the group's name, set by ``group_kinds``.
     """
 
     name: str
@@ -34,6 +34,7 @@ class ConditionKind:
 
 
 def group_kinds(group: str, *kinds: ConditionKind) -> tuple[ConditionKind, ...]:
+    """The kinds with the name of their group."""
     return tuple(replace(kind, group=group) for kind in kinds)
 
 
@@ -56,4 +57,5 @@ class StressCase:
 
 
 def make_frame(case: StressCase, kind: ConditionKind) -> PatternFrame | EmptyFrame:
+    """The frame of a case."""
     return kind.change(plain_frame(case.pattern, case.seed), case.step)

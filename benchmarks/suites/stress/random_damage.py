@@ -1,4 +1,4 @@
-"""Damage drawn at random, of any color and size, on surfaces formed and lit at random: what no table thinks of."""
+"""Random damage of any color and size, on randomly deformed surfaces under random light."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ DamageSampler = Callable[[PatternFrame, Rng], DamageFields]
 
 
 def sample_color(rng: Rng) -> RGB:
+    """A random color with levels of 0 to 230."""
     red, green, blue = rng.uniform(0, 230, 3).tolist()
     return red, green, blue
 
 
 def sample_long_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Bands across the whole pattern, each of its own width, some over the white cell."""
+    """Bands of random widths across the whole pattern, some over the white cell."""
     reach, bands = max(frame.layout.size_mm), []
     for turn in rng.uniform(0, 2 * np.pi, rng.integers(1, 7)):
         along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
@@ -38,7 +39,7 @@ def sample_long_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
 
 
 def sample_short_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Many thin ones of all lengths, which leave fragments of cells."""
+    """Many thin scratches of random lengths, which leave fragments of cells."""
     common, bands = sample_color(rng), []
     own_colors = rng.random() < 0.5
     for start in sample_places(frame, int(rng.integers(5, 40)), 0.5):
@@ -55,7 +56,7 @@ def _make_scratch(start: Any, end: Any, width_mm: float, rgb: RGB) -> Scratch:
 
 
 def sample_blobs(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Drops of one color or of many."""
+    """Blobs of one color or of random colors."""
     common, own_colors, largest = sample_color(rng), rng.random() < 0.5, rng.uniform(0.3, 1.6)
     return {
         "blobs": tuple(
@@ -70,7 +71,7 @@ def sample_blobs(frame: PatternFrame, rng: Rng) -> DamageFields:
 
 
 def sample_glare(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Anywhere on the pattern, small and sharp or wide and faint."""
+    """Reflections at random positions, small and sharp or wide and faint."""
     width, height = frame.size
     return {
         "glare": tuple(
@@ -83,12 +84,12 @@ def sample_glare(frame: PatternFrame, rng: Rng) -> DamageFields:
 
 
 def sample_missing_cells(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Cells here and there."""
+    """A random share of missing cells."""
     return {"missing_share": float(rng.uniform(0.05, 0.4))}
 
 
 def sample_missing_clusters(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Groups of neighbours."""
+    """Missing groups of neighbouring cells."""
     damage = missing_cell_clusters(frame, float(rng.uniform(0.05, 0.4))).scene.damage
     assert damage is not None
     return {"missing_cells": damage.missing_cells}
@@ -99,7 +100,7 @@ def sample_bleeding(frame: PatternFrame, rng: Rng) -> DamageFields:
 
 
 def sample_combined(frame: PatternFrame, rng: Rng) -> DamageFields:
-    """Two or three of the others."""
+    """Two or three other samplers together."""
     chosen = rng.choice(len(SINGLE_SAMPLERS), rng.integers(2, 4), replace=False)
     parts: DamageFields = {}
     for number in chosen:
@@ -120,10 +121,12 @@ SINGLE_SAMPLERS: tuple[DamageSampler, ...] = (
 
 
 def sample_deformed(frame: PatternFrame, rng: Rng) -> PatternFrame:
-    """None, one or two of press, twist and shear; tilted or not."""
+    """The frame with up to two of press, twist and shear, tilted or not."""
     if rng.random() < 0.35:
-        frame = frame.seen(tilt_deg=float(rng.uniform(5, 55)), tilt_axis_deg=float(rng.uniform(0, 180)))
-    return frame.formed(*_sample_deformations(rng))
+        frame = frame.with_camera(
+            tilt_deg=float(rng.uniform(5, 55)), tilt_axis_deg=float(rng.uniform(0, 180))
+        )
+    return frame.with_surface(*_sample_deformations(rng))
 
 
 def _sample_deformations(rng: Rng) -> Iterator[Deformation]:
@@ -145,15 +148,17 @@ def _sample_deformations(rng: Rng) -> Iterator[Deformation]:
 
 
 def sample_light(frame: PatternFrame, rng: Rng) -> PatternFrame:
-    """As it is, by colored LEDs, from aside, darker at the rim, or in another color."""
+    """The frame with unchanged light, colored LEDs, a gradient, or another color with vignetting."""
     choice = rng.integers(6)
     if choice == 0:
-        return frame.having(light=colored_leds(int(rng.integers(2, 4)), 0.7, float(rng.uniform(0.3, 0.7))))
+        return frame.with_parts(
+            light=colored_leds(int(rng.integers(2, 4)), 0.7, float(rng.uniform(0.3, 0.7)))
+        )
     if choice == 1:
-        return frame.having(light=Light(gradient=(float(rng.uniform(0.1, 0.6)), 0.0)))
+        return frame.with_parts(light=Light(gradient=(float(rng.uniform(0.1, 0.6)), 0.0)))
     if choice == 2:
         red, green, blue = rng.uniform(0.5, 1.0, 3).tolist()
-        return frame.having(light=Light(rgb=(red, green, blue), vignetting=float(rng.uniform(0, 0.6))))
+        return frame.with_parts(light=Light(rgb=(red, green, blue), vignetting=float(rng.uniform(0, 0.6))))
     return frame
 
 
@@ -165,7 +170,7 @@ def _make_change(draw: DamageSampler) -> FrameChange:
     return change
 
 
-# What may be hidden here is the white cell, too: no share is promised.
+# The white cell may be hidden, so no share is promised.
 RANDOM_KINDS = group_kinds(
     "drawn at random",
     *(

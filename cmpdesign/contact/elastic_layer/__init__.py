@@ -1,4 +1,4 @@
-"""The bonded elastic layer: surface displacement from surface traction, and nearly back.
+"""The bonded elastic layer: surface displacement from surface traction, and an approximate inverse.
 
-In: an ``Elastomer`` and a ``Grid``. Out: operators on tractions.
+In: an ``Elastomer`` and a grid's spacing and size. Out: operators on tractions.
 """

@@ -1,8 +1,9 @@
-"""The layer's answer to the load on one cell: real-space kernels on a grid, for a layer without end.
+"""Green's functions of the elastic layer: displacement kernels of a loaded cell, on a grid of an unbounded layer.
 
-A Fourier sum repeats the load with its period. The kernels fade within some thicknesses, so for a thin layer a period
-a little beyond the grid is enough. A thick layer's fade slowly; there, long waves are summed with ever larger
-periods and few of them, which costs next to nothing and leaves no trace of the repetition.
+A Fourier sum repeats the load with its period. The kernels decay within some thicknesses, so for a thin elastic layer a
+period slightly larger than the grid is sufficient. The kernels of a thick elastic layer decay slowly. For these the
+long waves are summed in further passes with ever larger periods and few waves each. This costs little, and the
+periodic images of the load vanish.
 """
 
 from __future__ import annotations
@@ -17,22 +18,23 @@ from cmpdesign.contact.elastic_layer.kernels import layer_compliances
 from cmpdesign.contact.elastomer import Elastomer
 
 Array = NDArray[np.float64]
-# Thicknesses within which the kernels fade to 2e-4 of their value at one thickness: they go with exp(-0.739 r / h), as
-# cosh kh = +- i kh, where D = 0 for nu = 1/2, has its first root at 0.739 i.
+# Thicknesses within which the kernels decay to 2e-4 of their value at one thickness. They decay as exp(-0.739 r / h):
+# cosh kh = +- i kh, the condition D = 0 for nu = 1/2, has its first root at 0.739 i.
 KERNEL_REACH_THICKNESSES = 12.0
-# Waves of a period that the next, four times larger one takes over: exp(-(k / kc)^4) with kc = CUT steps.
+# Long waves are left to the next period, four times larger: they are weighted by 1 - exp(-(k / kc)^4), with kc =
+# CUTOFF_WAVES wave number intervals; beyond NEGLIGIBLE_CUTOFFS * kc the next period's waves do not count.
 CUTOFF_WAVES, PERIOD_GROWTH, NEGLIGIBLE_CUTOFFS = 12, 4, 2.25
 
 
 @dataclass(frozen=True)
 class GreenKernels:
-    """Displacement in mm at offsets (row, column) >= 0 cells for 1 MPa on one cell; the rest by symmetry.
+    """Displacement in mm at offsets (row, column) >= 0 cells for 1 MPa on one cell. Other offsets follow by symmetry.
 
     Attributes:
-        elastomer: the layer.
-        zz, xx, yy, xy, xz, yz: (n, n) each; xz is u_x for t_z, odd in x. u_z for t_x is its negative.
-        step_mm: the grid's step.
-        reach: cells beyond which all of them are negligible.
+        elastomer: the elastic layer.
+        zz, xx, yy, xy, xz, yz: (n, n) float64 each; xz is u_x for t_z, odd in x. u_z for t_x is its negative.
+        step_mm: the grid's spacing.
+        reach: offset in cells beyond which all kernels are negligible.
     """
 
     elastomer: Elastomer
@@ -48,22 +50,28 @@ class GreenKernels:
 
 @lru_cache(maxsize=8)
 def green_kernels(elastomer: Elastomer, step_mm: float, cells: int) -> GreenKernels:
-    """The kernels for offsets up to ``cells`` - 1 in both directions."""
+    """The kernels for offsets up to ``cells`` - 1 in both directions.
+
+    Args:
+        elastomer: the elastic layer.
+        step_mm: the grid's spacing.
+        cells: cells along the longer side of the grid.
+    """
     reach = int(np.ceil(KERNEL_REACH_THICKNESSES * elastomer.thickness_mm / step_mm))
     offsets = np.asarray(step_mm * np.arange(cells), dtype=np.float64)
-    half = (cells + min(cells, reach)) // 2 + 1
-    period = (2 * half + 1) * step_mm
+    wave_count = (cells + min(cells, reach)) // 2 + 1
+    period = (2 * wave_count + 1) * step_mm
     total = np.zeros((4, cells, cells))
-    inherited = None
+    previous_cutoff = None
     while True:
-        last = period - cells * step_mm >= reach * step_mm
+        is_last = period - cells * step_mm >= reach * step_mm
         dk = 2 * np.pi / period
-        cut = None if last else CUTOFF_WAVES * dk
-        total += _sum_waves(elastomer, offsets, dk, half, inherited, cut) * step_mm**2
-        if cut is None:
+        cutoff = None if is_last else CUTOFF_WAVES * dk
+        total += _sum_waves(elastomer, offsets, dk, wave_count, previous_cutoff, cutoff) * step_mm**2
+        if cutoff is None:
             break
-        inherited, period = cut, PERIOD_GROWTH * period
-        half = int(np.ceil(NEGLIGIBLE_CUTOFFS * CUTOFF_WAVES * PERIOD_GROWTH))
+        previous_cutoff, period = cutoff, PERIOD_GROWTH * period
+        wave_count = int(np.ceil(NEGLIGIBLE_CUTOFFS * CUTOFF_WAVES * PERIOD_GROWTH))
     zz, xx, xy, xz = total
     for kernel in (zz, xx, xy, xz):
         kernel.setflags(write=False)
@@ -73,26 +81,31 @@ def green_kernels(elastomer: Elastomer, step_mm: float, cells: int) -> GreenKern
 
 
 def _sum_waves(
-    elastomer: Elastomer, offsets: Array, dk: float, half: int, inherited: float | None, cut: float | None
+    elastomer: Elastomer,
+    offsets: Array,
+    dk: float,
+    wave_count: int,
+    previous_cutoff: float | None,
+    cutoff: float | None,
 ) -> Array:
     """zz, xx, xy, xz (4, n, n) from the waves (i, j) dk with \\|i\\|, \\|j\\| <= half, between two cut-offs."""
-    k = dk * np.arange(half + 1)
+    k = dk * np.arange(wave_count + 1)
     kx, ky = np.meshgrid(k, k)
-    length = np.hypot(kx, ky)
-    c = layer_compliances(length, elastomer)
+    wave_number = np.hypot(kx, ky)
+    c = layer_compliances(wave_number, elastomer)
     weight = np.where(kx > 0, 2.0, 1.0) * np.where(ky > 0, 2.0, 1.0) * (dk / (2 * np.pi)) ** 2
-    if cut is not None:
-        weight = -weight * np.expm1(-((length / cut) ** 4))
-    if inherited is not None:
-        weight = weight * np.exp(-((length / inherited) ** 4))
-    shortest = np.pi / (offsets[1] - offsets[0])
-    unit = np.where(length > 0, length, 1.0)
-    nx, ny = kx / unit, ky / unit
-    # For nu < 1/2 xz does not fade towards the grid's shortest waves and would ring; Lanczos' factor calms it.
-    calm = np.sinc(kx / shortest) * np.sinc(ky / shortest)
+    if cutoff is not None:
+        weight = -weight * np.expm1(-((wave_number / cutoff) ** 4))
+    if previous_cutoff is not None:
+        weight = weight * np.exp(-((wave_number / previous_cutoff) ** 4))
+    nyquist = np.pi / (offsets[1] - offsets[0])
+    divisor = np.where(wave_number > 0, wave_number, 1.0)
+    nx, ny = kx / divisor, ky / divisor
+    # For nu < 1/2 xz does not decay towards the grid's shortest waves; Lanczos' factor suppresses the ringing.
+    lanczos = np.sinc(kx / nyquist) * np.sinc(ky / nyquist)
     cos, sin = np.cos(np.outer(offsets, k)), np.sin(np.outer(offsets, k))
     zz = cos @ (weight * c.zz) @ cos.T
-    xx = cos @ (weight * (nx**2 * c.ll + ny**2 * c.sh + (length == 0) * c.ll)) @ cos.T
+    xx = cos @ (weight * (nx**2 * c.ll + ny**2 * c.sh + (wave_number == 0) * c.ll)) @ cos.T
     xy = -sin @ (weight * nx * ny * (c.ll - c.sh)) @ sin.T
-    xz = -cos @ (weight * calm * nx * c.xz) @ sin.T
+    xz = -cos @ (weight * lanczos * nx * c.xz) @ sin.T
     return np.stack([zz, xx, xy, xz])

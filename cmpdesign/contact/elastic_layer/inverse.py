@@ -1,4 +1,4 @@
-"""What undoes the layer's answer, nearly: the preconditioner of ``quadratic``."""
+"""The approximate inverse of the elastic layer's response: the preconditioner of ``quadratic_program``."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ Single = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class InversePreconditioner:
-    """The layer's inverse without the coupling to z, as if the box repeated: a preconditioner, at a third of the cost.
+    """The elastic layer's inverse without the coupling to z, on a periodic box, at a third of the operator's cost.
 
     Attributes:
-        xx, yy, xy, zz: MPa/mm at the waves of a box of ``shape``.
-        stiffest: compliance in mm/MPa of the grid's shortest wave.
+        shape: rows and columns of the transform.
+        xx, yy, xy, zz: float32 MPa/mm at the waves of a box of ``shape``.
+        shortest_wave_compliance: mm/MPa at the grid's shortest wave.
     """
 
     shape: tuple[int, int]
@@ -28,40 +29,45 @@ class InversePreconditioner:
     yy: Single
     xy: Single
     zz: Single
-    stiffest: float
+    shortest_wave_compliance: float
 
     @classmethod
     def of(cls, green: GreenKernels, box: tuple[int, int]) -> Self:
-        """For a box of cells."""
+        """The preconditioner for a box of (rows, columns) cells."""
         from scipy.fft import next_fast_len
 
         rows, columns = (int(next_fast_len(n, real=True)) for n in box)
-        turn = 2 * np.pi / green.step_mm
-        kx, ky = np.meshgrid(turn * np.fft.rfftfreq(columns), turn * np.fft.fftfreq(rows))
+        sampling_rate = 2 * np.pi / green.step_mm
+        kx, ky = np.meshgrid(sampling_rate * np.fft.rfftfreq(columns), sampling_rate * np.fft.fftfreq(rows))
         k = np.hypot(kx, ky)
-        even = k == 0
-        # A thick layer gives way to even load without end; but the load ends at the box.
-        k[even] = 0.5 * turn / max(rows, columns)
+        uniform = k == 0
+        # Under uniform load the compliance of a thick elastic layer has no limit, but the load ends at the box.
+        k[uniform] = 0.5 * sampling_rate / max(rows, columns)
         c = layer_compliances(k, green.elastomer)
         x, y = kx / k, ky / k
-        # An incompressible layer hardly answers to even pressure: the longest waves count as no stiffer than this.
-        softest = k.flat[np.argmax(c.zz)]
-        zz = 1 / np.where(k < softest, np.maximum(c.zz, 0.4 * c.zz.max()), c.zz)
-        along, across = 1 / c.ll, 1 / c.sh
-        parts = (x**2 * along + y**2 * across, y**2 * along + x**2 * across, x * y * (along - across), zz)
-        parts[0][even] = parts[1][even] = along[even]
-        xx, yy, xy, inverse = (one.astype(np.float32) for one in parts)
-        shortest = layer_compliances(np.array(np.pi / green.step_mm), green.elastomer)
-        return cls((rows, columns), xx, yy, xy, inverse, float(shortest.ll))
+        # An incompressible layer hardly yields to uniform pressure: the longest waves are limited in stiffness.
+        softest_wave = k.flat[np.argmax(c.zz)]
+        zz = 1 / np.where(k < softest_wave, np.maximum(c.zz, 0.4 * c.zz.max()), c.zz)
+        longitudinal, shear = 1 / c.ll, 1 / c.sh
+        parts = (
+            x**2 * longitudinal + y**2 * shear,
+            y**2 * longitudinal + x**2 * shear,
+            x * y * (longitudinal - shear),
+            zz,
+        )
+        parts[0][uniform] = parts[1][uniform] = longitudinal[uniform]
+        xx, yy, xy, inverse = (part.astype(np.float32) for part in parts)
+        shortest_wave = layer_compliances(np.array(np.pi / green.step_mm), green.elastomer)
+        return cls((rows, columns), xx, yy, xy, inverse, float(shortest_wave.ll))
 
     def __call__(self, values: Single) -> Single:
-        """MPa from mm, (3, rows, columns) or (1, rows, columns)."""
+        """Tractions in MPa from displacements in mm, (3, rows, columns) or (1, rows, columns) float32."""
         from scipy.fft import irfft2, rfft2
 
         rows, columns = values.shape[1:]
-        given = rfft2(values, s=self.shape, workers=1)
-        found = given * self.zz
+        spectrum = rfft2(values, s=self.shape, workers=1)
+        inverse = spectrum * self.zz
         if len(values) == 3:
-            found[0] = self.xx * given[0] + self.xy * given[1]
-            found[1] = self.xy * given[0] + self.yy * given[1]
-        return np.asarray(irfft2(found, s=self.shape, workers=1, overwrite_x=True)[:, :rows, :columns])
+            inverse[0] = self.xx * spectrum[0] + self.xy * spectrum[1]
+            inverse[1] = self.xy * spectrum[0] + self.yy * spectrum[1]
+        return np.asarray(irfft2(inverse, s=self.shape, workers=1, overwrite_x=True)[:, :rows, :columns])

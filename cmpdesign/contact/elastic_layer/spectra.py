@@ -1,4 +1,4 @@
-"""The layer's answer wave by wave, compiled: one pass over memory instead of fifteen."""
+"""The elastic layer's response wave by wave, as one compiled pass over memory."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def update_load_spectra(
     xz: NDArray[Any],
     yz: NDArray[Any],
 ) -> None:
-    """Turn the spectra of tractions into those of displacements, in place.
+    """Replace the spectra of tractions by the spectra of displacements, in place.
 
     Args:
         loads: (3, rows, columns, 2), real and imaginary parts.
-        xx, yy, zz, xy, xz, yz: the kernels' spectra (rows, columns); those of xz and yz are imaginary, without their i.
+        xx, yy, zz, xy, xz, yz: (rows, columns) spectra of the kernels, see ``operator.KernelSpectra``.
     """
     for row in range(loads.shape[1]):
         for at in range(loads.shape[2]):

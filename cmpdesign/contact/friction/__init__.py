@@ -1,4 +1,4 @@
 """Contact with Coulomb friction as a quadratic program, one increment after the other.
 
-In: a layer, an object, its motion. Out: tractions and displacements.
+In: an elastic layer, an object, its motion. Out: tractions and displacements.
 """

@@ -1,16 +1,17 @@
 """One increment of a contact with Coulomb friction.
 
-Normal and tangential tractions act on each other (C_xz), so every increment is solved for all three at once. Within one
-increment a cell in contact sticks to the place of the object that it touched before, or slips against its friction. A
-cell that comes into contact sticks where it is.
+Normal and tangential tractions are coupled (C_xz), so every increment is solved for all three components at once.
+Within one increment a cell in contact sticks to its previous point of the object, or slips against friction. A cell
+that comes into contact sticks at its current position.
 
-The theory is linear: the object's height over a point of the surface is read at the point's place before the press.
-Only how far it has slid over the object since is followed, so that a sliding contact moves on.
+The theory is linear: the object's height over a point of the surface is evaluated at the point's position before the
+press. Only the distance that the point has slid over the object is added, so that a sliding contact advances.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,25 +27,52 @@ from cmpdesign.contact.objects.indenters import Indenter
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-CellBox = tuple[slice, slice]
-# The gap that may be left, over the press: a tenth of a micrometre at 1 mm.
+# The tolerated gap over the press: a tenth of a micrometre at 1 mm.
 GAP_TOLERANCE = 1e-4
-# With friction, whose limits have to be found as well, three tenths; more where that is but a start, or where the
-# height is looked up again after.
+# With friction: three tenths of a micrometre, because the limits are unknown too.
 GAP_TOLERANCE_FRICTION = 3e-4
+# Before the object's height is evaluated again, and of the pressure that initialises a solution with friction.
 GAP_TOLERANCE_PREDICTOR, GAP_TOLERANCE_START = 3e-3, 1e-2
-# The change of friction's limits, as a share of them, over the tolerance.
+# The tolerated relative change of the friction limits, over the gap's tolerance.
 LIMIT_CHANGE_TOLERANCE = 1.7
-# Cells around what is near enough to touch.
+# Cells around the cells that may come into contact.
 BOX_MARGIN_CELLS = 3
+
+
+class CellBox(NamedTuple):
+    """A box of the grid's cells, as an index of (ny, nx) arrays."""
+
+    rows: slice
+    columns: slice
+
+
+class BoxSolution(NamedTuple):
+    """Tractions of one solution in a box of cells.
+
+    Attributes:
+        traction_mpa: (3, ny, nx) float64, 0 outside the box.
+        limit_mpa: the friction limit in the box, (rows, columns); without friction (1, rows, columns) zeros.
+        operator_applications: how often the elastic layer's response was computed.
+        residual_gap_mm: RMS of the remaining gap.
+    """
+
+    traction_mpa: Array
+    limit_mpa: Array
+    operator_applications: int
+    residual_gap_mm: float
 
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """The surface (3, ny, nx) after some motion.
+    """The surface after some motion.
 
-    ``press_displacement_mm`` (2, ny, nx) is what pressing moved sideways, ``limit_mpa`` (ny, nx) how much friction
-    there is.
+    Attributes:
+        motion: the object's motion from its first touch.
+        traction_mpa, displacement_mm: (3, ny, nx) float64.
+        press_displacement_mm: (2, ny, nx) lateral displacement by the press alone.
+        limit_mpa: (ny, nx) the friction limit.
+        iterations: how often the elastic layer's response was computed.
+        residual_mm: RMS of the remaining gap.
     """
 
     motion: Motion
@@ -63,7 +91,15 @@ class ContactState:
 
 @dataclass(frozen=True, eq=False)
 class ContactProblem:
-    """What stays the same in all increments; the elastomer is one of 1 MPa."""
+    """The constants of all increments.
+
+    Attributes:
+        elastomer: the elastic layer, with a Young's modulus of 1 MPa.
+        indenter: the object.
+        friction: Coulomb's coefficient.
+        grid: the cells.
+        operators: the response operators by the shape of their box.
+    """
 
     elastomer: Elastomer
     indenter: Indenter
@@ -72,56 +108,60 @@ class ContactProblem:
     operators: dict[tuple[int, int], ComplianceOperator] = field(default_factory=dict, repr=False)
 
     def height_mm(self, xy_mm: Array) -> Array:
-        """Height of the object, as it first stood, over points (2, ny, nx)."""
+        """(ny, nx) height of the object in its initial pose over points (2, ny, nx)."""
         return self.indenter.height_mm(*xy_mm)
 
     def operator(self, box: CellBox) -> ComplianceOperator:
-        """The layer's answer on a box of cells; made once for each size of box."""
-        rows, columns = box
-        shape = (rows.stop - rows.start, columns.stop - columns.start)
+        """The elastic layer's response on a box of cells; made once for each shape of box."""
+        shape = (box.rows.stop - box.rows.start, box.columns.stop - box.columns.start)
         if shape not in self.operators:
             kernels = green_kernels(self.elastomer, self.grid.step_mm, max(self.grid.shape))
             self.operators[shape] = ComplianceOperator(kernels, shape)
         return self.operators[shape]
 
     def surface_displacement_mm(self, traction_mpa: Array) -> Array:
-        """Displacement (3, ny, nx) of all cells, in single precision: what errs is a millionth of the solver's gap."""
+        """Displacement (3, ny, nx) of all cells, in single precision: its error is a millionth of the solver's gap."""
         rows, columns = self.grid.shape
-        whole = self.operator((slice(0, rows), slice(0, columns)))
+        whole = self.operator(CellBox(slice(0, rows), slice(0, columns)))
         return whole(traction_mpa.astype(np.float32)).astype(np.float64)
 
 
 def state_without_contact(motion: Motion, shape: tuple[int, int]) -> ContactState:
-    """The flat surface."""
-    nothing = np.zeros((3, *shape))
-    return ContactState(motion, nothing, nothing, nothing[:2], nothing[0])
+    """The state of the flat surface; ``shape`` is the grid's (ny, nx)."""
+    zeros = np.zeros((3, *shape))
+    return ContactState(motion, zeros, zeros, zeros[:2], zeros[0])
 
 
 def solve_increment(problem: ContactProblem, state: ContactState, motion: Motion) -> ContactState:
-    """The state after one more increment. Starts with the cells that may touch, takes in what else would."""
+    """The state after one more increment.
+
+    The box starts with the cells that may come into contact. It grows while other cells would penetrate the object.
+    """
     if motion.press_mm == 0:
         return state_without_contact(motion, problem.grid.shape)
     height = problem.height_mm(_points_in_object_frame(problem, state, motion))
-    near = height < 1.15 * motion.press_mm
-    if not near.any():
+    candidates = height < 1.15 * motion.press_mm
+    if not candidates.any():
         return state_without_contact(motion, problem.grid.shape)
-    near |= state.in_contact
-    start = state.traction_mpa
+    candidates |= state.in_contact
+    start_mpa = state.traction_mpa
     while True:
-        box = _box_around(near, problem.grid.shape)
-        found, height = _solve_in_box(problem, state, motion, box, start)
-        through = found.displacement_mm[2] > height - motion.press_mm + 10 * GAP_TOLERANCE * motion.press_mm
-        through[box] = False
-        if not through.any():
-            return found
-        near |= through
-        start, state = found.traction_mpa, replace(state, iterations=found.iterations)
+        box = _box_around(candidates, problem.grid.shape)
+        solved, height = _solve_in_box(problem, state, motion, box, start_mpa)
+        penetrating = (
+            solved.displacement_mm[2] > height - motion.press_mm + 10 * GAP_TOLERANCE * motion.press_mm
+        )
+        penetrating[box] = False
+        if not penetrating.any():
+            return solved
+        candidates |= penetrating
+        start_mpa, state = solved.traction_mpa, replace(state, iterations=solved.iterations)
 
 
 def _box_around(cells: Mask, shape: tuple[int, int]) -> CellBox:
-    """The bounding box of some cells, with a margin in which a contact can grow."""
+    """The bounding box of some cells, with a margin for the growth of the contact."""
     rows, columns = np.flatnonzero(cells.any(axis=1)), np.flatnonzero(cells.any(axis=0))
-    return (
+    return CellBox(
         slice(max(int(rows[0]) - BOX_MARGIN_CELLS, 0), min(int(rows[-1]) + 1 + BOX_MARGIN_CELLS, shape[0])),
         slice(
             max(int(columns[0]) - BOX_MARGIN_CELLS, 0), min(int(columns[-1]) + 1 + BOX_MARGIN_CELLS, shape[1])
@@ -130,103 +170,124 @@ def _box_around(cells: Mask, shape: tuple[int, int]) -> CellBox:
 
 
 def _points_in_object_frame(problem: ContactProblem, state: ContactState, motion: Motion) -> Array:
-    """Where in the object's first frame every point is if it rides along (2, ny, nx)."""
+    """(2, ny, nx) positions of all points in the object's initial frame if they move with the object."""
     if problem.friction == 0:
         return motion.brought_back(problem.grid.xy_mm, problem.indenter.centre_mm)
-    moved = problem.grid.xy_mm + state.displacement_mm[:2] - state.press_displacement_mm
-    return state.motion.brought_back(moved, problem.indenter.centre_mm)
+    position = problem.grid.xy_mm + state.displacement_mm[:2] - state.press_displacement_mm
+    return state.motion.brought_back(position, problem.indenter.centre_mm)
 
 
 def _solve_in_box(
     problem: ContactProblem, state: ContactState, motion: Motion, box: CellBox, start_mpa: Array
 ) -> tuple[ContactState, Array]:
-    """The state with tractions in a box of cells, and the object's height over all cells."""
+    """The state with tractions in a box of cells, and the object's height (ny, nx) over all cells."""
     grid, centre = problem.grid, problem.indenter.centre_mm
     height = problem.height_mm(_points_in_object_frame(problem, state, motion))
-    traction, applied, left = _solve_pressure(problem, start_mpa, height, motion, box)
+    solution = _solve_pressure(problem, start_mpa, height, motion, box)
+    applications = solution.operator_applications
     limit = np.zeros(grid.shape)
-    pressing = motion.part(0, 1) == state.motion.part(0, 1)
+    is_press = motion.part(0, 1) == state.motion.part(0, 1)
     if problem.friction > 0:
-        wanted = _sticking_displacement(grid, state, motion, centre)
-        # Where the object slides its height over a point changes; it is looked up again with what has slid so far.
-        if not pressing:
-            traction, _, more, _ = _solve_friction(
-                problem, traction, height, wanted, motion, box, GAP_TOLERANCE_PREDICTOR
+        sticking = _sticking_displacement(grid, state, motion, centre)
+        # The height over a point changes where the object slides. It is evaluated again with the predicted slip.
+        if not is_press:
+            solution = _solve_friction(
+                problem, solution.traction_mpa, height, sticking, motion, box, GAP_TOLERANCE_PREDICTOR
             )
-            applied += more
-            moved = grid.xy_mm + problem.surface_displacement_mm(traction)[:2] - state.press_displacement_mm
+            applications += solution.operator_applications
+            predicted = problem.surface_displacement_mm(solution.traction_mpa)
+            moved = grid.xy_mm + predicted[:2] - state.press_displacement_mm
             height = problem.height_mm(motion.brought_back(moved, centre))
-            traction, more, _ = _solve_pressure(problem, traction, height, motion, box)
-            applied += more
-        traction, limit[box], more, left = _solve_friction(
-            problem, traction, height, wanted, motion, box, GAP_TOLERANCE_FRICTION
+            solution = _solve_pressure(problem, solution.traction_mpa, height, motion, box)
+            applications += solution.operator_applications
+        solution = _solve_friction(
+            problem, solution.traction_mpa, height, sticking, motion, box, GAP_TOLERANCE_FRICTION
         )
-        applied += more
-    displacement = problem.surface_displacement_mm(traction)
-    settled = (
-        state.press_displacement_mm + (displacement - state.displacement_mm)[:2]
-        if pressing
-        else state.press_displacement_mm
+        limit[box] = solution.limit_mpa
+        applications += solution.operator_applications
+    displacement = problem.surface_displacement_mm(solution.traction_mpa)
+    by_press = state.press_displacement_mm
+    if is_press:
+        by_press = by_press + (displacement - state.displacement_mm)[:2]
+    solved = ContactState(
+        motion,
+        solution.traction_mpa,
+        displacement,
+        by_press,
+        limit,
+        state.iterations + applications,
+        solution.residual_gap_mm,
     )
-    found = ContactState(motion, traction, displacement, settled, limit, state.iterations + applied, left)
-    return found, height
+    return solved, height
 
 
 def _sticking_displacement(
     grid: ContactGrid, state: ContactState, motion: Motion, centre_mm: tuple[float, float]
 ) -> Array:
-    """Displacement (2, ny, nx) of points that do not slip: on with the object, or where they were before it came."""
-    place = grid.xy_mm + state.displacement_mm[:2]
-    carried = motion.carried(state.motion.brought_back(place, centre_mm), centre_mm)
-    return np.where(state.in_contact, carried, place) - grid.xy_mm
+    """Displacement (2, ny, nx) of points that do not slip: with the object, or unchanged before contact."""
+    position = grid.xy_mm + state.displacement_mm[:2]
+    carried = motion.carried(state.motion.brought_back(position, centre_mm), centre_mm)
+    return np.where(state.in_contact, carried, position) - grid.xy_mm
 
 
 def _solve_pressure(
     problem: ContactProblem, traction: Array, height: Array, motion: Motion, box: CellBox
-) -> tuple[Array, int, float]:
-    """Tractions whose pressure leaves no gap, friction held as it is; with friction, this is but a start."""
+) -> BoxSolution:
+    """Tractions whose pressure leaves no gap, at constant shear. With friction the result is only initial."""
     operator, inside = problem.operator(box), (..., *box)
-    held = traction[inside].copy()
-    start, held[2] = held[2].copy(), 0.0
-    offset = operator(held.astype(np.float32))[2] if held.any() else 0.0
-    touchable = np.isfinite(height[box])
-    target = np.where(touchable, height[box], 0.0) - motion.press_mm - offset
+    shear = traction[inside].copy()
+    start, shear[2] = shear[2].copy(), 0.0
+    offset = operator(shear.astype(np.float32))[2] if shear.any() else 0.0
+    contact_candidates = np.isfinite(height[box])
+    target = np.where(contact_candidates, height[box], 0.0) - motion.press_mm - offset
     z = minimise(
         operator,
         target[None],
-        PressureTractions(touchable[None]),
+        PressureTractions(contact_candidates[None]),
         start[None],
         tolerance_mm=(GAP_TOLERANCE_START if problem.friction > 0 else GAP_TOLERANCE) * motion.press_mm,
-        checked=problem.friction == 0,
+        verify=problem.friction == 0,
     )
-    found = np.zeros_like(traction)
-    found[inside] = held
-    found[(2, *box)] = z.traction_mpa[0]
-    return found, z.operator_applications, z.residual_gap_mm
+    solved = np.zeros_like(traction)
+    solved[inside] = shear
+    solved[(2, *box)] = z.traction_mpa[0]
+    return BoxSolution(solved, z.admissible.limit_mpa, z.operator_applications, z.residual_gap_mm)
 
 
 def _solve_friction(
     problem: ContactProblem,
     traction: Array,
     height: Array,
-    wanted: Array,
+    sticking: Array,
     motion: Motion,
     box: CellBox,
     tolerance: float,
-) -> tuple[Array, Array, int, float]:
-    """Tractions with friction up to the friction coefficient times the pressure, and that limit in the box."""
+) -> BoxSolution:
+    """Tractions with shear up to the friction coefficient times the pressure.
+
+    Args:
+        problem: the constants.
+        traction: (3, ny, nx) MPa, the initial tractions.
+        height: (ny, nx) mm of the object over the surface.
+        sticking: (2, ny, nx) mm displacement without slip.
+        motion: the object's motion after this increment.
+        box: the cells to solve.
+        tolerance: of the gap, over the press.
+    """
     operator, inside = problem.operator(box), (..., *box)
-    touchable = np.isfinite(height[box])
-    target = np.concatenate([wanted[inside], (np.where(touchable, height[box], 0.0) - motion.press_mm)[None]])
+    contact_candidates = np.isfinite(height[box])
+    target = np.concatenate(
+        [sticking[inside], (np.where(contact_candidates, height[box], 0.0) - motion.press_mm)[None]]
+    )
     t = minimise(
         operator,
         target,
-        CoulombTractions.at(touchable, problem.friction, traction[(2, *box)]),
+        CoulombTractions.at(contact_candidates, problem.friction, traction[(2, *box)]),
         traction[inside],
         tolerance_mm=tolerance * motion.press_mm,
-        steady=LIMIT_CHANGE_TOLERANCE * tolerance,
-        checked=tolerance <= GAP_TOLERANCE_FRICTION,
+        limit_tolerance=LIMIT_CHANGE_TOLERANCE * tolerance,
+        verify=tolerance <= GAP_TOLERANCE_FRICTION,
     )
-    found = np.zeros_like(traction)
-    found[inside] = t.traction_mpa
-    return found, t.allowed.limit_mpa, t.operator_applications, t.residual_gap_mm
+    solved = np.zeros_like(traction)
+    solved[inside] = t.traction_mpa
+    return BoxSolution(solved, t.admissible.limit_mpa, t.operator_applications, t.residual_gap_mm)

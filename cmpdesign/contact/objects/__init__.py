@@ -1,4 +1,4 @@
-"""Rigid objects that touch the layer, from formulas, pictures or arrays.
+"""Rigid objects that touch the elastic layer, from formulas, pictures or arrays.
 
-In: dimensions in mm. Out: heights of their underside.
+In: dimensions in mm. Out: heights of the objects' underside.
 """

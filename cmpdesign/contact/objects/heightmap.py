@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class HeightMap(Indenter):
-    """A stamp: how far its face sticks out towards the layer, on square pixels.
+    """A stamp: the height of its face towards the elastic layer, on square pixels.
 
     Attributes:
-        heights_mm: (rows, columns), seen from the front as it lies on the pattern, first row at the largest y. The
-            largest height touches first. NaN: there is nothing.
-        pixel_mm: the side of a pixel. Between pixel centres, heights are interpolated linearly.
+        heights_mm: (rows, columns) float64, seen from the front as the stamp lies on the pattern, first row at the
+            largest y. The largest height touches first. NaN: no material.
+        pixel_mm: the side of a pixel. Heights are interpolated linearly between pixel centres.
     """
 
     heights_mm: Array = field(repr=False)
@@ -43,10 +43,10 @@ class HeightMap(Indenter):
     def read(
         cls, path: str | Path, pixel_mm: float, depth_mm: float | None = None, **placed: Any
     ) -> HeightMap:
-        """A grayscale PNG (8 or 16 bits: white sticks out by ``depth_mm`` over black) or an NPY file in mm.
+        """Read a grayscale PNG (8 or 16 bits: white is ``depth_mm`` higher than black) or an NPY file in mm.
 
         Raises:
-            ContactError: the file is neither, or ``depth_mm`` is missing for a picture or given for an NPY file.
+            ContactError: the file is neither, or ``depth_mm`` is missing for a PNG or given for an NPY file.
         """
         path = Path(path)
         if path.suffix.lower() == ".npy":
@@ -63,13 +63,15 @@ class HeightMap(Indenter):
         rows, columns = self.heights_mm.shape
         row = (rows - 1) / 2 - np.asarray(y_mm) / self.pixel_mm
         column = (columns - 1) / 2 + np.asarray(x_mm) / self.pixel_mm
-        below = np.nanmax(self.heights_mm) - self.heights_mm
-        there = np.isfinite(below)
-        # Half a pixel around the outermost centres belongs to them.
+        depth = np.nanmax(self.heights_mm) - self.heights_mm
+        has_material = np.isfinite(depth)
+        # The outermost pixels extend half a pixel beyond their centres.
         inside = (row >= -0.5) & (row <= rows - 0.5) & (column >= -0.5) & (column <= columns - 0.5)
-        places = np.stack([row, column])
-        height = map_coordinates(np.where(there, below, 0.0), places, order=1, mode="nearest")
-        inside &= map_coordinates(there.astype(np.float64), places, order=1, mode="nearest") > 1 - 1e-9
+        positions = np.stack([row, column])
+        height = map_coordinates(np.where(has_material, depth, 0.0), positions, order=1, mode="nearest")
+        inside &= (
+            map_coordinates(has_material.astype(np.float64), positions, order=1, mode="nearest") > 1 - 1e-9
+        )
         return np.where(inside, height, np.inf)
 
     @property
@@ -88,7 +90,7 @@ def _read_npy(path: Path) -> Array:
 
 
 def _read_gray(path: Path) -> Array:
-    """Brightness from 0 to 1."""
+    """(rows, columns) float64 brightness from 0 to 1."""
     import cv2
 
     try:

@@ -1,4 +1,4 @@
-"""Rigid objects that touch the layer: the height of their underside above its lowest point."""
+"""Rigid objects that touch the elastic layer, by the height of their underside above its lowest point."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Indenter(ABC):
-    """Where an object stands: its centre in the layout frame and its counter-clockwise turn, seen from the front."""
+    """A rigid object.
+
+    Attributes:
+        centre_mm: x and y of the centre in the layout frame.
+        turn_deg: rotation about the centre, counter-clockwise from the front.
+        positive: names of the fields that must be above 0.
+    """
 
     centre_mm: tuple[float, float] = (0.0, 0.0)
     turn_deg: float = 0.0
@@ -35,37 +41,41 @@ class Indenter(ABC):
             require(getattr(self, name) > 0, name, f"{getattr(self, name):g}", "above 0")
 
     def height_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        """Height of the underside above its lowest point at places of the layout frame; inf beside the object."""
+        """Height of the underside above its lowest point at points of the layout frame; inf outside the object."""
         c, s = np.cos(np.radians(self.turn_deg)), np.sin(np.radians(self.turn_deg))
         x, y = np.asarray(x_mm) - self.centre_mm[0], np.asarray(y_mm) - self.centre_mm[1]
         return self.profile_mm(c * x + s * y, c * y - s * x)
 
     @abstractmethod
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        """The same in the object's own frame."""
+        """Height of the underside above its lowest point at points of the object's frame; inf outside the object."""
 
     @property
     @abstractmethod
     def smallest_radius_mm(self) -> float:
-        """The sharpest curve of the underside, which the grid has to resolve; 0 for sharp edges."""
+        """The smallest radius of curvature of the underside, which the grid must resolve; 0 for sharp edges."""
 
 
 def spherical_profile(distance_mm: Array, radius_mm: float) -> Array:
-    """Height of a circle of this radius at a distance from its lowest point; inf beyond."""
+    """Height of a circle of this radius at a distance from its lowest point; inf beyond the radius."""
     inside = np.abs(distance_mm) <= radius_mm
     # r - sqrt(r^2 - d^2) without cancellation.
-    square = np.where(inside, distance_mm, 0.0) ** 2
-    height = square / (radius_mm + np.sqrt(radius_mm**2 - square)) if radius_mm > 0 else square
+    distance_squared = np.where(inside, distance_mm, 0.0) ** 2
+    height = (
+        distance_squared / (radius_mm + np.sqrt(radius_mm**2 - distance_squared))
+        if radius_mm > 0
+        else distance_squared
+    )
     return np.where(inside, height, np.inf)
 
 
 def rounded_rectangle_profile(
     x_mm: Array, y_mm: Array, size_mm: tuple[float, float], edge_radius_mm: float
 ) -> Array:
-    """Height of a flat rectangle with its edges rounded; inf beside it."""
-    past_x = np.maximum(np.abs(x_mm) - (size_mm[0] / 2 - edge_radius_mm), 0.0)
-    past_y = np.maximum(np.abs(y_mm) - (size_mm[1] / 2 - edge_radius_mm), 0.0)
-    return spherical_profile(np.hypot(past_x, past_y), edge_radius_mm)
+    """Height of a flat rectangle (width, height) with rounded edges; inf outside."""
+    beyond_x = np.maximum(np.abs(x_mm) - (size_mm[0] / 2 - edge_radius_mm), 0.0)
+    beyond_y = np.maximum(np.abs(y_mm) - (size_mm[1] / 2 - edge_radius_mm), 0.0)
+    return spherical_profile(np.hypot(beyond_x, beyond_y), edge_radius_mm)
 
 
 def _require_edge_radius(edge_mm: float, largest_mm: float, name: str = "edge_radius_mm") -> None:
@@ -89,7 +99,7 @@ class Ball(Indenter):
 
 @dataclass(frozen=True)
 class Cylinder(Indenter):
-    """A cylinder that lies on its side, with its axis at ``axis_deg`` from x; its ends are flat and sharp."""
+    """A cylinder on its side, with its axis at ``axis_deg`` from x and flat, sharp ends."""
 
     radius_mm: float
     length_mm: float
@@ -110,7 +120,7 @@ class Cylinder(Indenter):
 
 @dataclass(frozen=True)
 class Punch(Indenter):
-    """A cylinder that stands upright: a flat disc with its edge rounded by ``edge_radius_mm``."""
+    """An upright cylinder: a flat disc with its edge rounded by ``edge_radius_mm``."""
 
     radius_mm: float
     edge_radius_mm: float = 0.0
@@ -121,8 +131,8 @@ class Punch(Indenter):
         _require_edge_radius(self.edge_radius_mm, self.radius_mm)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        past = np.maximum(np.hypot(x_mm, y_mm) - (self.radius_mm - self.edge_radius_mm), 0.0)
-        return spherical_profile(past, self.edge_radius_mm)
+        beyond = np.maximum(np.hypot(x_mm, y_mm) - (self.radius_mm - self.edge_radius_mm), 0.0)
+        return spherical_profile(beyond, self.edge_radius_mm)
 
     @property
     def smallest_radius_mm(self) -> float:
@@ -131,7 +141,7 @@ class Punch(Indenter):
 
 @dataclass(frozen=True)
 class Ring(Indenter):
-    """A ring that lies flat: a tube of radius ``tube_mm`` bent to a circle of radius ``radius_mm``."""
+    """A flat ring: a tube of radius ``tube_mm`` along a circle of radius ``radius_mm``."""
 
     radius_mm: float
     tube_mm: float
@@ -187,7 +197,7 @@ class Wedge(Indenter):
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
         half = np.radians(self.angle_deg / 2)
         slope, distance = 1 / np.tan(half), np.abs(y_mm)
-        tangent = self.tip_radius_mm * np.cos(half)  # where the round tip meets the faces
+        tangent = self.tip_radius_mm * np.cos(half)  # distance at which the round tip meets the faces
         face = self.tip_radius_mm * (1 - np.sin(half)) + slope * (distance - tangent)
         height = np.where(
             distance < tangent, spherical_profile(np.minimum(distance, tangent), self.tip_radius_mm), face

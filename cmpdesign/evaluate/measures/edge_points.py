@@ -8,26 +8,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
-CONTACT_DISPLACEMENT_SHARE = 0.5  # of the largest displacement: markers beyond it are in contact
+CONTACT_DISPLACEMENT_SHARE = (
+    0.5  # of the largest displacement; markers with a larger displacement are in contact
+)
 
 
 @dataclass(frozen=True, eq=False)
 class EdgePoints:
-    """The markers that moved by more than half of the largest displacement.
+    """The markers with a displacement of more than half of the largest displacement.
 
     Attributes:
-        xy_mm: (K, 2) where they are.
-        moved_mm: (K,) by how much they moved, along the direction of the load.
+        xy_mm: (K, 2) deformed positions.
+        displacement_mm: (K,) displacement along the direction of the load.
     """
 
     xy_mm: Points
-    moved_mm: Points
+    displacement_mm: Points
 
 
 def edge_points(xyz_mm: Points, displacement_mm: Points, direction: tuple[float, float, float]) -> EdgePoints:
-    """Of markers (M, 3), NaN where unknown, those of the contact; empty when none is known.
+    """The edge points among markers; empty when no displacement is known.
 
-    The displacement counts along a unit vector: (0, 0, -1) for a press, the way of the shear for a shear.
+    Args:
+        xyz_mm: (M, 3) deformed positions, NaN where unknown.
+        displacement_mm: (M, 3) displacements, NaN where unknown.
+        direction: unit vector along which displacements count: (0, 0, -1) for a press, the shear's direction for a
+            shear.
     """
     along = displacement_mm @ np.asarray(direction)
     known = np.isfinite(along)
@@ -38,10 +44,10 @@ def edge_points(xyz_mm: Points, displacement_mm: Points, direction: tuple[float,
 
 
 def circumscribed_square_mm(xy_mm: Points, turn_deg: float = 0.0) -> float | None:
-    """Side of the square around a point set (K, 2) that lies as the object does; None without points.
+    """Side in mm of the square around points (K, 2) mm, with the object's orientation; None without points.
 
-    The set's width and height along the object's axes differ, as the pattern's points are spaced; a square that
-    touches the set on opposite sides and holds it has the larger of both.
+    The points' width and height along the object's axes differ, because of the pattern's spacing. The circumscribed
+    square has the larger of both.
     """
     if not len(xy_mm):
         return None
@@ -50,10 +56,10 @@ def circumscribed_square_mm(xy_mm: Points, turn_deg: float = 0.0) -> float | Non
 
 
 def mean_extent_mm(xy_mm: Points) -> float | None:
-    """The mean of the set's width and height: the other way to make a square of them."""
+    """The mean of the points' width and height, a variant of the fitted square; None without points."""
     return float(np.ptp(xy_mm, axis=0).mean()) if len(xy_mm) else None
 
 
 def shear_response(points: EdgePoints, shear_mm: float) -> float | None:
     """Mean displacement of the edge points along the shear, in units of the shear; None without points."""
-    return float(points.moved_mm.mean()) / shear_mm if len(points.moved_mm) else None
+    return float(points.displacement_mm.mean()) / shear_mm if len(points.displacement_mm) else None

@@ -1,4 +1,4 @@
-"""A cube pressed and sheared at ten places: what the edge fitting error and the response are measured on (Fig. 11)."""
+"""A cube pressed and sheared at ten positions, for the edge fitting error and the response (Fig. 11)."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ LOAD_DIRECTIONS = {
     "press_shear": (0.0, 1.0, 0.0),
     "press_shear_x": (1.0, 0.0, 0.0),
 }
-# Ten places 4 mm apart in x or y at which the whole face lies on the pattern.
+# Ten positions 4 mm apart in x or y at which the whole face lies on the pattern.
 CUBE_POSITIONS_MM = (
     (-6.0, 0.0), (-2.0, 0.0), (2.0, 0.0), (6.0, 0.0),
     (-2.0, 4.0), (2.0, 4.0), (6.0, 4.0),
     (-6.0, -4.0), (-2.0, -4.0), (2.0, -4.0),
 )  # fmt: skip
-REACH_MM = 5.0  # more places than these ten are drawn from within this, in x and y
+REACH_MM = 5.0  # largest distance of further, random positions from the pattern's middle, in x and y
 COMPARED_METHODS = ("square", "multicolor")
 
 
 def cube_position_mm(index: int, seed: int) -> tuple[float, float]:
-    """The ten places, then random ones."""
+    """The centre of the cube: one of the ten positions, then random positions."""
     if index < len(CUBE_POSITIONS_MM):
         return CUBE_POSITIONS_MM[index]
     x, y = trial_rng(seed, "cube", index).uniform(-REACH_MM, REACH_MM, 2)
@@ -49,33 +49,40 @@ def cube_position_mm(index: int, seed: int) -> tuple[float, float]:
 
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
-    """What each pattern shows of the cube at one place."""
+    """The measures of each pattern for the cube at one position."""
     from cmpdesign.evaluate.simulated.conditions import mean_conditions
 
     text, mode = values["sensor"], values["mode"]
     centre_mm = cube_position_mm(values["index"], values["seed"])
-    pressed = place_surface(text, CUBE_LOADS[mode], centre_mm)
-    found: dict[str, Any] = {"centre_mm": list(centre_mm)}
+    surface = place_surface(text, CUBE_LOADS[mode], centre_mm)
+    result: dict[str, Any] = {"centre_mm": list(centre_mm)}
     for method in COMPARED_METHODS:
-        one = instrument_for_method(text, method, values["preset"])
+        instrument = instrument_for_method(text, method, values["preset"])
         seed = int(trial_rng(values["seed"], f"cube-{mode}", values["index"]).integers(2**31))
-        picture = one.picture(mean_conditions(one.sensor.table.conditions), seed, pressed)
-        shape = one.reconstructor.reconstruct(one.read(picture.image))
+        picture = instrument.picture(mean_conditions(instrument.sensor.table.conditions), seed, surface)
+        shape = instrument.reconstructor.reconstruct(instrument.read(picture.image))
         read = _measure_edge_points(shape.xyz_mm, shape.displacement_mm, mode)
         virtual = _measure_edge_points(
             np.concatenate([shape.xyz_mm, shape.virtual_xyz_mm.reshape(-1, 3)]),
             np.concatenate([shape.displacement_mm, shape.virtual_displacement_mm.reshape(-1, 3)]),
             mode,
         )
-        found[method] = {"read": read, "with_virtual": virtual, "perfect": _measure_truth(one, pressed, mode)}
-    return found
+        result[method] = {
+            "read": read,
+            "with_virtual": virtual,
+            "perfect": _measure_truth(instrument, surface, mode),
+        }
+    return result
 
 
-def _measure_truth(one: Instrument, pressed: Any, mode: str) -> dict[str, Any]:
-    """The same measures of the markers' true places: what the pattern alone, read without error, can show."""
-    present = one.layout.present
-    xyz, moved = pressed(one.layout.marker_xy_mm), pressed.displacement_mm(one.layout.marker_xy_mm)
-    return _measure_edge_points(xyz[present], moved[present], mode)
+def _measure_truth(instrument: Instrument, surface: Any, mode: str) -> dict[str, Any]:
+    """The same measures of the markers' true positions: the result of a reading without error."""
+    present = instrument.layout.present
+    xyz, displacement_mm = (
+        surface(instrument.layout.marker_xy_mm),
+        surface.displacement_mm(instrument.layout.marker_xy_mm),
+    )
+    return _measure_edge_points(xyz[present], displacement_mm[present], mode)
 
 
 def _measure_edge_points(xyz_mm: Points, displacement_mm: Points, mode: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A report as one HTML page that needs nothing else: text, tables, plots drawn as SVG."""
+"""A report as one self-contained HTML page: text, tables, plots as SVG."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ caption, figcaption { color: #5a646c; text-align: left; font-size: .9rem; }
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells under headings; a cell is written as it is told."""
+    """Rows of cells under headings; cells are escaped texts."""
 
     caption: str
     headings: Sequence[str]
@@ -29,7 +29,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Plot:
-    """A drawing in SVG, and what it shows."""
+    """A drawing as SVG, with its caption."""
 
     caption: str
     svg: str
@@ -37,7 +37,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it: paragraphs, a list, tables, plots."""
+    """A heading and its content: paragraphs, a list, tables, plots."""
 
     title: str
     paragraphs: Sequence[str] = ()

@@ -27,7 +27,7 @@ STYLE |= {"axes.spines.right": False, "font.family": "sans-serif", "legend.frame
 
 @contextmanager
 def _open_figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[], str]]]:
-    """A figure's axes, and the function that draws it."""
+    """A figure's axes, and the function that returns it as SVG."""
     try:
         import matplotlib
     except ModuleNotFoundError as error:
@@ -42,7 +42,7 @@ def _open_figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[]
 
 
 def _figure_svg(figure: Any) -> str:
-    """The figure without what comes before the element: it stands in a page."""
+    """The figure as an SVG element, without the XML header, for a page."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
@@ -50,19 +50,19 @@ def _figure_svg(figure: Any) -> str:
 
 
 def plot_success_rates(groups: Mapping[str, Mapping[str, Mapping[str, Any]]], methods: Sequence[str]) -> str:
-    """Success rates with their 95 % intervals, one group of bars a mode, the article's as rings."""
+    """Success rates with their 95 % intervals, one group of bars per mode, the article's rates as rings."""
     with _open_figure(8.0, 3.2) as (axes, draw):
         width = 0.8 / len(methods)
         for i, method in enumerate(methods):
             for g, mode in enumerate(groups.values()):
-                x, one = g + (i - (len(methods) - 1) / 2) * width, mode[method]
-                share = 100 * one["share"]
-                low, high = (100 * limit for limit in one["interval_95"])
+                x, result = g + (i - (len(methods) - 1) / 2) * width, mode[method]
+                share = 100 * result["share"]
+                low, high = (100 * limit for limit in result["interval_95"])
                 label = method.replace("_", " ") if g == 0 else None
                 axes.bar(x, share, 0.9 * width, color=COLORS[method], label=label)
                 axes.plot([x, x], [low, high], color="#1c2126", lw=1)
-                if "article" in one:
-                    axes.plot(x, 100 * one["article"]["share"], "o", mfc="none", mec="#b2182b", ms=6)
+                if "article" in result:
+                    axes.plot(x, 100 * result["article"]["share"], "o", mfc="none", mec="#b2182b", ms=6)
         axes.plot([], [], "o", mfc="none", mec="#b2182b", ms=6, ls="", label="the article, 10 trials")
         axes.set_xticks(range(len(groups)), [mode.replace("_", " ") for mode in groups])
         axes.set_ylabel("successful, %")
@@ -91,7 +91,7 @@ def plot_values(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str) 
 
 
 def plot_bars(groups: Mapping[str, Mapping[str, float | None]], unit: str) -> str:
-    """One bar a method in every group."""
+    """One bar per method in every group."""
     with _open_figure(7.0, 3.0) as (axes, draw):
         for g, methods in enumerate(groups.values()):
             width = 0.8 / len(methods)
@@ -106,7 +106,7 @@ def plot_bars(groups: Mapping[str, Mapping[str, float | None]], unit: str) -> st
 
 
 def plot_lost_angles(measured: Mapping[int, Mapping[int, float | None]], formula: Mapping[int, float]) -> str:
-    """The first angle lost over the cell's size, one line a shape, its formula's limit dashed."""
+    """The first angle lost over the cell's size, one line per shape, the formula's limit dashed."""
     shades = ("#2f6fb7", "#59636b", "#b2182b")
     with _open_figure(6.0, 3.0) as (axes, draw):
         for shade, (sides, found) in zip(shades, measured.items(), strict=True):

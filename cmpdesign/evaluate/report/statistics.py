@@ -1,4 +1,4 @@
-"""Shares with their intervals, and spreads."""
+"""Success shares with confidence intervals, and statistics of samples."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def wilson_interval(successful: int, trials: int, z: float = Z_95) -> tuple[floa
     middle = share + spread / 2
     half = z * sqrt(share * (1 - share) / trials + spread / (4 * trials))
     low, high = (middle - half) / (1 + spread), (middle + half) / (1 + spread)
-    # Both ends are exact at 0 and at all of them; rounding must not leave 1e-17 there.
+    # The ends 0 and 1 are exact; rounding must not leave 1e-17.
     return (0.0 if successful == 0 else low), (1.0 if successful == trials else high)
 
 
 @dataclass(frozen=True)
 class SampleStatistics:
-    """What a sample of finite values looks like; all NaN where it is empty."""
+    """Statistics of a sample of finite values; NaN for an empty sample."""
 
     count: int
     mean: float
@@ -74,15 +74,15 @@ class SampleStatistics:
 
 def sample_statistics(values: Sequence[float]) -> SampleStatistics:
     """Count, mean, standard deviation (n - 1), smallest, median and largest of the finite values."""
-    found = np.asarray([value for value in values if value is not None], dtype=np.float64)
-    found = found[np.isfinite(found)]
-    if not len(found):
+    finite = np.asarray([value for value in values if value is not None], dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if not len(finite):
         return SampleStatistics(0, *[float("nan")] * 5)
-    deviation = float(found.std(ddof=1)) if len(found) > 1 else 0.0
-    low, median, high = (float(np.quantile(found, share)) for share in (0, 0.5, 1))
-    return SampleStatistics(len(found), float(found.mean()), deviation, low, median, high)
+    deviation = float(finite.std(ddof=1)) if len(finite) > 1 else 0.0
+    low, median, high = (float(np.quantile(finite, share)) for share in (0, 0.5, 1))
+    return SampleStatistics(len(finite), float(finite.mean()), deviation, low, median, high)
 
 
 def round_for_json(value: float, digits: int = 6) -> float | None:
-    """A figure as JSON can hold it: rounded, None where there is none."""
+    """A rounded value for JSON; None if it is not finite."""
     return round(float(value), digits) if np.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Light, blur, noise and dirt of one picture, drawn from a sensor's ranges."""
+"""Light, blur, noise and dirt of one picture, sampled from a sensor's ranges."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from cmpdesign.evaluate.simulated.sensor import ConditionRanges
 from cmpdesign.scene import Blob, Damage, Led, Light
 
-# What a bubble or a grain of dirt looks like: a gray of any level between the inks.
+# Range of the gray level of a bubble or a grain of dirt, 0 to 255.
 SPECK_LEVEL = (40.0, 200.0)
 
 
@@ -26,7 +26,7 @@ class ImagingConditions:
 def sample_conditions(
     ranges: ConditionRanges, rng: np.random.Generator, half_window_mm: float
 ) -> ImagingConditions:
-    """Conditions drawn evenly from the ranges; specks lie anywhere within the half window around the middle."""
+    """Conditions sampled uniformly from the ranges; specks lie within the half window around the middle."""
     level = rng.uniform(*ranges.level)
     rgb = level * (1 + rng.uniform(-ranges.tint, ranges.tint, 3))
     gradient = rng.uniform(-ranges.gradient, ranges.gradient, 2)
@@ -45,7 +45,7 @@ def sample_conditions(
 
 
 def mean_conditions(ranges: ConditionRanges) -> ImagingConditions:
-    """The ranges' middle: even light, no lamps, no specks."""
+    """The middle of the ranges, with uniform light, no lamps and no specks."""
     level = float(np.mean(ranges.level))
     light = Light(rgb=(level, level, level), vignetting=float(np.mean(ranges.vignetting)))
     return ImagingConditions(light, float(np.mean(ranges.blur_px)), float(np.mean(ranges.noise)), None)

@@ -1,4 +1,4 @@
-"""The contacts of the experiments, solved once and then moved about: the layer is the same everywhere."""
+"""The contacts of the experiments, solved once and then shifted: the elastic layer is uniform."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from cmpdesign.contact import Contact, Indenter, Motion
 
 Points = NDArray[np.float64]
-REST = "rest"  # no object at all
+REST = "rest"  # no object
 
 
 @dataclass(frozen=True)
 class ContactLoad:
-    """An object and what it does.
+    """An object and its motion.
 
     Attributes:
-        object: a name that ``make_indenter`` knows, or ``REST``.
+        object: a name of ``make_indenter``, or ``REST``.
         press_mm, shear_mm, twist_deg: as ``contact.Motion``; a positive twist is counter-clockwise from the front.
     """
 
@@ -35,7 +35,7 @@ class ContactLoad:
 
 
 def make_indenter(name: str) -> Indenter:
-    """An object of the experiments. Sizes: the article where it gives one (cube 15 mm, ball 20 mm); else assumed."""
+    """An object of the experiments, of the article's size where stated (cube 15 mm, ball 20 mm), else assumed."""
     from cmpdesign.contact import Ball, Cube, Cylinder, Rib, Ring, Wedge
 
     made: dict[str, Callable[[], Indenter]] = {
@@ -51,6 +51,7 @@ def make_indenter(name: str) -> Indenter:
 
 
 def load_motion(load: ContactLoad) -> Motion:
+    """The motion of a load."""
     from cmpdesign.contact import Motion
 
     return Motion(load.press_mm, load.shear_mm, load.twist_deg)
@@ -58,7 +59,7 @@ def load_motion(load: ContactLoad) -> Motion:
 
 @lru_cache(maxsize=16)
 def solve_contact(sensor_text: str, load: ContactLoad) -> Contact:
-    """The contact at the middle of the sensor's layer."""
+    """The contact at the middle of the sensor's elastic layer."""
     from cmpdesign.contact import solve
 
     sensor = parse_sensor(sensor_text)
@@ -76,7 +77,7 @@ def solve_contact(sensor_text: str, load: ContactLoad) -> Contact:
 
 @dataclass(frozen=True, eq=False)
 class PlacedSurface:
-    """A surface whose contact has its centre at ``centre_mm``: (N, 2) mm to (N, 3) mm."""
+    """A surface with a contact at ``centre_mm``: maps (N, 2) mm to (N, 3) mm."""
 
     surface_at_origin: Callable[[Points], Points]
     centre_mm: tuple[float, float]
@@ -88,7 +89,7 @@ class PlacedSurface:
         return found
 
     def displacement_mm(self, xy_mm: Points) -> Points:
-        """(N, 3) how the points (N, 2) of the flat surface have moved."""
+        """(N, 3) mm: displacements of points (N, 2) mm of the flat surface."""
         moved = self(xy_mm)
         moved[:, :2] -= xy_mm
         return moved
@@ -104,5 +105,5 @@ def _contact_relief(sensor_text: str, load: ContactLoad) -> Callable[[Points], P
 
 
 def place_surface(sensor_text: str, load: ContactLoad, centre_mm: tuple[float, float]) -> PlacedSurface:
-    """The surface under a load at a place."""
+    """The surface under a load at a position."""
     return PlacedSurface(_contact_relief(sensor_text, load), centre_mm)

@@ -1,4 +1,4 @@
-"""A pattern on a simulated sensor: what its camera sees, and what is read from it."""
+"""A pattern on a simulated sensor: the camera's picture, and the markers read from it."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     from extractor.space.reconstruction import Reconstructor
 
 Points = NDArray[np.float64]
-# What a corner of the square pattern is taken to be known to, for want of a covariance of its own.
+# Assumed deviation of the square pattern's corners, whose reader states no covariance.
 SQUARE_SIGMA_PX = 0.1
 REST_SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Instrument:
-    """A sensor with one pattern and one way to read it.
+    """A sensor with one pattern and one reader.
 
     Attributes:
         sensor: the simulated sensor.
-        layout: the pattern, its outline's middle at the origin: there the cameras look.
+        layout: the pattern, with its outline's middle at the origin, the cameras' target.
         reader: "contours" or "saddles" for a square pattern, "colors" for a triangular one.
-        preset: the extractor's, for a triangular pattern.
+        preset: the extractor's preset, for a triangular pattern.
     """
 
     sensor: SimulatedSensor
@@ -48,7 +48,7 @@ class Instrument:
 
     @cached_property
     def reference(self) -> Reference:
-        """The same pattern as the extractor knows it."""
+        """The same pattern as the extractor's layout."""
         from cmpdesign.files.layout_json import layout_to_json
         from extractor.layout.layout_file import parse_layout
 
@@ -57,7 +57,7 @@ class Instrument:
 
     @cached_property
     def layout_as_designed(self) -> Layout:
-        """With marker 0 at the origin."""
+        """The layout with marker 0 at the origin."""
         return _shift_layout(self.layout, -self.layout.marker_xy_mm[0])
 
     @property
@@ -67,29 +67,36 @@ class Instrument:
 
     @property
     def pitch_mm(self) -> float:
+        """The layout's pitch."""
         return float(self.layout.parameters["pitch_mm"])
 
     @cached_property
     def edge_px(self) -> float:
-        """The edges' median length in the picture at rest."""
+        """The median length of the edges in the picture at rest."""
         flat = np.column_stack([self.layout.marker_xy_mm, np.zeros(len(self.layout.marker_xy_mm))])
         ends = [view.project(flat)[self.layout.edges] for view in self.sensor.rig.views]
         return float(np.median([np.linalg.norm(end[:, 1] - end[:, 0], axis=1) for end in ends]))
 
     def picture(
-        self, drawn: ImagingConditions, seed: int, surface: Callable[[Points], Points] | None = None
+        self, conditions: ImagingConditions, seed: int, surface: Callable[[Points], Points] | None = None
     ) -> Rendered:
-        """What the camera sees, with the truth."""
+        """The camera's picture, with its truth.
+
+        Args:
+            conditions: light, blur, noise and dirt.
+            seed: the picture's seed.
+            surface: (N, 2) mm to (N, 3) mm; None: flat.
+        """
         from cmpdesign.scene import Optics, Scene, Sensor, render
 
         scene = Scene(
             layout=self.layout,
             camera=self.sensor.cameras,
             surface=surface,
-            light=drawn.light,
-            optics=Optics(drawn.blur_px),
-            sensor=Sensor(noise=drawn.noise),
-            damage=drawn.damage,
+            light=conditions.light,
+            optics=Optics(conditions.blur_px),
+            sensor=Sensor(noise=conditions.noise),
+            damage=conditions.damage,
             seed=seed,
         )
         return render(scene, size=self.sensor.size_px)
@@ -109,7 +116,7 @@ class Instrument:
 
     @cached_property
     def reconstructor(self) -> Reconstructor:
-        """Poses from a picture at rest, as a user calibrates: in the middle of the ranges, its noise its own."""
+        """A reconstructor with poses from a picture at rest, under mean conditions and with its own noise."""
         from extractor.space.reconstruction import Reconstructor
         from extractor.space.rig import Rig
 
@@ -131,7 +138,7 @@ class Instrument:
 
 
 def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
-    """A square pattern's reader for one view: which way its rows run there is known from rest."""
+    """A square pattern's reader for one view; the direction of its rows is known from rest."""
     from cmpdesign.evaluate.square.contour_reader import SquareReader
     from cmpdesign.evaluate.square.saddle_reader import SaddleReader
 
@@ -146,7 +153,7 @@ def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray
 
 
 def markers_from_places(xy_px: Points, layout: Layout) -> Markers:
-    """Places (M, 2), NaN where lost, as the extractor would hand them out."""
+    """The extractor's result type for positions (M, 2) px, NaN where lost."""
     from extractor.result import Markers, Reason, VirtualStatus
 
     known = np.isfinite(xy_px[:, 0])
@@ -177,6 +184,7 @@ def centre_layout(layout: Layout) -> Layout:
 
 
 def _shift_layout(layout: Layout, by_mm: Points) -> Layout:
+    """The layout moved by (2,) mm, rounded to 1e-9 mm."""
     return replace(
         layout,
         marker_xy_mm=np.round(layout.marker_xy_mm + by_mm, 9) + 0.0,
@@ -196,7 +204,7 @@ def instrument_for_method(sensor_text: str, method: str, preset: Preset = "balan
 def instrument_for_design(
     sensor: SimulatedSensor, design: Design, preset: Preset = "balanced", *, saddles: bool = False
 ) -> Instrument:
-    """A design on a sensor, with the reader that its cells ask for."""
+    """A design on a sensor, with the reader for its cells."""
     layout = centre_layout(build_layout(design))
     if layout.cell_corners.shape[1] == 3:
         return Instrument(sensor, layout, "colors", preset)

@@ -1,4 +1,4 @@
-"""A simulated sensor: its views, its patterns, its elastomer, and what differs from trial to trial. One TOML file."""
+"""A simulated sensor in one TOML file: views, patterns, elastomer, and the ranges of imaging conditions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _StrictTable(BaseModel):
 
 
 class ElastomerTable(_StrictTable):
-    """The soft layer, bonded to the sensor's window."""
+    """The elastic layer, bonded to the sensor's window."""
 
     thickness_mm: Positive
     young_mpa: Positive
@@ -43,7 +43,7 @@ class ElastomerTable(_StrictTable):
 
 
 class ContactTable(_StrictTable):
-    """How contacts are solved."""
+    """The solver's parameters of contacts."""
 
     friction: float = Field(ge=0)
     size_mm: tuple[Positive, Positive]
@@ -52,7 +52,7 @@ class ContactTable(_StrictTable):
 
 
 class LoadTable(_StrictTable):
-    """One contact of the set that designs are compared with; a positive twist is counter-clockwise from the front."""
+    """One contact of the set for comparing designs; a positive twist is counter-clockwise from the front."""
 
     object: str
     press_mm: float = Field(ge=0)
@@ -68,7 +68,7 @@ class LoadTable(_StrictTable):
 
 
 class ConditionRanges(_StrictTable):
-    """What differs from trial to trial; ranges are drawn from evenly."""
+    """Ranges of imaging conditions, sampled uniformly in every trial."""
 
     level: tuple[Positive, Positive] = (1.0, 1.0)
     tint: Share = 0.0
@@ -91,7 +91,7 @@ class ConditionRanges(_StrictTable):
 
 
 class SensorTable(_StrictTable):
-    """The file but for its [[view]] tables, which the extractor's own reader checks."""
+    """The file without its [[view]] tables, which the extractor's reader checks."""
 
     name: str = ""
     description: str = ""
@@ -106,12 +106,12 @@ class SensorTable(_StrictTable):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSensor:
-    """A sensor file, read.
+    """The content of a sensor file.
 
     Attributes:
-        table: its tables.
-        rig: its views, with their poses.
-        text: the file's content.
+        table: the tables.
+        rig: the views, with their poses.
+        text: the file's text.
     """
 
     table: SensorTable
@@ -124,7 +124,7 @@ class SimulatedSensor:
 
     @cached_property
     def cameras(self) -> tuple[Pinhole, ...]:
-        """The views as the renderer takes them."""
+        """The views as pinholes of the renderer."""
         from cmpdesign.scene import Pinhole
 
         return tuple(
@@ -144,8 +144,8 @@ class SimulatedSensor:
     def elastomer(self) -> Elastomer:
         from cmpdesign.contact import Elastomer
 
-        layer = self.table.elastomer
-        return Elastomer(layer.thickness_mm, layer.young_mpa, layer.poisson)
+        table = self.table.elastomer
+        return Elastomer(table.thickness_mm, table.young_mpa, table.poisson)
 
     def pattern(self, method: str) -> Mapping[str, Any]:
         """The design of ``square`` or ``multicolor``.
@@ -161,7 +161,7 @@ class SimulatedSensor:
 
 
 def find_sensor(name_or_path: str | Path) -> Path:
-    """The file of a sensor that is shipped, or of a path.
+    """The file of a shipped sensor, or of a path.
 
     Raises:
         SensorError: neither.
@@ -181,7 +181,7 @@ def load_sensor(name_or_path: str | Path = "tac3d") -> SimulatedSensor:
     """Read a sensor file.
 
     Raises:
-        SensorError: no such file, or a value in it that cannot be used; one line that names it.
+        SensorError: no such file, or a value cannot be used; the message names the value on one line.
     """
     path = find_sensor(name_or_path)
     try:
@@ -192,7 +192,7 @@ def load_sensor(name_or_path: str | Path = "tac3d") -> SimulatedSensor:
 
 
 def parse_sensor(text: str, where: str = "sensor") -> SimulatedSensor:
-    """The sensor in a TOML text; ``where`` opens every error's message.
+    """The sensor in a TOML text; ``where`` is the prefix of every error's message.
 
     Raises:
         SensorError: see ``load_sensor``.

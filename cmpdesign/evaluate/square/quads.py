@@ -1,11 +1,11 @@
 """The former method's recognition: squares of a checkerboard from their contours.
 
-    image -> adaptive threshold -> light and dark squares, freed from each other by erosion -> contours -> quads
+    image -> adaptive threshold -> light and dark squares, separated by erosion -> contours -> quads
 
-Neighbouring squares of one shade touch at their corners, and blur joins them there. So the mask is eroded, and
-the quads' corners are put back by as much, as in the quad-based chessboard finder of OpenCV (V. Vezhnevets); of a
-few erosions the one that leaves the most quads is taken. Squares that stick all the same have a contour
-with more than four corners and are lost, and with them whatever hangs on them.
+Neighbouring squares of one shade touch at their corners, and blur joins them. Therefore the mask is eroded, and
+the quads' sides are moved back outward, as in the quad-based chessboard finder of OpenCV (V. Vezhnevets). Of a
+few erosions the one with the most quads is used. Squares that stay joined have a contour
+with more than four corners and are lost.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Quads:
 
     Attributes:
         corners_px: (Q, 4, 2) float64, clockwise as the image shows them (y points down).
-        light: (Q,) bool, the squares lighter than what surrounds them, the reference cell among them.
-        reference: the row of the colored reference cell; None where it was not found.
+        light: (Q,) bool, the squares lighter than their surroundings, including the reference cell.
+        reference: the row of the colored reference cell; None if it was not found.
     """
 
     corners_px: NDArray[np.float64]
@@ -43,7 +43,7 @@ def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
     """The squares of a checkerboard whose edges are about ``edge_px`` long at rest."""
     import cv2
 
-    # The brightest channel: there the colored reference cell is light, too.
+    # In the brightest channel the colored reference cell is light too.
     value = np.ascontiguousarray(bgr.max(axis=2))
     block = 2 * round(edge_px) + 1
     mask = np.asarray(
@@ -57,7 +57,7 @@ def find_quads(bgr: NDArray[np.uint8], edge_px: float) -> Quads:
 
 
 def _find_most_quads(mask: NDArray[np.uint8], edge_px: float) -> NDArray[np.float64]:
-    """(Q, 4, 2) from the erosion that leaves the most quads; the weakest of equals."""
+    """(Q, 4, 2) px: the quads of the erosion with the most quads; of equals the weakest erosion."""
     return max((_quads_from_mask(mask, times, edge_px) for times in EROSION_STEPS_PX), key=len)
 
 
@@ -67,18 +67,17 @@ def _quads_from_mask(mask: NDArray[np.uint8], eroded_px: int, edge_px: float) ->
     contours, _ = cv2.findContours(
         cv2.erode(mask, EROSION_KERNEL, iterations=eroded_px), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
-    shortest = (
-        2 * np.sqrt(np.pi * QUAD_AREA_RANGE[0]) * edge_px / np.sqrt(2)
-    )  # pixels around a disc of the least area
+    # The contour's number of pixels around a disc of the smallest area.
+    shortest = 2 * np.sqrt(np.pi * QUAD_AREA_RANGE[0]) * edge_px / np.sqrt(2)
     long = (contour for contour in contours if len(contour) >= shortest)
-    kept = [quad for contour in long if (quad := _fit_quad(contour, edge_px)) is not None]
-    if not kept:
+    quads = [quad for contour in long if (quad := _fit_quad(contour, edge_px)) is not None]
+    if not quads:
         return np.empty((0, 4, 2))
-    return _offset_quads(np.stack(kept), float(eroded_px))
+    return _offset_quads(np.stack(quads), float(eroded_px))
 
 
 def _fit_quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | None:
-    """(4, 2) corners of a contour that is a convex quadrilateral of about the right size; None for any other."""
+    """(4, 2) px: corners of a contour that is a convex quadrilateral of about the right size, else None."""
     import cv2
 
     area = cv2.contourArea(contour)
@@ -88,23 +87,23 @@ def _fit_quad(contour: NDArray[Any], edge_px: float) -> NDArray[np.float64] | No
     if len(outline) != 4 or not cv2.isContourConvex(outline):
         return None
     corners = outline[:, 0].astype(np.float64)
-    # With y down, a positive area is clockwise to the eye.
+    # With y down, a positive area appears clockwise.
     return corners if cv2.contourArea(outline, True) > 0 else corners[::-1]
 
 
 def _offset_quads(quads: NDArray[np.float64], by_px: float) -> NDArray[np.float64]:
-    """Quads (Q, 4, 2), clockwise with y down, with every side moved outward."""
+    """Quads (Q, 4, 2), clockwise with y down, with every side moved outward by ``by_px``."""
     along = np.roll(quads, -1, axis=1) - quads
     along /= np.linalg.norm(along, axis=2, keepdims=True)
     normal = np.stack([along[..., 1], -along[..., 0]], axis=2)  # outward of the side from corner i
     before = np.roll(normal, 1, axis=1)
-    # The mitre: the point whose distances from both sides through the corner grow by ``by_px``.
+    # The mitre point: its distances from both sides through the corner grow by ``by_px``.
     cosine = (normal * before).sum(axis=2, keepdims=True)
     return np.asarray(quads + by_px * (normal + before) / np.maximum(1 + cosine, 0.3))
 
 
 def _find_reference_cell(bgr: NDArray[np.uint8], light: NDArray[np.float64]) -> int | None:
-    """The light quad that is decidedly red; None when none is, or more than one."""
+    """The only light quad with a redness above ``RED_SHARE``; None if there is none or more than one."""
     centres = light.mean(axis=1)
     shares = [_redness(bgr, centre) for centre in centres]
     red = np.flatnonzero(np.asarray(shares) > RED_SHARE)
@@ -112,7 +111,7 @@ def _find_reference_cell(bgr: NDArray[np.uint8], light: NDArray[np.float64]) -> 
 
 
 def _redness(bgr: NDArray[np.uint8], centre: NDArray[np.float64]) -> float:
-    """How much red exceeds the other channels around a point, as a share of red."""
+    """Excess of red over the larger other channel around a point, as a share of red."""
     x, y = np.rint(centre).astype(int)
     patch = bgr[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].reshape(-1, 3).astype(np.float64)
     if not len(patch):

@@ -1,14 +1,15 @@
-"""A stronger reader of the square pattern than its users had: what contours lose is sought as saddle points.
+"""A stronger reader of the square pattern than the article's: corners lost by contours are found as saddle points.
 
-Where four squares meet, brightness has a saddle, and it keeps it when the squares stick. So from the corners that
-contours gave, the lattice is grown to those they did not: the next corner is looked for where its neighbours let it be
-expected. Stated beside the former method, never instead of it.
+Where four squares meet, brightness has a saddle point, even when the squares are joined by blur. The lattice is grown
+from the corners found by contours: further corners are searched at positions predicted from their neighbours. Results
+are reported in addition to the former method's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from heapq import heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,39 +17,56 @@ from numpy.typing import NDArray
 from cmpdesign.evaluate.square.contour_reader import SquareReader, refine_corners
 
 Points = NDArray[np.float64]
-LatticePlace = tuple[int, int]  # row, column
 SMOOTHING_EDGES = 0.08  # sigma of the Gaussian before the second derivatives, in edges
 MIN_RESPONSE_SHARE = 0.02  # share of the strong saddles' response below which a maximum is noise
-SEARCH_REACH_EDGES = 0.3  # how far from where it is expected a corner may lie, in edges
-NEIGHBOUR_OFFSETS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+SEARCH_REACH_EDGES = 0.3  # largest distance of a corner from its predicted position, in edges
+
+
+class LatticePlace(NamedTuple):
+    """A corner of the square lattice, or the difference of two corners."""
+
+    row: int
+    column: int
+
+
+class _Candidate(NamedTuple):
+    """A saddle point near the predicted position of a corner, ordered by distance."""
+
+    distance_edges: float
+    place: LatticePlace
+    saddle: int
+
+
+RIGHT, DOWN = LatticePlace(0, 1), LatticePlace(1, 0)
+NEIGHBOUR_OFFSETS = (RIGHT, DOWN, LatticePlace(0, -1), LatticePlace(-1, 0))
 
 
 @dataclass(frozen=True, eq=False)
 class SaddleReader(SquareReader):
-    """Reads one view of a square pattern by contours, and then by saddle points."""
+    """Reads one view of a square pattern by contours, then by saddle points."""
 
     def read(self, bgr: NDArray[np.uint8]) -> Points:
-        """(M, 2) the markers' places in px, NaN where lost. A poor image is data, never an exception."""
+        """(M, 2) the markers' positions in px, NaN where lost. A poor image never raises an exception."""
         xy_px = super().read(bgr)
         known = np.flatnonzero(np.isfinite(xy_px[:, 0])).tolist()
         if not known or len(known) == len(xy_px):
             return xy_px
         side = int(self.layout.marker_index.max()) + 1
-        start = {divmod(marker, side): xy_px[marker] for marker in known}
+        start = {LatticePlace(*divmod(marker, side)): xy_px[marker] for marker in known}
         placed = grow_lattice(find_saddles(bgr, self.edge_px), start, side, self.edge_px * self.axes_px)
         more = sorted(placed.keys() - start.keys())
         if more:
-            ids = [row * side + column for row, column in more]
+            ids = [place.row * side + place.column for place in more]
             xy_px[ids] = refine_corners(bgr, np.array([placed[place] for place in more]), self.edge_px)
         return xy_px
 
 
 @dataclass(frozen=True, eq=False)
 class SaddlePoints:
-    """Saddle points: (N, 2) their places in px, and (N, 2, 2) the second derivatives there."""
+    """Saddle points: (N, 2) positions in px, and (N, 2, 2) the second derivatives of brightness."""
 
     xy_px: Points
-    bend: Points
+    hessian: Points
 
 
 def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> SaddlePoints:
@@ -64,19 +82,24 @@ def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> SaddlePoints:
     peaks = response[(response == highest) & (response > 0)]
     strong = float(np.quantile(peaks, 0.9)) if len(peaks) else 1.0
     rows, columns = np.nonzero((response == highest) & (response > MIN_RESPONSE_SHARE * strong))
-    bend = np.stack([xx, xy, xy, yy], axis=-1)[rows, columns].reshape(-1, 2, 2).astype(np.float64)
-    return SaddlePoints(np.stack([columns, rows], axis=1).astype(np.float64), bend)
+    hessian = np.stack([xx, xy, xy, yy], axis=-1)[rows, columns].reshape(-1, 2, 2).astype(np.float64)
+    return SaddlePoints(np.stack([columns, rows], axis=1).astype(np.float64), hessian)
 
 
 def grow_lattice(
     saddles: SaddlePoints, start: dict[LatticePlace, Points], side: int, cell: Points
 ) -> dict[LatticePlace, Points]:
-    """(row, column) -> place: ``start``, and what is found outward from it.
+    """Positions in px by place: ``start``, and the corners found outward from it.
 
-    The nearest saddle within ``SEARCH_REACH_EDGES`` of where a neighbour is expected is taken, the best fitting
-    first, each once.
-    It must bend as its place says: light and dark cells alternate, and top left of the pattern is a light one.
-    ``cell`` (2, 2) holds the steps from column to column and from row to row where no neighbour tells them.
+    The nearest saddle point within ``SEARCH_REACH_EDGES`` of a neighbour's predicted position is used, the nearest
+    first, each once. The sign of its second derivatives must fit the place: light and dark cells alternate, and the top
+    left cell of the pattern is light.
+
+    Args:
+        saddles: the saddle points.
+        start: (2,) px of known corners.
+        side: corners along a side of the pattern.
+        cell: (2, 2) px, the default offsets to the next column and to the next row.
     """
     from scipy.spatial import cKDTree
 
@@ -85,45 +108,44 @@ def grow_lattice(
     tree = cKDTree(saddles.xy_px)
     placed = dict(start)
     used: set[int] = set()
-    queue: list[tuple[float, LatticePlace, int]] = []
+    queue: list[_Candidate] = []
 
-    def offer_neighbours(known: LatticePlace) -> None:
-        right_px, down_px = (_predict_offset(known, way, placed, cell) for way in ((0, 1), (1, 0)))
+    def add_neighbours(known: LatticePlace) -> None:
+        right_px, down_px = (_predict_offset(known, step, placed, cell) for step in (RIGHT, DOWN))
         edge_px = float(min(np.linalg.norm(right_px), np.linalg.norm(down_px)))
-        for way in NEIGHBOUR_OFFSETS:
-            near = known[0] + way[0], known[1] + way[1]
-            if near in placed or min(near) < 0 or max(near) >= side:
+        for step in NEIGHBOUR_OFFSETS:
+            neighbour = LatticePlace(known.row + step.row, known.column + step.column)
+            if neighbour in placed or min(neighbour) < 0 or max(neighbour) >= side:
                 continue
-            expected = placed[known] + _predict_offset(known, way, placed, cell)
-            apart, saddle = tree.query(expected, distance_upper_bound=SEARCH_REACH_EDGES * edge_px)
-            if not np.isfinite(apart):
+            predicted = placed[known] + _predict_offset(known, step, placed, cell)
+            distance, saddle = tree.query(predicted, distance_upper_bound=SEARCH_REACH_EDGES * edge_px)
+            if not np.isfinite(distance):
                 continue
-            light_below = bool(right_px @ saddles.bend[saddle] @ down_px > 0)
-            if light_below == (sum(near) % 2 == 0):
-                heappush(queue, (float(apart) / edge_px, near, int(saddle)))
+            light_below = bool(right_px @ saddles.hessian[saddle] @ down_px > 0)
+            if light_below == (sum(neighbour) % 2 == 0):
+                heappush(queue, _Candidate(float(distance) / edge_px, neighbour, int(saddle)))
 
     for place, xy in start.items():
-        apart, saddle = tree.query(xy)
-        if apart <= SMOOTHING_EDGES * float(np.linalg.norm(cell[0])) + 1:
+        distance, saddle = tree.query(xy)
+        if distance <= SMOOTHING_EDGES * float(np.linalg.norm(cell[0])) + 1:
             used.add(int(saddle))
-        offer_neighbours(place)
+        add_neighbours(place)
     while queue:
-        _, place, saddle = heappop(queue)
-        if place not in placed and saddle not in used:
-            placed[place] = saddles.xy_px[saddle]
-            used.add(saddle)
-            offer_neighbours(place)
+        candidate = heappop(queue)
+        if candidate.place not in placed and candidate.saddle not in used:
+            placed[candidate.place] = saddles.xy_px[candidate.saddle]
+            used.add(candidate.saddle)
+            add_neighbours(candidate.place)
     return placed
 
 
 def _predict_offset(
-    place: LatticePlace, way: LatticePlace, placed: dict[LatticePlace, Points], cell: Points
+    place: LatticePlace, step: LatticePlace, placed: dict[LatticePlace, Points], cell: Points
 ) -> Points:
-    """The step to a neighbour: the mean of the step behind and those beside, or as at rest."""
-    (row, column), (down, right) = place, way
-    pairs = [((row - down, column - right), place)]
-    for i in (-1, 1):
-        beside = row + i * right, column + i * down
-        pairs.append((beside, (beside[0] + down, beside[1] + right)))
+    """(2,) px: the offset to a neighbour, the mean of known parallel offsets around ``place``, or the default."""
+    pairs = [(LatticePlace(place.row - step.row, place.column - step.column), place)]
+    for side in (-1, 1):
+        begin = LatticePlace(place.row + side * step.column, place.column + side * step.row)
+        pairs.append((begin, LatticePlace(begin.row + step.row, begin.column + step.column)))
     known = [placed[end] - placed[begin] for begin, end in pairs if begin in placed and end in placed]
-    return np.asarray(np.mean(known, axis=0) if known else right * cell[0] + down * cell[1])
+    return np.asarray(np.mean(known, axis=0) if known else step.column * cell[0] + step.row * cell[1])

@@ -1,4 +1,4 @@
-"""The Cramer-Rao bound of a scene: how precisely its image can tell the markers' places at all.
+"""The Cramer-Rao bound of a scene: the smallest possible covariance of marker positions measured in its image.
 
 In: a ``Scene``. Out: covariances.
 """

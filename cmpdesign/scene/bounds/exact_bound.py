@@ -1,8 +1,9 @@
 """The exact Cramer-Rao bound of a scene, from derivatives of its rendered image.
 
-``bound.cramer_rao`` counts every gridline as if it were alone. Here nothing is assumed: the image's derivative with
-respect to every marker is rendered (central differences) and the Fisher matrix is their Gram matrix over the noise's
-variance. Markers that lie far apart move in one and the same rendering, so a few dozen renderings serve any pattern.
+``gridline_bound.cramer_rao`` treats every gridline as isolated. This module needs no such assumption: it renders the
+image's derivative with respect to every marker (central differences). The Fisher matrix is the derivatives' Gram matrix
+over the noise's variance. Markers far from each other are shifted in the same rendering, so a few dozen renderings are
+sufficient for any pattern.
 """
 
 from __future__ import annotations
@@ -12,23 +13,27 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.bounds.gridline_bound import _inverse_blocks
+from cmpdesign.scene.bounds.gridline_bound import marker_covariances
 from cmpdesign.scene.drawing.render import render, render_truth
 from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
 
-STEP_PX = 0.1
-MIN_SEPARATION_RINGS = 3  # rings between markers that move together
-REACH_SIGMA = 5.0
+STEP_PX = 0.1  # shift of the central differences
+MIN_SEPARATION_EDGES = 3  # markers that are shifted together are more edges apart in the layout's graph
+REACH_SIGMA = 5.0  # of the blur, around the cells of a marker
 
 
 def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
     """The smallest covariance (M, 2, 2) px^2 of an unbiased estimate of the markers; NaN where not visible.
 
-    A gridline moves with its two markers and keeps the curvature that the surface gives it. Inks, light and blur
-    count as known; gamma, JPEG and quantisation are left out.
+    A gridline moves with its two markers and keeps its curvature. Inks, light and blur are assumed to be known. Gamma,
+    JPEG and quantisation are neglected.
+
+    Args:
+        scene: a scene with noise and one view.
+        size: the image's (width, height) px.
 
     Raises:
         SceneError: the scene has no noise.
@@ -42,17 +47,17 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     truth = render_truth(scene, size=size)
     markers = len(truth.visible)
     groups = _separated_groups(scene.layout.edges, markers)
-    owners = _influence_boxes(scene, truth.marker_xy_px, size)
+    boxes = _influence_boxes(scene, truth.marker_xy_px, size)
     rows, columns, values = [], [], []
     for group in range(groups.max() + 1):
-        moved = np.flatnonzero(groups == group)
+        shifted = np.flatnonzero(groups == group)
         for axis in (0, 1):
-            change = _image_derivative(clean, moved, axis, size)
-            for marker in moved:
-                low, high = owners[marker]
+            derivative = _image_derivative(clean, shifted, axis, size)
+            for marker in shifted:
+                low, high = boxes[marker]
                 if (high <= low).any():
                     continue
-                part = change[low[1] : high[1], low[0] : high[0]]
+                part = derivative[low[1] : high[1], low[0] : high[0]]
                 y, x, channel = np.nonzero(part)
                 rows.append(((y + low[1]) * size[0] + x + low[0]) * 3 + channel)
                 columns.append(np.full(len(x), 2 * marker + axis))
@@ -61,20 +66,19 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
         shape=(size[0] * size[1] * 3, 2 * markers),
     ).tocsc()
-    return _inverse_blocks((jacobian.T @ jacobian).tocsc(), truth)
+    return marker_covariances((jacobian.T @ jacobian).tocsc(), truth)
 
 
 def _separated_groups(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
-    """(M,) group numbers: markers of one group are more than ``MIN_SEPARATION_RINGS`` - 1 rings from each other
-    (greedily)."""
+    """(M,) group numbers: markers of one group are at least ``MIN_SEPARATION_EDGES`` + 1 edges apart (greedy)."""
     from scipy.sparse import coo_array, eye_array
 
     one = np.ones(2 * len(edges))
-    both = np.concatenate([edges, edges[:, ::-1]])
-    step = (coo_array((one, both.T), shape=(markers, markers)) + eye_array(markers)).tocsr()
-    reached = step
-    for _ in range(MIN_SEPARATION_RINGS - 1):
-        reached = reached @ step
+    directed = np.concatenate([edges, edges[:, ::-1]])
+    adjacent = (coo_array((one, directed.T), shape=(markers, markers)) + eye_array(markers)).tocsr()
+    reached = adjacent
+    for _ in range(MIN_SEPARATION_EDGES - 1):
+        reached = reached @ adjacent
     group = np.full(markers, -1)
     for marker in range(markers):
         taken = group[reached.indices[reached.indptr[marker] : reached.indptr[marker + 1]]]
@@ -83,7 +87,7 @@ def _separated_groups(edges: NDArray[np.int32], markers: int) -> NDArray[np.int6
 
 
 def _influence_boxes(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
-    """(M, 2, 2): the box of pixels (from, to) that a marker's cells and their blur can reach."""
+    """(M, 2, 2) int64: the box of pixels (from, to) that a marker's cells and their blur can affect."""
     edges = scene.layout.edges
     low, high = xy_px.copy(), xy_px.copy()
     for a, b in (edges.T, edges.T[::-1]):
@@ -95,15 +99,15 @@ def _influence_boxes(scene: Scene, xy_px: NDArray[np.float64], size: tuple[int, 
 
 
 def _image_derivative(
-    scene: Scene, moved: NDArray[np.int64], axis: int, size: tuple[int, int]
+    scene: Scene, markers: NDArray[np.int64], axis: int, size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """(H, W, 3): change of the image with the shift (1 px) of these markers along an image axis."""
+    """(H, W, 3): derivative of the image with respect to a shift (1 px) of these markers along an image axis."""
     xy_mm = scene.layout.marker_xy_mm
-    step_mm = STEP_PX * _inverse_jacobians(scene, moved, size)[:, :, axis]
+    step_mm = STEP_PX * _inverse_jacobians(scene, markers, size)[:, :, axis]
     images = []
     for sign in (1, -1):
         shifted = xy_mm.copy()
-        shifted[moved] += sign * step_mm
+        shifted[markers] += sign * step_mm
         image = render(replace(scene, layout=replace(scene.layout, marker_xy_mm=shifted)), size=size).image
         images.append(image.astype(np.float64) / 257)
     return (images[0] - images[1]) / (2 * STEP_PX)
@@ -112,11 +116,12 @@ def _image_derivative(
 def _inverse_jacobians(
     scene: Scene, markers: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """(n, 2, 2) mm per px: the inverse derivative of the map from layout to image at these markers."""
+    """(n, 2, 2) mm per px: the inverse Jacobian of the map from layout to image at these markers."""
     view, xy = single_view(scene, size), scene.layout.marker_xy_mm[markers]
-    step = 1e-4 * np.ptp(scene.layout.marker_xy_mm)
+    step_mm = 1e-4 * np.ptp(scene.layout.marker_xy_mm)
     columns = [
-        (view.image_from_layout(xy + step * unit) - view.image_from_layout(xy - step * unit)) / (2 * step)
+        (view.image_from_layout(xy + step_mm * unit) - view.image_from_layout(xy - step_mm * unit))
+        / (2 * step_mm)
         for unit in np.eye(2)
     ]
     return np.linalg.inv(np.stack(columns, axis=2))

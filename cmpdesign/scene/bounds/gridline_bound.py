@@ -1,14 +1,14 @@
-"""The Cramer-Rao bound of a scene: how precisely its image can tell the markers' positions at all.
+"""The Cramer-Rao bound of a scene: the smallest possible covariance of marker positions, gridline by gridline.
 
-An edge of contrast A (norm over the channels), blur s and pixel noise sigma carries the Fisher information
+A gridline of contrast A (norm over the channels), blur s and pixel noise sigma has the Fisher information
 A^2 / (2 sqrt(pi) s sigma^2) per pixel of its length about its offset along its normal: the integral of the
-squared derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's own box. A
+squared derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's box. A
 gridline is straight between its two markers, so a point at the fraction t moves with the weights 1 - t and
 t. All gridlines together give a sparse information matrix; the diagonal blocks of its inverse bound every
 marker's covariance.
 
-Every edge counts as if it were alone. Near a corner six of them share their pixels and tell less, so the
-true bound lies higher, by the more the fewer pixels an edge has: for a deviation, about 17 % at 20 px and
+Every gridline is treated as isolated. Near a marker six gridlines share their pixels and hold less information, so the
+true bound is higher. The difference grows as edges get shorter: for a deviation, about 17 % at 20 px and
 blur 1.
 """
 
@@ -28,23 +28,27 @@ from cmpdesign.scene.parts.light import light_gain
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
 
-# A marker that the image says nothing about would make the matrix singular: a prior of 1000 px cures that.
+# Without information about a marker the matrix would be singular: a prior with a deviation of 1000 px prevents this.
 PRIOR_PER_PX2 = 1e-6
-SOLVED_AT_ONCE = 512
+SOLVED_AT_ONCE = 512  # markers, to limit memory
 
 
 def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
     """The smallest covariance (M, 2, 2) px^2 that an unbiased estimate of the markers can have.
 
-    Uses the scene's inks, light, blur, noise, missing cells and true positions. Gamma, JPEG, quantisation and
-    the bending of gridlines are left out. NaN for markers that are not visible.
+    The bound uses the scene's inks, light, blur, noise, missing cells and true positions. Gamma, JPEG, quantisation and
+    the bending of gridlines are neglected. NaN for markers that are not visible.
+
+    Args:
+        scene: a scene with noise and one view.
+        size: the image's (width, height) px.
 
     Raises:
-        SceneError: the scene has no noise, so nothing bounds it; or it has several views, each with its own bound.
+        SceneError: the scene has no noise, or it has several views, each with its own bound.
     """
-    single_view(scene, size)  # refuses several views
+    single_view(scene, size)  # raises for several views
     truth = render_truth(scene, size=size)
-    return _inverse_blocks(edge_information(scene, truth, size), truth)
+    return marker_covariances(edge_information(scene, truth, size), truth)
 
 
 def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
@@ -67,7 +71,7 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
 def _contrast_squared(
     scene: Scene, middle_px: NDArray[np.float64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """(E,): squared difference of the colors on both sides of each edge, under the light at its middle."""
+    """(E,): squared difference of the colors on both sides of each edge, under the light at the edge's middle."""
     layout = scene.layout
     color = np.where(missing_cell_mask(scene), BLACK, layout.cell_color)
     over_black = np.array([np.subtract(scene.ink(c)[::-1], scene.ink(BLACK)[::-1]) for c in color])
@@ -76,7 +80,7 @@ def _contrast_squared(
     markers = len(layout.marker_xy_mm)
     edge_key = layout.edges[:, 0].astype(np.int64) * markers + layout.edges[:, 1]
     edge = np.searchsorted(edge_key, sides.min(axis=1) * markers + sides.max(axis=1))
-    # An edge's two cells run along it in opposite directions; beyond the rim there is black.
+    # The corners of an edge's two cells run along it in opposite directions. Beyond the rim there is black.
     sign = np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0)[:, None]
     difference = np.zeros((len(edge_key), 3))
     np.add.at(difference, edge, sign * np.repeat(over_black, corners.shape[1], axis=0))
@@ -93,29 +97,29 @@ def _sum_information(
     area: Area,
     markers: int,
 ) -> Any:
-    """The sparse (2M, 2M) information matrix of all edges, as far as they lie inside the view's area."""
+    """The sparse (2M, 2M) information matrix of all edges, clipped to the view's area."""
     from scipy.sparse import coo_array
 
-    step = ends[:, 1] - ends[:, 0]
-    length = np.linalg.norm(step, axis=1)
-    normal = np.stack([-step[:, 1], step[:, 0]], axis=-1) / length[:, None]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=-1) / length[:, None]
     low, high = _clip_to_area(ends, area)
     weight = per_px * length
     # Integrals of (1 - t)^2, t (1 - t) and t^2 over the part inside.
-    both = {
+    integrals = {
         (0, 0): ((1 - low) ** 3 - (1 - high) ** 3) / 3,
         (0, 1): (high**2 - low**2) / 2 - (high**3 - low**3) / 3,
         (1, 1): (high**3 - low**3) / 3,
     }
-    blocks = normal[:, :, None] * normal[:, None, :]
+    projectors = normal[:, :, None] * normal[:, None, :]
     row, column, value = [], [], []
-    for (a, b), integral in both.items():
+    for (a, b), integral in integrals.items():
         for i, j in {(a, b), (b, a)}:
             rows = 2 * edges[:, i, None, None] + np.array([[0], [1]])
             columns = 2 * edges[:, j, None, None] + np.array([[0, 1]])
-            row.append(np.broadcast_to(rows, blocks.shape).ravel())
-            column.append(np.broadcast_to(columns, blocks.shape).ravel())
-            value.append((blocks * (weight * integral)[:, None, None]).ravel())
+            row.append(np.broadcast_to(rows, projectors.shape).ravel())
+            column.append(np.broadcast_to(columns, projectors.shape).ravel())
+            value.append((projectors * (weight * integral)[:, None, None]).ravel())
     matrix = coo_array(
         (np.concatenate(value), (np.concatenate(row), np.concatenate(column))),
         shape=(2 * markers, 2 * markers),
@@ -135,17 +139,17 @@ def _clip_to_area(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.flo
     return np.where(outside, 0.0, low), np.where(outside, 0.0, high)
 
 
-def _inverse_blocks(information: Any, truth: Truth) -> NDArray[np.float64]:
-    """The (M, 2, 2) diagonal blocks of the inverse, for the visible markers."""
+def marker_covariances(information: Any, truth: Truth) -> NDArray[np.float64]:
+    """(M, 2, 2) px^2: the diagonal blocks of the inverse information for the visible markers, NaN for others."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 
     markers = len(truth.visible)
     solver = splu((information + PRIOR_PER_PX2 * eye_array(2 * markers)).tocsc())
     covariance = np.full((markers, 2, 2), np.nan)
-    wanted = np.flatnonzero(truth.visible)
-    for first in range(0, len(wanted), SOLVED_AT_ONCE):
-        chosen = wanted[first : first + SOLVED_AT_ONCE]
+    visible = np.flatnonzero(truth.visible)
+    for first in range(0, len(visible), SOLVED_AT_ONCE):
+        chosen = visible[first : first + SOLVED_AT_ONCE]
         unit = np.zeros((2 * markers, 2 * len(chosen)))
         entries = np.stack([2 * chosen, 2 * chosen + 1], axis=-1).ravel()
         unit[entries, np.arange(len(entries))] = 1.0

@@ -1,4 +1,4 @@
-"""A pinhole camera anywhere in space, with OpenCV's lens distortion; several of them share one image.
+"""A pinhole camera with any pose and OpenCV's lens distortion. Several pinholes may share one image.
 
     x_camera = R_camera_from_layout @ x_layout + t_camera_from_layout_mm
 
@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from cmpdesign.scene.errors import SceneError
 
 Points = NDArray[np.float64]
-Area = tuple[int, int, int, int]
+Area = tuple[int, int, int, int]  # x, y, width, height in px, as users write it
 
-NEAREST_MM = 1e-3
-ORTHOGONAL = 1e-6
+NEAREST_MM = 1e-3  # smallest depth before the camera
+ORTHOGONAL = 1e-6  # largest deviation of R R^T from the unit matrix
 
 
 def _front_rotation() -> Points:
-    """Straight on from the front: x right, y down, z into the pattern."""
+    """(3, 3) rotation of a camera in front of the pattern: x right, y down, z into the pattern."""
     return np.diag([1.0, -1.0, -1.0])
 
 
@@ -36,10 +36,10 @@ class Pinhole:
         focal_px: fx, fy.
         centre_px: the principal point cx, cy in the whole image's frame.
         distortion: OpenCV's k1, k2, p1, p2, k3, on normalised coordinates.
-        R_camera_from_layout: (3, 3) float64, orthogonal; det -1 where a mirror stands between.
+        R_camera_from_layout: (3, 3) float64, orthogonal; det -1 with a mirror between pattern and camera.
         t_camera_from_layout_mm: (3,) float64.
-        area_px: x, y, width, height of the image's part that this view fills; None: all of it.
-        name: for messages.
+        area_px: x, y, width, height of the image's part that this view fills; None: the whole image.
+        name: the view's name in messages.
     """
 
     focal_px: tuple[float, float]
@@ -77,19 +77,23 @@ class Pinhole:
 
     @property
     def mirrored(self) -> bool:
-        """Whether the pattern at rest is seen as from its back."""
+        """Whether the pattern at rest appears as from its back."""
         front = self.position_mm[2] > 0
         return bool(front == (np.linalg.det(self.R_camera_from_layout) < 0))
 
     @property
     def intrinsics(self) -> Points:
-        """(3, 3): normalised coordinates to px."""
+        """(3, 3): the matrix from normalised coordinates to px."""
         (fx, fy), (cx, cy) = self.focal_px, self.centre_px
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     @property
     def homography(self) -> Points | None:
-        """(3, 3) image from the layout's plane, H[2, 2] = 1; None where the lens distorts."""
+        """(3, 3) image from the layout's plane, H[2, 2] = 1; None with lens distortion.
+
+        Raises:
+            SceneError: the layout's origin has no depth before the camera.
+        """
         if any(self.distortion):
             return None
         h = self.intrinsics @ np.column_stack(
@@ -103,20 +107,24 @@ class Pinhole:
 
     @cached_property
     def reach(self) -> float:
-        """The normalised radius where radial distortion turns back on itself; inf where it never does.
+        """The normalised radius up to which the distorted radius r (1 + k1 r^2 + k2 r^4 + k3 r^6) grows with r.
 
-        The distorted radius r (1 + k1 r^2 + k2 r^4 + k3 r^6) must grow with r.
+        It is inf where the distorted radius always grows.
         """
         k1, k2, _, _, k3 = self.distortion
-        inverse_squares = np.roots(
-            [1.0, 3 * k1, 5 * k2, 7 * k3]
-        )  # in 1 / r^2, so that weak ones do not overflow
+        # Solved for 1 / r^2, so that weak coefficients do not overflow.
+        inverse_squares = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])
         real = inverse_squares.real[np.abs(inverse_squares.imag) <= 1e-9 * np.abs(inverse_squares)]
         largest = float(real.max(initial=0.0))
         return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
 
     def reflected(self, point_mm: Sequence[float], normal: Sequence[float]) -> Pinhole:
-        """This camera as it sees the pattern in a plane mirror through a point; the normal has any length."""
+        """This camera behind a plane mirror: it sees the pattern's reflection.
+
+        Args:
+            point_mm: (3,) a point of the mirror, layout frame.
+            normal: (3,) the mirror's normal, of any length.
+        """
         point, n = np.asarray(point_mm, dtype=np.float64), np.asarray(normal, dtype=np.float64)
         n = n / np.linalg.norm(n)
         r, t = self.R_camera_from_layout, self.t_camera_from_layout_mm
@@ -143,19 +151,22 @@ class Pinhole:
         area_px: Area | None = None,
         name: str = "",
     ) -> Pinhole:
-        """A camera that looks at a point, which it sees in its area's middle.
+        """A camera whose optical axis passes through a point, at the middle of the area.
+
+        This public constructor has more than eight parameters, all but the first by keyword: they are the keys of a
+        [[view]] table.
 
         Args:
             size: the image's (width, height) px.
-            distance_mm: from the camera's centre to the target.
-            field_of_view_deg: across the area's width, without distortion.
-            tilt_deg: between the pattern's normal and the optical axis, -85 to 85.
-            azimuth_deg: to where the camera is tilted, counter-clockwise from the layout's x axis.
-            roll_deg: turn of the pattern in the image, counter-clockwise as seen; at 0 the layout's y points up.
-            target_mm: what it looks at, in the layout frame.
-            back: it stands behind the pattern, at negative z.
-            mirror: its picture is flipped left to right, as by a mirror before it.
-            distortion, area_px, name: as in ``Pinhole``.
+            distance_mm: distance from the camera's centre to the target.
+            field_of_view_deg: angle across the area's width, without distortion.
+            tilt_deg: angle between the pattern's normal and the optical axis, -85 to 85.
+            azimuth_deg: direction of the tilt, counter-clockwise from the layout's x axis.
+            roll_deg: rotation of the pattern in the image, counter-clockwise as seen; at 0 the layout's y points up.
+            target_mm: the point on the optical axis, layout frame.
+            back: the camera is behind the pattern, at negative z.
+            mirror: the image is flipped left to right, as by a mirror before the camera.
+            distortion, area_px, name: see ``Pinhole``.
 
         Raises:
             SceneError: a value is out of range.
@@ -169,17 +180,18 @@ class Pinhole:
         if not abs(tilt_deg) <= 85:
             raise SceneError(f"tilt_deg is {tilt_deg:g}; it must lie between -85 and 85 degrees")
         x, y, width, height = area_px or (0, 0, *size)
-        focal = float(0.5 * width / np.tan(np.radians(field_of_view_deg) / 2))
+        focal_px = float(0.5 * width / np.tan(np.radians(field_of_view_deg) / 2))
         r = _looking_rotation(tilt_deg, azimuth_deg, roll_deg, back)
         t = np.array([0.0, 0.0, distance_mm]) - r @ np.asarray(target_mm, dtype=np.float64)
         if mirror:
             flip = np.diag([-1.0, 1.0, 1.0])
             r, t = flip @ r, flip @ t
-        centre = (x + (width - 1) / 2, y + (height - 1) / 2)
-        return cls((focal, focal), centre, distortion, r, t, area_px, name)
+        centre_px = (x + (width - 1) / 2, y + (height - 1) / 2)
+        return cls((focal_px, focal_px), centre_px, distortion, r, t, area_px, name)
 
 
 def _looking_rotation(tilt_deg: float, azimuth_deg: float, roll_deg: float, back: bool) -> Points:
+    """(3, 3) rotation of ``Pinhole.looking``."""
     tilt, azimuth, roll = np.radians([tilt_deg, azimuth_deg, roll_deg])
     side = -1.0 if back else 1.0
     towards = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), side * np.cos(tilt)])
@@ -188,7 +200,7 @@ def _looking_rotation(tilt_deg: float, azimuth_deg: float, roll_deg: float, back
     right /= np.linalg.norm(right)
     upright = np.stack([right, np.cross(forward, right), forward])
     cos, sin = np.cos(roll), np.sin(roll)
-    # The image's y points down: a turn that looks counter-clockwise is clockwise in its numbers.
+    # The image's y points down: a rotation that looks counter-clockwise is clockwise in image coordinates.
     return np.asarray(np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ upright)
 
 
@@ -201,30 +213,30 @@ def _frozen_array(value: object, shape: tuple[int, ...], name: str) -> Points:
 
 
 def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
-    """Points (N, 3) mm of the layout frame to (N, 2) px of the whole image.
+    """Project points (N, 3) mm of the layout frame to (N, 2) px of the whole image.
 
     Raises:
-        SceneError: a point lies behind the camera, or so far aside that the distortion is not defined there.
+        SceneError: a point lies behind the camera, or beyond the radius where the distortion is defined.
     """
-    at = xyz_mm @ camera.R_camera_from_layout.T + camera.t_camera_from_layout_mm
-    depth = at[:, 2]
+    xyz_camera = xyz_mm @ camera.R_camera_from_layout.T + camera.t_camera_from_layout_mm
+    depth = xyz_camera[:, 2]
     if not np.all(depth > NEAREST_MM):
         if not np.isfinite(depth).all():
             raise SceneError(f"{_camera_label(camera)}the surface is not finite everywhere; mend the map")
         worst = int(np.argmin(depth))
-        place = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
+        position = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
         raise SceneError(
-            f"{_camera_label(camera)}a part of the pattern lies behind the camera: ({place}) mm has a depth of "
+            f"{_camera_label(camera)}a part of the pattern lies behind the camera: ({position}) mm has a depth of "
             f"{depth[worst]:.3g} mm, it must be above 0 mm; move the camera away or tilt it less"
         )
-    xy = at[:, :2] / depth[:, None]
+    xy = xyz_camera[:, :2] / depth[:, None]
     if any(camera.distortion):
         xy = distort_points(camera, xy)
     return np.asarray(xy * np.asarray(camera.focal_px) + np.asarray(camera.centre_px))
 
 
 def depth_mm(camera: Pinhole, xyz_mm: Points) -> Points:
-    """(N,) how far before the camera, along its axis, points (N, 3) mm of the layout frame lie."""
+    """(N,) depth in mm before the camera, along its axis, of points (N, 3) mm of the layout frame."""
     return np.asarray(xyz_mm @ camera.R_camera_from_layout[2] + camera.t_camera_from_layout_mm[2])
 
 
@@ -232,7 +244,7 @@ def distort_points(camera: Pinhole, xy: Points) -> Points:
     """Normalised coordinates (N, 2) after the lens (OpenCV's model with k1, k2, p1, p2, k3).
 
     Raises:
-        SceneError: a point lies where the radial distortion turns back on itself.
+        SceneError: a point lies beyond ``Pinhole.reach``.
     """
     k1, k2, p1, p2, k3 = camera.distortion
     x, y = xy[:, 0], xy[:, 1]

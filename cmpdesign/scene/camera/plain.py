@@ -1,4 +1,4 @@
-"""The plain camera: a pinhole in terms of the picture that it makes; on a plane, a homography from mm to px."""
+"""The plain camera: a pinhole described by its image of the pattern. For a plane it is a homography from mm to px."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class Camera:
     """A pinhole that looks at the layout's plane.
 
     Attributes:
-        pitch_px: one pitch of the layout at the pattern's middle, before the tilt foreshortens it.
-        rotation_deg: turn of the pattern in the image, counter-clockwise as seen.
+        pitch_px: one pitch of the layout at the pattern's middle, without foreshortening by the tilt.
+        rotation_deg: rotation of the pattern in the image, counter-clockwise as seen.
         tilt_deg: angle between the optical axis and the pattern's normal, -85 to 85.
-        tilt_axis_deg: direction of the line about which it tilts, counter-clockwise from the right.
-        centre_px: where the middle of the pattern's outline lies; None: the image's centre.
-        focal_px: focal length and distance in one; small means strong perspective. None: 1.5 times the
+        tilt_axis_deg: direction of the tilt's axis, counter-clockwise from the right.
+        centre_px: image position of the middle of the pattern's outline; None: the image's centre.
+        focal_px: focal length, and distance in px; a small value means strong perspective. None: 1.5 times the
             image's longer side.
-        mirrored: looks at the pattern's back; None: as the layout was designed.
+        mirrored: the camera looks at the pattern's back; None: as the layout was designed.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -48,12 +48,12 @@ class Camera:
 
 
 def is_mirrored(camera: Camera, layout: Layout) -> bool:
-    """Whether this camera sees the layout's back."""
+    """Whether this camera looks at the layout's back."""
     return layout.mirrored if camera.mirrored is None else camera.mirrored
 
 
 def pitch_mm(layout: Layout) -> float:
-    """The layout's pitch; the median length of its edges where the parameters give none."""
+    """The layout's pitch in mm; without this parameter the median length of its edges."""
     if "pitch_mm" in layout.parameters:
         return float(layout.parameters["pitch_mm"])
     ends = layout.marker_xy_mm[layout.edges]
@@ -74,19 +74,19 @@ def camera_homography(camera: Camera, layout: Layout, size: tuple[int, int]) -> 
 
 
 def to_pinhole(camera: Camera, layout: Layout, size: tuple[int, int]) -> Pinhole:
-    """The same camera in space: its homography of the layout's plane is ``camera_homography``."""
+    """The equivalent pinhole: its homography of the layout's plane is ``camera_homography``."""
     focal = _focal_px(camera, size)
     planar = _image_axes(camera, layout)
-    # Seen from the front the layout's z points at the camera, seen from the back away from it.
+    # From the front the layout's z axis points towards the camera, from the back away from the camera.
     r = _tilt_rotation(camera) @ np.block(
         [[planar, np.zeros((2, 1))], [np.zeros((1, 2)), np.linalg.det(planar)]]
     )
-    away = np.array([0.0, 0.0, focal * pitch_mm(layout) / camera.pitch_px])
+    centre_mm = np.array([0.0, 0.0, focal * pitch_mm(layout) / camera.pitch_px])
     return Pinhole(
         (focal, focal),
         _centre_px(camera, size),
         R_camera_from_layout=r,
-        t_camera_from_layout_mm=away - r[:, :2] @ _layout_middle_mm(layout),
+        t_camera_from_layout_mm=centre_mm - r[:, :2] @ _layout_middle_mm(layout),
     )
 
 
@@ -105,11 +105,11 @@ def _layout_middle_mm(layout: Layout) -> NDArray[np.float64]:
 
 
 def _image_axes(camera: Camera, layout: Layout) -> NDArray[np.float64]:
-    """(2, 2): the layout's axes in the image's, before the tilt."""
+    """(2, 2): the layout's axes in image coordinates, before the tilt."""
     turn = np.radians(camera.rotation_deg)
     side = -1.0 if is_mirrored(camera, layout) else 1.0
     cos, sin = np.cos(turn), np.sin(turn)
-    # The image's y points down, so a turn that looks counter-clockwise is clockwise in its numbers.
+    # The image's y points down: a rotation that looks counter-clockwise is clockwise in image coordinates.
     return np.asarray(np.diag([1.0, -1.0]) @ np.array([[cos, -sin], [sin, cos]]) @ np.diag([side, 1.0]))
 
 
@@ -120,13 +120,13 @@ def _tilt_rotation(camera: Camera) -> NDArray[np.float64]:
 
 def _axis_rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """Rotation matrix about a unit axis (Rodrigues)."""
-    x, y, z = axis
+    x, y, z = axis[0], axis[1], axis[2]
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))
 
 
 def project_by_homography(h: NDArray[np.float64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (..., 2) through a homography.
+    """Map points (..., 2) mm by a homography to px.
 
     Raises:
         SceneError: a point lies behind the camera.

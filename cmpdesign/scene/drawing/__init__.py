@@ -1,4 +1,4 @@
-"""A scene drawn: views, exact coverage, folds, and the truth.
+"""Rendering of a scene: views, exact coverage, occlusion, and the truth.
 
 In: a ``Scene``. Out: an image and its ``Truth``.
 """

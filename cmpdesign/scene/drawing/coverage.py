@@ -1,16 +1,16 @@
-"""Exact coverage of the image by polygons, seen through a point spread that is a sum of B-splines.
+"""Exact coverage of the image by polygons, filtered by a point spread that is a sum of B-splines.
 
-The coverage that a spline at (i, j) sees is, by Green's theorem, a sum over the polygon's edges:
+The coverage filtered by a spline at (i, j) is, by Green's theorem, a sum over the polygon's sides:
 
     integral over the polygon of B(u - i) B(v - j) du dv  =  contour integral of C(u - i) B(v - j) dv,
 
-C the integral of B from -infinity. Font rasterisers do this with boxes (signed-area accumulation). As
-there, differences along the row are accumulated, which touch only the few samples around the edge, and one
-cumulative sum restores the coverage. Along an edge's piece inside one sample cell the integrand is a
-polynomial of degree 2 * degree + 1, which Gauss-Legendre quadrature with degree + 1 points integrates
-exactly. Nothing is approximated but for rounding (about 1e-6).
+where C is the integral of B from -infinity. Font rasterisers use the same method with boxes (signed-area accumulation).
+Differences along the row are accumulated, which affect only the few samples around a side. One
+cumulative sum then gives the coverage. Along the piece of a side inside one sample cell the integrand is a
+polynomial of degree 2 * degree + 1. Gauss-Legendre quadrature with degree + 1 points integrates it
+exactly. The only error is rounding (about 1e-6).
 
-This module holds the preparation and the engine in plain numpy; ``coverage_compiled`` the same as loops.
+This module holds the preparation and the engine in plain numpy. ``coverage_compiled`` holds the engine as loops.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from cmpdesign.scene.parts.optics import PointSpread
 Engine = Literal["compiled", "numpy"]
 BAND_ROWS = 64
 
-# The image is drawn in bands of rows, so that a large one needs no large memory.
+# (task, first row, rows) -> planes. The image is drawn in bands of rows to limit memory.
 BandFunction = Callable[["CoverageTask", int, int], NDArray[np.float32]]
 
 
@@ -40,16 +40,16 @@ def draw_coverage(
     engine: Engine = "compiled",
     orientation: float | None = None,
 ) -> NDArray[np.float32]:
-    """Sum over the polygons of value times blurred coverage.
+    """Draw the sum over the polygons of value times blurred coverage.
 
     Args:
         paths: closed polygons in the image frame, of either orientation.
-        values: (polygons, planes): what each polygon adds to each plane where it covers it.
-        size: the image's (width, height).
+        values: (polygons, planes): the value that each polygon adds to each plane where it covers the plane.
+        size: the image's (width, height) px.
         spread: the point spread.
-        engine: "compiled" (numba) or its twin "numpy".
-        orientation: sign of the area (x to y counts as positive) of polygons that count as covered; the other way
-            round they count as minus that. None: each counts as covered either way round.
+        engine: "compiled" (numba) or the equivalent "numpy".
+        orientation: sign of the area (positive from x to y) of polygons whose coverage is positive; polygons of
+            the opposite sign have negative coverage. None: the coverage of all polygons is positive.
 
     Returns:
         (planes, height, width) float32.
@@ -75,20 +75,20 @@ def _load_engine(engine: Engine) -> BandFunction:
 def _make_task(
     paths: PolygonSegments, values: NDArray[np.float64], size: tuple[int, int], spread: PointSpread
 ) -> CoverageTask:
-    fine = spread.oversampling
-    columns, rows = (fine * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
+    oversampling = spread.oversampling
+    columns, rows = (oversampling * (pixels - 1) + 2 * spread.reach + 1 for pixels in size)
     # Knots of the even degree lie between the samples.
     shift = spread.reach + (0.5 if spread.degree == 0 else 0.0)
-    cut, owner = _clip_segments(fine * paths.xy_px + shift, paths.owner, columns, rows)
+    segments, owner = _clip_segments(oversampling * paths.xy_px + shift, paths.owner, columns, rows)
     nodes, weights = np.polynomial.legendre.leggauss(spread.degree + 1)
     quadrature = np.stack([(nodes + 1) / 2, weights / 2])
-    return CoverageTask(cut, owner, values, columns, rows, spread, size[0], quadrature)
+    return CoverageTask(segments, owner, values, columns, rows, spread, size[0], quadrature)
 
 
 def _signed_values(
     paths: PolygonSegments, values: NDArray[np.float64], orientation: float | None
 ) -> NDArray[np.float64]:
-    """What the contour integral is to be weighted with."""
+    """(polygons, planes): the weights of the contour integral."""
     if orientation is not None:
         return -orientation * values
     xy = paths.xy_px
@@ -99,15 +99,18 @@ def _signed_values(
 def _clip_segments(
     uv: NDArray[np.float64], owner: NDArray[np.int64], columns: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Drop what lies above, below or right of the samples; push what lies left of them onto their margin.
+    """Remove parts above, below or right of the samples; move parts left of the samples to their margin.
 
-    An edge left of all samples counts fully in every one of them; one to the right counts in none.
+    A side left of all samples counts fully in all samples of its rows. A side right of all samples counts in none.
+
+    Returns:
+        (n, 4) the remaining pieces, and (n,) their polygons.
     """
     margin = 4.0
     low, high = -margin, columns + margin
     top, bottom = np.minimum(uv[:, 1], uv[:, 3]), np.maximum(uv[:, 1], uv[:, 3])
-    near = (bottom > -margin) & (top < rows + margin) & (np.minimum(uv[:, 0], uv[:, 2]) < high)
-    uv, owner = uv[near], owner[near]
+    relevant = (bottom > -margin) & (top < rows + margin) & (np.minimum(uv[:, 0], uv[:, 2]) < high)
+    uv, owner = uv[relevant], owner[relevant]
     if uv.size == 0 or (uv.min() >= low and uv[:, 0::2].max() <= high and uv[:, 1::2].max() <= rows + margin):
         return uv, owner
 
@@ -128,21 +131,21 @@ def _clip_segments(
     pieces = np.concatenate([points[:-1], points[1:]], axis=-1).reshape(-1, 4)
     owners = np.tile(owner, len(t) - 1)
     top, bottom = np.minimum(pieces[:, 1], pieces[:, 3]), np.maximum(pieces[:, 1], pieces[:, 3])
-    kept = (bottom > top) & (bottom > -margin + 1e-9) & (top < rows + margin - 1e-9)
-    return np.ascontiguousarray(pieces[kept]), owners[kept]
+    inside = (bottom > top) & (bottom > -margin + 1e-9) & (top < rows + margin - 1e-9)
+    return np.ascontiguousarray(pieces[inside]), owners[inside]
 
 
 def draw_band(task: CoverageTask, first: int, count: int) -> NDArray[np.float32]:
-    """Pixel rows ``first`` to ``first + count`` as (planes, count, width) float32, in plain numpy."""
-    fine, reach, degree = task.spread.oversampling, task.spread.reach, task.spread.degree
-    rows = fine * (count - 1) + 2 * reach + 1
-    differences = _edge_differences(task, fine * first, rows, degree)
+    """Draw pixel rows ``first`` to ``first + count`` as (planes, count, width) float32, in plain numpy."""
+    oversampling, reach, degree = task.spread.oversampling, task.spread.reach, task.spread.degree
+    rows = oversampling * (count - 1) + 2 * reach + 1
+    differences = _edge_differences(task, oversampling * first, rows, degree)
     vertical = np.stack([_apply_point_spread(plane.T, task.spread, count).T for plane in differences])
     return _apply_point_spread(np.cumsum(vertical, axis=2), task.spread, task.width).astype(np.float32)
 
 
 def _apply_point_spread(samples: NDArray[np.float64], spread: PointSpread, count: int) -> NDArray[np.float64]:
-    """The point spread's weights along the last axis, one result a pixel."""
+    """Samples filtered by the point spread along the last axis, one result per pixel."""
     windows = np.lib.stride_tricks.sliding_window_view(samples, len(spread.weights), axis=-1)
     return np.asarray(
         windows[..., :: spread.oversampling, :][..., :count, :] @ spread.weights.astype(np.float64)
@@ -152,7 +155,7 @@ def _apply_point_spread(samples: NDArray[np.float64], spread: PointSpread, count
 def _edge_differences(task: CoverageTask, top: int, rows: int, degree: int) -> NDArray[np.float64]:
     """Differences along the rows (planes, rows, columns) of the band that starts at sample row ``top``."""
     pieces, source = _split_at_knots(task.segments)
-    drop = pieces[:, 3] - pieces[:, 1]
+    height = pieces[:, 3] - pieces[:, 1]
     nodes, weights = task.quadrature
     cell = np.floor(0.5 * (pieces[:, :2] + pieces[:, 2:])).astype(np.int64)
     total = np.zeros((task.values.shape[1], rows * task.columns))
@@ -164,16 +167,16 @@ def _edge_differences(task: CoverageTask, top: int, rows: int, degree: int) -> N
             for i in range(degree + 2):
                 column = np.maximum(cell[:, 0] - degree // 2 + i, 0)
                 inside = (row >= 0) & (row < rows) & (column < task.columns)
-                place = row[inside] * task.columns + column[inside]
-                share = (weight * drop * across[i] * along[j])[inside]
+                sample = row[inside] * task.columns + column[inside]
+                share = (weight * height * across[i] * along[j])[inside]
                 for plane in range(len(total)):
                     value = share * task.values[task.owner[source[inside]], plane]
-                    total[plane] += np.bincount(place, value, minlength=total.shape[1])
+                    total[plane] += np.bincount(sample, value, minlength=total.shape[1])
     return total.reshape(-1, rows, task.columns)
 
 
 def _split_at_knots(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Pieces (n, 4) of the segments that lie inside one sample cell each, and their segments' numbers."""
+    """(n, 4) pieces of the segments, each inside one sample cell, and (n,) the numbers of their segments."""
     source = [np.arange(len(segments)), np.arange(len(segments))]
     t = [np.zeros(len(segments)), np.ones(len(segments))]
     for axis in (0, 1):
@@ -188,12 +191,12 @@ def _split_at_knots(segments: NDArray[np.float64]) -> tuple[NDArray[np.float64],
     order = np.lexsort([all_t, all_source])
     all_source, all_t = all_source[order], all_t[order]
     xy = segments[all_source, :2] + all_t[:, None] * (segments[all_source, 2:] - segments[all_source, :2])
-    together = all_source[1:] == all_source[:-1]
-    return np.concatenate([xy[:-1], xy[1:]], axis=1)[together], all_source[1:][together]
+    same_segment = all_source[1:] == all_source[:-1]
+    return np.concatenate([xy[:-1], xy[1:]], axis=1)[same_segment], all_source[1:][same_segment]
 
 
 def _bspline_basis(t: NDArray[np.float64], degree: int) -> list[NDArray[np.float64]]:
-    """The degree + 1 uniform B-splines that reach a knot interval, at the fraction t, leftmost first."""
+    """The degree + 1 uniform B-splines that are not zero in a knot interval, at the fraction t, leftmost first."""
     values = [np.ones_like(t)]
     for d in range(1, degree + 1):
         below = [np.zeros_like(t), *values, np.zeros_like(t)]

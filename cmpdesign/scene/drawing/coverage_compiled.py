@@ -1,4 +1,4 @@
-"""The coverage engine as compiled loops: the steps of ``coverage.draw_band``, one edge after the other."""
+"""The coverage engine as compiled loops: the method of ``coverage.draw_band``, one side after the other."""
 
 from __future__ import annotations
 
@@ -15,33 +15,40 @@ if TYPE_CHECKING:
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _compiled(function: Function) -> Function:
+def compiled(function: Function) -> Function:
+    """Compile a function with numba, cached on disk."""
     options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
     return cast(Function, numba.njit(**options)(function))
 
 
 def draw_band(task: CoverageTask, first: int, count: int) -> NDArray[np.float32]:
-    """Pixel rows ``first`` to ``first + count`` as (planes, count, width) float32."""
-    fine, reach = task.spread.oversampling, task.spread.reach
-    rows = fine * (count - 1) + 2 * reach + 1
+    """Draw pixel rows ``first`` to ``first + count`` as (planes, count, width) float32."""
+    oversampling, reach = task.spread.oversampling, task.spread.reach
+    rows = oversampling * (count - 1) + 2 * reach + 1
     differences = np.zeros((task.values.shape[1], rows, task.columns), dtype=np.float32)
     _accumulate_differences(
-        differences, task.segments, task.owner, task.values, fine * first, task.spread.degree, task.quadrature
+        differences,
+        task.segments,
+        task.owner,
+        task.values,
+        oversampling * first,
+        task.spread.degree,
+        task.quadrature,
     )
-    return _apply_point_spread(differences, task.spread.weights, fine, count, task.width)
+    return _apply_point_spread(differences, task.spread.weights, oversampling, count, task.width)
 
 
-@_compiled
+@compiled
 def _cubic_bsplines(t: float) -> tuple[float, float, float, float]:
-    """The four cubic B-splines that reach a knot interval, at the fraction t, leftmost first."""
+    """The four cubic B-splines that are not zero in a knot interval, at the fraction t, leftmost first."""
     s = 1.0 - t
     tt, ss = t * t, s * s
     return ss * s / 6, (4 - 6 * tt + 3 * tt * t) / 6, (4 - 6 * ss + 3 * ss * s) / 6, tt * t / 6
 
 
-@_compiled
+@compiled
 def _quartic_bsplines(t: float) -> tuple[float, float, float, float, float]:
-    """The five quartic B-splines that reach a knot interval, by one more step of the recursion."""
+    """The five quartic B-splines that are not zero in a knot interval, by one more recursion."""
     a, b, c, d = _cubic_bsplines(t)
     s = 1.0 - t
     return (
@@ -53,7 +60,7 @@ def _quartic_bsplines(t: float) -> tuple[float, float, float, float, float]:
     )
 
 
-@_compiled
+@compiled
 def _accumulate_differences(
     differences: NDArray[np.float32],
     segments: NDArray[np.float64],
@@ -110,49 +117,50 @@ def _accumulate_differences(
             t = end
 
 
-@_compiled
+@compiled
 def _next_knot(start: float, step: float) -> float:
-    """The first integer strictly ahead of ``start`` in the direction of ``step``."""
+    """The first integer strictly beyond ``start`` in the direction of ``step``."""
     return np.floor(start) + 1.0 if step > 0.0 else np.ceil(start) - 1.0  # type: ignore[no-any-return]
 
 
-@_compiled
+@compiled
 def _add_patch(
     plane: NDArray[np.float32], patch: NDArray[np.float64], value: float, row: int, column: int
 ) -> None:
+    """Add value times patch at (row, column), clipped to the plane; columns left of it count in column 0."""
     rows, columns = plane.shape
     for j in range(max(0, -row), min(patch.shape[0], rows - row)):
         for i in range(min(patch.shape[1], columns - column)):
             plane[row + j, max(column + i, 0)] += np.float32(value * patch[j, i])
 
 
-@_compiled
+@compiled
 def _apply_point_spread(
-    differences: NDArray[np.float32], weights: NDArray[np.float32], fine: int, count: int, width: int
+    differences: NDArray[np.float32], weights: NDArray[np.float32], oversampling: int, count: int, width: int
 ) -> NDArray[np.float32]:
     """Point spread down the columns, cumulative sum along the rows, point spread along the rows."""
     planes, _, columns = differences.shape
     taps = len(weights)
     image = np.zeros((planes, count, width), dtype=np.float32)
     line = np.empty(columns, dtype=np.float32)
-    # Every fine-th sample lies together, so that the second sum runs over neighbours in memory.
-    phases = np.empty((fine, columns // fine + 1), dtype=np.float32)
+    # Samples of the same phase are adjacent, so that the second sum runs over contiguous memory.
+    phases = np.empty((oversampling, columns // oversampling + 1), dtype=np.float32)
     for plane in range(planes):
         for y in range(count):
             line[:] = 0.0
             for k in range(taps):
                 weight = weights[k]
-                source = differences[plane, fine * y + k]
+                source = differences[plane, oversampling * y + k]
                 for x in range(columns):
                     line[x] += weight * source[x]
             total = 0.0
             for x in range(columns):
                 total += line[x]
-                phases[x % fine, x // fine] = total
+                phases[x % oversampling, x // oversampling] = total
             target = image[plane, y]
             for k in range(taps):
                 weight = weights[k]
-                samples = phases[k % fine, k // fine :]
+                samples = phases[k % oversampling, k // oversampling :]
                 for x in range(width):
                     target[x] += weight * samples[x]
     return image

@@ -1,4 +1,4 @@
-"""What a coverage engine is asked for."""
+"""The input of a coverage engine."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from cmpdesign.scene.parts.optics import PointSpread
 
 @dataclass(frozen=True, eq=False)
 class CoverageTask:
-    """What an engine needs.
+    """The input of a coverage engine.
 
     Attributes:
-        segments: (N, 4) float64 u0, v0, u1, v1 in samples; sample (0, 0) is the first that any pixel uses,
+        segments: (N, 4) float64 u0, v0, u1, v1 in samples; sample (0, 0) is the first sample of any pixel,
             and the splines' knots are the integers.
-        owner: (N,) int64.
-        values: (polygons, planes) float64, what a fully covered sample shows, signed by orientation.
-        columns, rows: samples that the image uses.
+        owner: (N,) int64, the polygon of each segment.
+        values: (polygons, planes) float64, the value of a fully covered sample, signed by orientation.
+        columns, rows: samples of the image.
         spread: the point spread.
         width: pixels in a row.
-        quadrature: Gauss-Legendre nodes and weights (2, degree + 1) on [0, 1].
+        quadrature: (2, degree + 1) Gauss-Legendre nodes and weights on [0, 1].
     """
 
     segments: NDArray[np.float64]

@@ -1,17 +1,41 @@
-"""The loops of ``occlusion``: small triangles over the samples of a tile, nearest first."""
+"""The compiled loops of ``occlusion``: small triangles over the samples of a tile."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.drawing.coverage_compiled import _compiled
+from cmpdesign.scene.drawing.coverage_compiled import compiled
 
 Points = NDArray[np.float64]
-OVERLAPPING = 2
+OVERLAPPING = 2  # sheets over a sample that need a correction
 
 
-@_compiled
+class OcclusionResidual(NamedTuple):
+    """The correction of a tile's samples.
+
+    Attributes:
+        row, column: the first sample.
+        values: (planes, rows, columns) the nearest sheet's value less the signed sum of all sheets.
+    """
+
+    row: int
+    column: int
+    values: Points
+
+
+class SampleBox(NamedTuple):
+    """A box of a tile's samples: first row, rows, first column, columns."""
+
+    row: int
+    rows: int
+    column: int
+    columns: int
+
+
+@compiled
 def occlusion_residual(
     xyd: Points,
     uv: Points,
@@ -21,17 +45,25 @@ def occlusion_residual(
     top: int,
     size: int,
     samples: int,
-) -> tuple[int, int, Points]:
-    """First row and column and (planes, rows, columns): the nearest sheet's value less the signed sum of all sheets.
+) -> OcclusionResidual:
+    """The correction of the samples of a tile where sheets overlap or one faces away; 0 elsewhere.
 
-    It is 0 but where sheets lie over each other or one faces away; the samples around those are all that is looked at.
+    Args:
+        xyd: (T, 3, 3) triangles: x and y in px, depth in mm.
+        uv: (T, 3, 2) the same corners in texels.
+        facing: (T,) 1 towards the camera, -1 away.
+        texture: (planes, height, width).
+        left, top: the tile's first pixel.
+        size: the tile's side in px.
+        samples: samples per px along each axis.
     """
     count, planes = size * samples, len(texture)
     sheets = _count_sheets(xyd, facing, left, top, count, samples)
-    row, rows, column, columns = _overlap_box(sheets)
+    box = _overlap_box(sheets)
+    row, rows, column, columns = box.row, box.rows, box.column, box.columns
     result = np.zeros((planes, rows, columns))
     if rows == 0:
-        return row, column, result
+        return OcclusionResidual(row, column, result)
     depth = np.full((rows, columns), np.inf)
     nearest = np.zeros((planes, rows, columns))
     value = np.empty(planes)
@@ -49,20 +81,20 @@ def occlusion_residual(
                 u = a * uv[t, 0, 0] + b * uv[t, 1, 0] + c * uv[t, 2, 0]
                 v = a * uv[t, 0, 1] + b * uv[t, 1, 1] + c * uv[t, 2, 1]
                 _fill_texture_value(texture, u, v, value)
-                away = a * xyd[t, 0, 2] + b * xyd[t, 1, 2] + c * xyd[t, 2, 2]
+                distance = a * xyd[t, 0, 2] + b * xyd[t, 1, 2] + c * xyd[t, 2, 2]
                 for plane in range(planes):
                     result[plane, j - row, i - column] -= facing[t] * value[plane]
-                    if away < depth[j - row, i - column]:
+                    if distance < depth[j - row, i - column]:
                         nearest[plane, j - row, i - column] = value[plane]
-                depth[j - row, i - column] = min(depth[j - row, i - column], away)
-    return row, column, result + nearest
+                depth[j - row, i - column] = min(depth[j - row, i - column], distance)
+    return OcclusionResidual(row, column, result + nearest)
 
 
-@_compiled
+@compiled
 def _count_sheets(
     xyd: Points, facing: Points, left: int, top: int, count: int, samples: int
 ) -> NDArray[np.uint8]:
-    """(count, count) how many sheets lie over each sample; one that faces away counts as many."""
+    """(count, count) the number of sheets over each sample; a sheet that faces away counts as ``OVERLAPPING``."""
     found = np.zeros((count, count), dtype=np.uint8)
     for t in range(len(xyd)):
         x_low, x_high = _sample_range(xyd[t, 0, 0], xyd[t, 1, 0], xyd[t, 2, 0], left, count, samples)
@@ -79,9 +111,9 @@ def _count_sheets(
     return found
 
 
-@_compiled
-def _overlap_box(sheets: NDArray[np.uint8]) -> tuple[int, int, int, int]:
-    """First row, rows, first column and columns of the samples under many sheets."""
+@compiled
+def _overlap_box(sheets: NDArray[np.uint8]) -> SampleBox:
+    """The box of the samples under ``OVERLAPPING`` sheets or more."""
     count = len(sheets)
     top, bottom, left, right = count, 0, count, 0
     for j in range(count):
@@ -89,12 +121,12 @@ def _overlap_box(sheets: NDArray[np.uint8]) -> tuple[int, int, int, int]:
             if sheets[j, i] >= OVERLAPPING:
                 top, bottom = min(top, j), max(bottom, j + 1)
                 left, right = min(left, i), max(right, i + 1)
-    return top, max(bottom - top, 0), left, max(right - left, 0)
+    return SampleBox(top, max(bottom - top, 0), left, max(right - left, 0))
 
 
-@_compiled
+@compiled
 def _fill_texture_value(texture: NDArray[np.float32], u: float, v: float, value: Points) -> None:
-    """Every plane's value at a place, linear between the centres of texels."""
+    """Write every plane's value at texel (u, v) into ``value``, bilinear between the centres of texels."""
     _, height, width = texture.shape
     column, row = min(max(int(u), 0), width - 2), min(max(int(v), 0), height - 2)
     right, down = u - column, v - row
@@ -104,18 +136,18 @@ def _fill_texture_value(texture: NDArray[np.float32], u: float, v: float, value:
         value[plane] = (1 - down) * upper + down * lower
 
 
-@_compiled
+@compiled
 def _sample_range(a: float, b: float, c: float, start: int, count: int, samples: int) -> tuple[int, int]:
-    """The samples from the first to behind the last that lie between three coordinates."""
+    """The range (first, last + 1) of samples between the smallest and the largest of three coordinates."""
     low, high = min(a, b, c), max(a, b, c)
     first = int(np.ceil(max((low - start + 0.5) * samples - 0.5, 0.0)))
     last = int(np.floor(min((high - start + 0.5) * samples - 0.5, count - 1.0)))
     return first, last + 1
 
 
-@_compiled
+@compiled
 def _barycentric(triangle: Points, x: float, y: float) -> tuple[float, float, float]:
-    """Barycentric coordinates of a point in a triangle (3, 3); negative ones outside it."""
+    """Barycentric coordinates of a point in a triangle (3, 3); negative outside the triangle."""
     ax, ay = triangle[0, 0] - x, triangle[0, 1] - y
     bx, by = triangle[1, 0] - x, triangle[1, 1] - y
     cx, cy = triangle[2, 0] - x, triangle[2, 1] - y
@@ -126,9 +158,9 @@ def _barycentric(triangle: Points, x: float, y: float) -> tuple[float, float, fl
     return a / total, b / total, c / total
 
 
-@_compiled
+@compiled
 def nearest_depth(xyd: Points, points: Points) -> Points:
-    """(N,) the smallest depth of any triangle at the points (N, 3), which rise in x; inf where there is none."""
+    """(N,) the smallest depth of any triangle at points (N, 3) in ascending order of x; inf without a triangle."""
     found = np.full(len(points), np.inf)
     x = points[:, 0].copy()
     for t in range(len(xyd)):

@@ -1,4 +1,4 @@
-"""The whole ground of a layout, cells and border, as triangles that share their corners."""
+"""The ground of a layout, cells and border, as triangles with common corners."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Points = NDArray[np.float64]
 def ground_patches(layout: Layout) -> Points:
     """(P, 3, 2) mm: triangles that fill a layout's outline, counter-clockwise from the front.
 
-    First the cells in their order (of square ones the first half of each, then the second), then the border.
+    First the cells in their order (of square cells the first half of each, then the second), then the border.
     """
     corners = layout.marker_xy_mm[layout.cell_corners]
     fans = [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
@@ -27,7 +27,7 @@ def ground_patches(layout: Layout) -> Points:
 
 
 def _border_triangles(layout: Layout, cells_mm: Points) -> Points:
-    """(B, 3, 2) what the outline holds besides the cells, in pieces about as large as these."""
+    """(B, 3, 2) mm: triangles of the outline without the cells, of about the cells' size."""
     import shapely
 
     inner = shapely.union_all(shapely.polygons(cells_mm))
@@ -37,25 +37,25 @@ def _border_triangles(layout: Layout, cells_mm: Points) -> Points:
         for piece in shapely.get_parts(shapely.get_parts(ring))
         for part in shapely.get_parts(shapely.constrained_delaunay_triangles(piece))
     ]
-    found = np.array(triangles).reshape(-1, 3, 2)
-    ahead, aside = found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]
-    clockwise = ahead[:, 0] * aside[:, 1] < ahead[:, 1] * aside[:, 0]
-    found[clockwise] = found[clockwise][:, ::-1]
-    return found
+    border = np.array(triangles).reshape(-1, 3, 2)
+    first_side, second_side = border[:, 1] - border[:, 0], border[:, 2] - border[:, 0]
+    clockwise = first_side[:, 0] * second_side[:, 1] < first_side[:, 1] * second_side[:, 0]
+    border[clockwise] = border[clockwise][:, ::-1]
+    return border
 
 
 @lru_cache(maxsize=8)
 def subdivide_triangle(parts: int) -> tuple[Points, NDArray[np.int64]]:
-    """A triangle with each side in ``parts``: barycentric nodes (K, 3), and small triangles (parts^2, 3) of them."""
+    """A triangle with sides divided into ``parts``: barycentric nodes (K, 3) and triangles (parts^2, 3) of nodes."""
     i, j = (index.ravel() for index in np.indices((parts + 1, parts + 1)))
     kept = i + j <= parts
     number = np.full((parts + 1, parts + 1), -1)
     number[i[kept], j[kept]] = np.arange(kept.sum())
-    at = np.stack([parts - i[kept] - j[kept], i[kept], j[kept]], axis=-1) / parts
+    nodes = np.stack([parts - i[kept] - j[kept], i[kept], j[kept]], axis=-1) / parts
     up = [(number[a, b], number[a + 1, b], number[a, b + 1]) for a in range(parts) for b in range(parts - a)]
     down = [
         (number[a + 1, b], number[a + 1, b + 1], number[a, b + 1])
         for a in range(parts)
         for b in range(parts - a - 1)
     ]
-    return at, np.array(up + down)
+    return nodes, np.array(up + down)

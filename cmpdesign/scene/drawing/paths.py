@@ -1,4 +1,4 @@
-"""Closed polygons of the layout as straight segments in the image, finer where the surface curves them."""
+"""Closed polygons of the layout as straight segments in the image, subdivided where the surface curves them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cmpdesign.scene.errors import SceneError
 
 Points = NDArray[np.float64]
 
-CHORD_PX = 0.0004
+CHORD_PX = 0.0004  # largest distance between a chord and its curve
 MAX_SIDE_PIECES = 1 << 14
 
 
@@ -22,7 +22,7 @@ class PolygonSegments:
 
     Attributes:
         xy_px: (N, 4) float64: x0, y0, x1, y1.
-        owner: (N,) int64, the polygon that each belongs to, ascending.
+        owner: (N,) int64, the polygon of each segment, ascending.
     """
 
     xy_px: NDArray[np.float64]
@@ -30,7 +30,7 @@ class PolygonSegments:
 
 
 def join_segments(parts: list[PolygonSegments]) -> PolygonSegments:
-    """All polygons of all parts, renumbered in order."""
+    """All polygons of all parts, numbered consecutively."""
     first = np.cumsum([0] + [int(part.owner.max(initial=-1)) + 1 for part in parts[:-1]])
     owner = [part.owner + start for part, start in zip(parts, first, strict=True)]
     return PolygonSegments(np.concatenate([part.xy_px for part in parts]), np.concatenate(owner))
@@ -39,31 +39,35 @@ def join_segments(parts: list[PolygonSegments]) -> PolygonSegments:
 def project_polygons(
     polygons_mm: Points, image_from_layout: Callable[[Points], Points], curved: bool
 ) -> PolygonSegments:
-    """Map polygons (K, n, 2) mm to the image; ``curved``: straight sides do not stay straight there.
+    """Map polygons (K, n, 2) mm to the image.
 
-    A curved side is cut into pieces, equal in the layout, until chords are within ``CHORD_PX`` of the curve.
+    Args:
+        polygons_mm: closed polygons, the first point not repeated.
+        image_from_layout: (N, 2) mm to (N, 2) px.
+        curved: straight sides become curves. They are divided into pieces, equal in the layout, until the distance
+            between chords and curve is below ``CHORD_PX``.
     """
     start = polygons_mm.reshape(-1, 2)
     end = np.roll(polygons_mm, -1, axis=1).reshape(-1, 2)
     owner = np.repeat(np.arange(len(polygons_mm)), polygons_mm.shape[1])
     if curved:
-        here, pieces = _project_sides(start, end, image_from_layout)
+        starts, pieces = _project_sides(start, end, image_from_layout)
     else:
-        here, pieces = image_from_layout(start), np.ones(len(start), dtype=np.int64)
-    # Each piece ends, to the last bit, where the next one of its polygon starts.
+        starts, pieces = image_from_layout(start), np.ones(len(start), dtype=np.int64)
+    # Each piece ends exactly at the start of the next piece of its polygon.
     count = np.bincount(owner, pieces, minlength=len(polygons_mm)).astype(np.int64)
-    following = np.arange(1, len(here) + 1)
+    next_start = np.arange(1, len(starts) + 1)
     last = np.cumsum(count) - 1
-    following[last] = last - count + 1
-    return PolygonSegments(np.concatenate([here, here[following]], axis=1), np.repeat(owner, pieces))
+    next_start[last] = last - count + 1
+    return PolygonSegments(np.concatenate([starts, starts[next_start]], axis=1), np.repeat(owner, pieces))
 
 
 def _project_sides(
     start: Points, end: Points, image_from_layout: Callable[[Points], Points]
 ) -> tuple[Points, NDArray[np.int64]]:
-    """Where the pieces of all sides (N, 2) start, one side after the other, and how many each side has.
+    """The start points of the pieces of all sides (N, 2) in order, and (N,) the number of each side's pieces.
 
-    Halving the pieces leaves a fourth of the chord error, which is how it is known.
+    Pieces of half the length have a fourth of the chord error, so the error is estimated from the middles.
     """
     pieces = np.full(len(start), 4, dtype=np.int64)
     rounds = []
@@ -81,35 +85,35 @@ def _project_sides(
                 "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
             )
     pieces *= 2
-    here = np.empty((int(pieces.sum()), 2))
-    place = np.cumsum(pieces) - pieces
+    starts = np.empty((int(pieces.sum()), 2))
+    offset = np.cumsum(pieces) - pieces
     for sides, first, xy in rounds:
-        here[_concatenated_ranges(place[sides], pieces[sides])] = xy[
+        starts[_concatenated_ranges(offset[sides], pieces[sides])] = xy[
             _concatenated_ranges(first, pieces[sides])
         ]
-    return here, pieces
+    return starts, pieces
 
 
 def _project_pieces(
     start: Points, end: Points, pieces: NDArray[np.int64], image_from_layout: Callable[[Points], Points]
 ) -> tuple[Points, NDArray[np.int64]]:
-    """The ends and middles of every side's pieces in the image, and where each side's first one stands."""
+    """The ends and middles of every side's pieces in px, and the index of each side's first point."""
     count = 2 * pieces + 1
     first = np.cumsum(count) - count
     side = np.repeat(np.arange(len(start)), count)
-    step = np.arange(len(side)) - first[side]
-    t = (step / (2 * pieces[side]))[:, None]
+    number = np.arange(len(side)) - first[side]
+    t = (number / (2 * pieces[side]))[:, None]
     return image_from_layout(start[side] + t * (end - start)[side]), first
 
 
 def _chord_error(xy: Points, first: NDArray[np.int64], pieces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(N,) px: the largest distance between a piece's middle and its chord's middle."""
+    """(N,) px: the largest distance of each side between a piece's middle and its chord's middle."""
     middle = np.repeat(first, pieces) + 2 * _concatenated_ranges(np.zeros_like(pieces), pieces) + 1
     bend = np.linalg.norm(xy[middle] - 0.5 * (xy[middle - 1] + xy[middle + 1]), axis=1)
     return np.asarray(np.maximum.reduceat(bend, np.cumsum(pieces) - pieces))
 
 
 def _concatenated_ranges(first: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The numbers first, first + 1, ..., ``count`` of them, for one range after the other."""
+    """The ranges first, first + 1, ... of ``count`` numbers, one after the other."""
     before = np.cumsum(count) - count
     return np.asarray(np.arange(int(count.sum())) + np.repeat(first - before, count))

@@ -1,4 +1,4 @@
-"""A scene becomes an image and its ground truth."""
+"""Rendering of a scene to an image and its ground truth."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from cmpdesign.scene.truth import Truth
 Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
 
-# Everything random has a stream of its own, so that one part's change leaves the others as they were.
+# Every random part has its own stream, so that a change of one part does not affect the others.
 BACKGROUND_STREAM, MISSING_STREAM, BLEED_STREAM, NOISE_STREAM = range(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
-    """An image (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor), its truth, and what it cannot be trusted in."""
+    """An image (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor), its truth, and warnings of doubtful parts."""
 
     image: NDArray[np.uint8] | NDArray[np.uint16]
     truth: Truth
@@ -39,25 +39,32 @@ class Rendered:
 
 
 def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine = "compiled") -> Rendered:
-    """Draw a scene; ``size`` is (width, height) in px.
+    """Draw a scene.
 
-    Where several views share the image, what none of them fills is dark.
+    Where several views share the image, pixels outside all views are dark.
+
+    Args:
+        scene: the scene.
+        size: the image's (width, height) px.
+        engine: "compiled" (numba) or the equivalent "numpy".
 
     Raises:
         SceneError: the surface folds, a part lies behind a camera or turns away from it, or a value is out of range.
     """
-    seen = _checked_views(scene, size)
-    gone = missing_cell_mask(scene)
-    behind = _blur_planes(scene.background.planes(size, _stream_rng(scene, BACKGROUND_STREAM)), scene.blur_px)
-    parts = [_draw_view(scene, view, gone, behind, engine) for view in seen]
-    planes = _assemble_views(seen, parts, size)
+    views = _checked_views(scene, size)
+    missing = missing_cell_mask(scene)
+    background = _blur_planes(
+        scene.background.planes(size, _stream_rng(scene, BACKGROUND_STREAM)), scene.blur_px
+    )
+    parts = [_draw_view(scene, view, missing, background, engine) for view in views]
+    planes = _assemble_views(views, parts, size)
     if scene.light:
         planes = planes * light_gain(scene.light, size)
     for glare in scene.damage.glare if scene.damage else ():
         planes = planes + glare.plane(size)
     image = expose_sensor(scene.sensor or Sensor(), planes, _noise_rng(scene))
-    warnings = (*scene.warnings, *(view.warning for view in seen if view.occlusion))
-    return Rendered(image, _make_truth(scene, seen, gone), warnings)
+    warnings = (*scene.warnings, *(view.warning for view in views if view.occlusion))
+    return Rendered(image, _make_truth(scene, views, missing), warnings)
 
 
 def render_truth(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> Truth:
@@ -71,20 +78,20 @@ def _checked_views(scene: Scene, size: tuple[int, int]) -> tuple[SceneView, ...]
     return scene_views(scene, size)
 
 
-def _assemble_views(seen: tuple[SceneView, ...], parts: list[Planes], size: tuple[int, int]) -> Planes:
+def _assemble_views(views: tuple[SceneView, ...], parts: list[Planes], size: tuple[int, int]) -> Planes:
     if len(parts) == 1 and parts[0].shape[1:] == size[::-1]:
         return parts[0]
     planes = np.zeros((3, size[1], size[0]), dtype=np.float32)
-    for view, part in zip(seen, parts, strict=True):
+    for view, part in zip(views, parts, strict=True):
         planes[view.window] = part
     return planes
 
 
 def _draw_view(
-    scene: Scene, view: SceneView, gone: NDArray[np.bool_], behind: Planes, engine: Engine
+    scene: Scene, view: SceneView, missing: NDArray[np.bool_], background: Planes, engine: Engine
 ) -> Planes:
-    """One view's part of the image: (3, height, width)."""
-    planes = _draw_pattern(scene, view, gone, behind[view.window], engine)
+    """(3, height, width): one view's part of the image."""
+    planes = _draw_pattern(scene, view, missing, background[view.window], engine)
     if scene.damage and (scene.damage.blobs or scene.damage.scratches):
         return _cover_with_dirt(planes, scene.damage, scene.blur_px, view, engine)
     return planes
@@ -95,30 +102,30 @@ def _stream_rng(scene: Scene, stream: int) -> np.random.Generator:
 
 
 def _noise_rng(scene: Scene) -> np.random.Generator:
-    """Another stream in every frame of a sequence; all else that is random stays as it is."""
+    """The noise's stream, different in every frame of a sequence. All other random parts do not change."""
     return np.random.default_rng(
         [scene.seed, NOISE_STREAM, scene.frame] if scene.frame else [scene.seed, NOISE_STREAM]
     )
 
 
 def missing_cell_mask(scene: Scene) -> NDArray[np.bool_]:
-    """(C,) bool: the cells that fell out of this scene's pattern."""
+    """(C,) bool: the missing cells of this scene."""
     if scene.damage is None:
         return np.zeros(len(scene.layout.cell_color), dtype=np.bool_)
     return sample_missing_cells(scene.damage, scene.layout, _stream_rng(scene, MISSING_STREAM))
 
 
 def _draw_pattern(
-    scene: Scene, view: SceneView, gone: NDArray[np.bool_], behind: Planes, engine: Engine
+    scene: Scene, view: SceneView, missing: NDArray[np.bool_], background: Planes, engine: Engine
 ) -> Planes:
-    """Ground over background, inks over ground: (3, height, width), B, G, R, blurred."""
+    """(3, height, width) B, G, R, blurred: ground over background, inks over ground."""
     layout = scene.layout
-    drawn = np.flatnonzero((layout.cell_color != BLACK) & ~gone)
+    drawn = np.flatnonzero((layout.cell_color != BLACK) & ~missing)
     polygons = layout.marker_xy_mm[layout.cell_corners[drawn]]
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
         polygons = bleed_polygons(polygons, bleed_mm, _stream_rng(scene, BLEED_STREAM))
-    # Planes: B, G, R over black, the ground, and where inks may overlap also their sum.
+    # Planes: B, G, R over black, the ground, and with bleeding the sum of the inks' coverage.
     black = _bgr(scene.ink(BLACK))
     over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
         -1, 3
@@ -134,30 +141,32 @@ def _draw_pattern(
     if bleed_mm:
         inks = inks / np.maximum(covered[4], 1.0)
     black_plane = black.astype(np.float32)[:, None, None]
-    return np.asarray(inks + behind + ground_share * (black_plane - behind), dtype=np.float32)
+    return np.asarray(inks + background + ground_share * (black_plane - background), dtype=np.float32)
 
 
 def _draw_polygons(
     view: SceneView, polygons_mm: list[Points], values: Points, blur_px: float, engine: Engine
 ) -> Planes:
-    """(planes, height, width): what polygons (K, n, 2) of the layout add up to in a view's area, hidden parts left out.
+    """(planes, height, width): the sum of polygons of the layout in a view's area, without hidden parts.
 
     Args:
         view: the view.
-        polygons_mm: counter-clockwise ones.
-        values: (polygons, planes) what each adds to each plane.
+        polygons_mm: arrays (K, n, 2) of counter-clockwise polygons.
+        values: (polygons, planes) the value that each polygon adds to each plane.
         blur_px: the optics' blur.
         engine: see ``draw_coverage``.
     """
-    spread, folds = make_point_spread(blur_px), view.occlusion
-    seen = join_segments([project_polygons(part, view.area_from_layout, view.curved) for part in polygons_mm])
-    planes = draw_coverage(seen, values, view.area[2:], spread, engine, view.orientation)
-    if folds is not None:
-        flat = join_segments(
-            [project_polygons(part, folds.texels_from_layout, False) for part in polygons_mm]
+    spread, occlusion = make_point_spread(blur_px), view.occlusion
+    segments = join_segments(
+        [project_polygons(part, view.area_from_layout, view.curved) for part in polygons_mm]
+    )
+    planes = draw_coverage(segments, values, view.area[2:], spread, engine, view.orientation)
+    if occlusion is not None:
+        flat_segments = join_segments(
+            [project_polygons(part, occlusion.texels_from_layout, False) for part in polygons_mm]
         )
-        texture = draw_coverage(flat, values, folds.texture_size, make_point_spread(0.0), engine)
-        update_hidden_parts(planes, folds, texture, blur_px)
+        texture = draw_coverage(flat_segments, values, occlusion.texture_size, make_point_spread(0.0), engine)
+        update_hidden_parts(planes, occlusion, texture, blur_px)
     return planes
 
 
@@ -166,7 +175,7 @@ def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def _blur_planes(planes: Planes, blur_px: float) -> Planes:
-    """The background is a picture, not a shape: an ordinary blur does."""
+    """The background after a Gaussian blur of its pixels; it has no exact shapes."""
     if blur_px == 0 or not any(planes.strides[1:]):
         return planes
     import cv2
@@ -177,7 +186,7 @@ def _blur_planes(planes: Planes, blur_px: float) -> Planes:
 def _cover_with_dirt(
     planes: Planes, damage: Damage, blur_px: float, view: SceneView, engine: Engine
 ) -> Planes:
-    """Blobs and scratches over the pattern; where they overlap, they mix."""
+    """Planes with blobs and scratches over the pattern; where they overlap, their colors are averaged."""
     spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
     values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
     covered = _draw_polygons(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
@@ -185,33 +194,33 @@ def _cover_with_dirt(
     return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
 
 
-def _make_truth(scene: Scene, seen: tuple[SceneView, ...], gone: NDArray[np.bool_]) -> Truth:
-    """Of one view as it is; of a tuple of views with a leading axis."""
-    layout, lift = scene.layout, seen[0].xyz_from_layout
-    xyz = lift(layout.marker_xy_mm), lift(layout.virtual_xy_mm.reshape(-1, 2))
-    parts = [_view_truth(scene, view, gone, *xyz) for view in seen]
+def _make_truth(scene: Scene, views: tuple[SceneView, ...], missing: NDArray[np.bool_]) -> Truth:
+    """The truth; with a leading axis of views if the camera is a tuple."""
+    layout, surface = scene.layout, views[0].xyz_from_layout
+    xyz = surface(layout.marker_xy_mm), surface(layout.virtual_xy_mm.reshape(-1, 2))
+    parts = [_view_truth(scene, view, missing, *xyz) for view in views]
     columns = {name: [part[name] for part in parts] for name in parts[0]}
     several = isinstance(scene.camera, tuple)
-    flat = [view.homography for view in seen if view.homography is not None]
+    flat = [view.homography for view in views if view.homography is not None]
     return Truth(
         **{name: np.stack(values) if several else values[0] for name, values in columns.items()},
-        mirrored=np.array([view.mirrored for view in seen]) if several else seen[0].mirrored,
-        H=None if len(flat) < len(seen) else np.stack(flat) if several else flat[0],
+        mirrored=np.array([view.mirrored for view in views]) if several else views[0].mirrored,
+        H=None if len(flat) < len(views) else np.stack(flat) if several else flat[0],
         marker_xyz_mm=xyz[0],
         virtual_xyz_mm=xyz[1].reshape(*layout.virtual_xy_mm.shape[:2], 3),
     )
 
 
 def _view_truth(
-    scene: Scene, view: SceneView, gone: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
+    scene: Scene, view: SceneView, missing: NDArray[np.bool_], marker_xyz_mm: Points, virtual_xyz_mm: Points
 ) -> dict[str, NDArray[Any]]:
-    """What one view has its own values of."""
+    """The fields of the truth that differ from view to view."""
     layout, step_mm = scene.layout, 1e-4 * pitch_mm(scene.layout)
     marker_xy_px = view.project(marker_xyz_mm)
     inside = view.contains(marker_xy_px)
     samples = _cell_samples(scene)
-    away = view.is_hidden(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
-    damaged = gone | ((_is_covered(scene, view, samples) | away).mean(axis=1) >= 0.5)
+    cell_hidden = view.is_hidden(samples.reshape(-1, 2), step_mm).reshape(samples.shape[:2])
+    damaged = missing | ((_is_covered(scene, view, samples) | cell_hidden).mean(axis=1) >= 0.5)
     touching = np.zeros(len(marker_xy_px), dtype=np.bool_)
     touching[layout.cell_corners[(layout.cell_color != BLACK) & ~damaged]] = True
     hidden = _is_covered(scene, view, layout.marker_xy_mm[:, None])[:, 0]
@@ -233,7 +242,7 @@ def _cell_samples(scene: Scene) -> Points:
 
 
 def _is_covered(scene: Scene, view: SceneView, xy_mm: Points) -> NDArray[np.bool_]:
-    """Which of the points (N, n, 2) mm lie under dirt or glare."""
+    """(N, n) bool: which of the points (N, n, 2) mm lie under dirt or glare."""
     covered = np.zeros(xy_mm.shape[:2], dtype=np.bool_)
     if scene.damage is None:
         return covered

@@ -1,4 +1,4 @@
-"""The way from the layout to the image: the scene's surface seen by one of its cameras."""
+"""The map from the layout to the image: the scene's surface and one of its cameras."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class SceneView:
     Attributes:
         xyz_from_layout: (N, 2) mm to (N, 3) mm, the surface in space.
         project: (N, 3) mm to (N, 2) px of the whole image.
-        area: x, y, width, height of its part of the image.
-        mirrored: the pattern's back is seen.
-        h: (3, 3) image from layout; None where straight lines do not stay straight.
-        camera: None where the surface stays in the layout's plane and depth means nothing.
-        folds: where the surface turns away from the camera; None: nowhere.
+        area: x, y, width, height of the view's part of the image.
+        mirrored: the camera looks at the pattern's back.
+        homography: (3, 3) image from layout; None where straight lines become curves.
+        camera: the pinhole; None where the surface stays in the layout's plane and depth is not defined.
+        occlusion: the parts that turn away from the camera; None: there are none.
     """
 
     xyz_from_layout: PointMap
@@ -54,32 +54,32 @@ class SceneView:
 
     @property
     def window(self) -> tuple[slice, slice, slice]:
-        """The area's place in planes (3, H, W)."""
+        """The index of the area in planes (3, H, W)."""
         x, y, width, height = self.area
         return slice(None), slice(y, y + height), slice(x, x + width)
 
     def image_from_layout(self, xy_mm: Points) -> Points:
-        """(N, 2) mm to px of the whole image."""
+        """Map (N, 2) mm to (N, 2) px of the whole image."""
         return self.project(self.xyz_from_layout(xy_mm))
 
     def area_from_layout(self, xy_mm: Points) -> Points:
-        """(N, 2) mm to px, counted from the area's own top left pixel."""
-        at = self.image_from_layout(xy_mm)
-        return at - self.area[:2] if any(self.area[:2]) else at
+        """Map (N, 2) mm to (N, 2) px relative to the area's top left pixel."""
+        xy_px = self.image_from_layout(xy_mm)
+        return xy_px - self.area[:2] if any(self.area[:2]) else xy_px
 
     @property
     def sign(self) -> float:
-        """Of the Jacobian determinant of ``image_from_layout`` where the surface faces the camera."""
+        """The sign of the Jacobian determinant of ``image_from_layout`` where the surface faces the camera."""
         return 1.0 if self.mirrored else -1.0
 
     @property
     def orientation(self) -> float | None:
-        """Of polygons that are counter-clockwise in the layout; None where all of them face the camera anyway."""
+        """The orientation of polygons that are counter-clockwise in the layout; None where all face the camera."""
         return self.sign if self.occlusion is not None else None
 
     @property
     def warning(self) -> str:
-        """That a part turns away, how much and where; empty where none does."""
+        """The warning that a part turns away, with share and position; empty if there is none."""
         if self.occlusion is None:
             return ""
         x, y = self.occlusion.place_mm
@@ -90,21 +90,24 @@ class SceneView:
         )
 
     def is_hidden(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
-        """Which of the points (N, 2) mm of the layout lie behind another part of the surface, or turn away."""
+        """(N,) bool: which points (N, 2) mm of the layout lie behind another part of the surface, or face away.
+
+        ``step_mm`` is the step of the central differences.
+        """
         if self.occlusion is None:
             return np.zeros(len(xy_mm), dtype=np.bool_)
         facing = self.sign * jacobian_determinant(self.image_from_layout, xy_mm, step_mm) > 0
         return is_hidden(self.occlusion, self.depth_from_layout(xy_mm), facing)
 
     def depth_from_layout(self, xy_mm: Points) -> Points:
-        """(N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
+        """Map (N, 2) mm to (N, 3): px as ``area_from_layout``, and depth before the camera in mm."""
         assert self.camera is not None
         xyz = self.xyz_from_layout(xy_mm)
         xy_px = self.project(xyz) - self.area[:2]
         return np.column_stack([xy_px, depth_mm(self.camera, xyz)])
 
     def contains(self, xy_px: Points) -> NDArray[np.bool_]:
-        """Which of the points (N, 2) px of the image lie in the area."""
+        """(N,) bool: which points (N, 2) px of the image lie in the area."""
         corner, size = np.asarray(self.area[:2]), np.asarray(self.area[2:])
         inside = (xy_px >= corner - 0.5) & (xy_px < corner + size - 0.5)
         return np.asarray(inside.all(axis=1))
@@ -114,7 +117,7 @@ def single_view(scene: Scene, size: tuple[int, int]) -> SceneView:
     """The only view of a scene.
 
     Raises:
-        SceneError: it has several; the surface folds; a part lies behind the camera or turns away from it.
+        SceneError: the scene has several views; the surface folds; a part lies behind the camera or turns away from it.
     """
     if isinstance(scene.camera, tuple) and len(scene.camera) > 1:
         raise SceneError(
@@ -132,9 +135,10 @@ def scene_views(scene: Scene, size: tuple[int, int]) -> tuple[SceneView, ...]:
     cameras = scene.camera if isinstance(scene.camera, tuple) else (scene.camera,)
     areas = [_view_area(camera, size) for camera in cameras]
     _require_disjoint_areas(areas, cameras)
-    lift = _make_lift(scene)
+    surface_map = _make_surface_map(scene)
     return tuple(
-        _make_view(scene, camera, area, lift, size) for camera, area in zip(cameras, areas, strict=True)
+        _make_view(scene, camera, area, surface_map, size)
+        for camera, area in zip(cameras, areas, strict=True)
     )
 
 
@@ -174,50 +178,58 @@ def _camera_label(camera: Camera | Pinhole) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _SurfaceLift:
-    """The surface as it was given, and whether it leads out of the plane."""
+class _SurfaceMap:
+    """The scene's surface as a map into space; ``spatial``: the surface leaves the plane."""
 
     surface: PointMap | None
     spatial: bool
 
     def __call__(self, xy_mm: Points) -> Points:
-        """(N, 2) mm to (N, 3) mm."""
-        at = xy_mm if self.surface is None else self.surface(xy_mm)
-        if at.shape[1] == 3:
-            return at
-        xyz = np.zeros((len(at), 3))
-        xyz[:, :2] = at
+        """Map (N, 2) mm to (N, 3) mm."""
+        mapped = xy_mm if self.surface is None else self.surface(xy_mm)
+        if mapped.shape[1] == 3:
+            return mapped
+        xyz = np.zeros((len(mapped), 3))
+        xyz[:, :2] = mapped
         return xyz
 
 
-def _make_lift(scene: Scene) -> _SurfaceLift:
+def _make_surface_map(scene: Scene) -> _SurfaceMap:
     layout, surface = scene.layout, scene.surface
     if surface is None:
-        return _SurfaceLift(None, False)
+        return _SurfaceMap(None, False)
     spatial = surface(layout.marker_xy_mm[:1]).shape[1] == 3
     if not spatial:
         checked = fold_check_points(layout.marker_xy_mm, layout.cell_corners)
         require_no_fold(surface, checked, 1e-4 * pitch_mm(layout))
-    return _SurfaceLift(surface, spatial)
+    return _SurfaceMap(surface, spatial)
 
 
 def _make_view(
-    scene: Scene, camera: Camera | Pinhole, area: Area, lift: _SurfaceLift, size: tuple[int, int]
+    scene: Scene, camera: Camera | Pinhole, area: Area, surface_map: _SurfaceMap, size: tuple[int, int]
 ) -> SceneView:
-    if isinstance(camera, Camera) and not lift.spatial:
-        return _make_planar_view(scene, camera, area, lift, size)
-    at = camera if isinstance(camera, Pinhole) else to_pinhole(camera, scene.layout, size)
-    h = at.homography if lift.surface is None else None
-    view = SceneView(lift, lambda xyz_mm: project_3d(at, xyz_mm), area, at.mirrored, h, at)
+    if isinstance(camera, Camera) and not surface_map.spatial:
+        return _make_planar_view(scene, camera, area, surface_map, size)
+    pinhole = camera if isinstance(camera, Pinhole) else to_pinhole(camera, scene.layout, size)
+    homography = pinhole.homography if surface_map.surface is None else None
+    view = SceneView(
+        surface_map, lambda xyz_mm: project_3d(pinhole, xyz_mm), area, pinhole.mirrored, homography, pinhole
+    )
     if not view.curved:
         return view
     return replace(view, occlusion=find_occlusion(scene.layout, view.depth_from_layout, view.sign, area[2:]))
 
 
 def _make_planar_view(
-    scene: Scene, camera: Camera, area: Area, lift: _SurfaceLift, size: tuple[int, int]
+    scene: Scene, camera: Camera, area: Area, surface_map: _SurfaceMap, size: tuple[int, int]
 ) -> SceneView:
-    h = camera_homography(camera, scene.layout, size)
-    straight = h if lift.surface is None else None
+    homography = camera_homography(camera, scene.layout, size)
+    flat_homography = homography if surface_map.surface is None else None
     mirrored = is_mirrored(camera, scene.layout)
-    return SceneView(lift, lambda xyz_mm: project_by_homography(h, xyz_mm[:, :2]), area, mirrored, straight)
+    return SceneView(
+        surface_map,
+        lambda xyz_mm: project_by_homography(homography, xyz_mm[:, :2]),
+        area,
+        mirrored,
+        flat_homography,
+    )

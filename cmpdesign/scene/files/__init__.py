@@ -1,4 +1,4 @@
-"""Scene files and sequences: TOML checked and composed, key frames, the film that is written.
+"""Scene files and sequences: TOML checked and composed, key frames, the writing of frames.
 
 In: a TOML file and a ``Layout``. Out: scenes, one for every frame.
 """

@@ -1,4 +1,4 @@
-"""The contacts of a scene file: solved once where nothing moves, as one way where the object does."""
+"""The contacts of a scene file: one for all frames when constant, one path of increments when the object moves."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ MOTION = "contact.motion."
 def solve_contacts(
     tables: Sequence[Mapping[str, Any]], changing: Sequence[str], folder: Path
 ) -> Iterator[Contact]:
-    """The contact of every frame.
+    """Solve the contact of every frame.
 
     Args:
         tables: [contact] in every frame.
-        changing: dotted paths of what changes from frame to frame. If it is the motion alone, every frame goes on from
-            the one before, so that friction knows the way; if it is anything else, every frame starts from rest.
-        folder: where a height map is looked for.
+        changing: dotted paths of the values that change from frame to frame. If only the motion changes, every frame
+            continues from the frame before, because friction depends on the path. Otherwise every frame starts from
+            rest.
+        folder: folder of height maps.
 
     Raises:
-        SceneError: a name or a value that is not allowed, or a contact that cannot be solved.
+        SceneError: a name or a value is not allowed, or a contact cannot be solved.
     """
     from cmpdesign.contact import ContactError, contact_from, solve_path
 
     try:
         if not any(path.startswith("contact.") for path in changing):
-            found = contact_from(tables[0], folder).solve()
-            yield from (found for _ in tables)
+            constant = contact_from(tables[0], folder).solve()
+            yield from (constant for _ in tables)
         elif all(path.startswith(MOTION) for path in changing if path.startswith("contact.")):
             setups = [contact_from(table, folder) for table in tables]
             first = setups[0]
@@ -55,7 +56,7 @@ def check_contact(table: Mapping[str, Any], folder: Path) -> None:
     """Read [contact] without solving it.
 
     Raises:
-        SceneError: a name or a value that is not allowed.
+        SceneError: a name or a value is not allowed.
     """
     from cmpdesign.contact import ContactError, contact_from
 

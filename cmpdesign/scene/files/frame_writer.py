@@ -1,4 +1,4 @@
-"""Where the pictures of a sequence go: a video, or a folder of PNG files, which loses nothing."""
+"""Writers of a sequence's images: a video, or a lossless folder of PNG files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class FrameWriter(Protocol):
-    """Takes pictures one after the other; only ``close`` puts them in their place."""
+    """Takes images one after the other; ``close`` moves the result to its path."""
 
     def add(self, picture: Any) -> None: ...
 
@@ -26,17 +26,17 @@ class FrameWriter(Protocol):
 
 
 def open_frame_writer(path: Path, fps: float, size: tuple[int, int], bits: int) -> FrameWriter:
-    """The film for a path: a video by its ending, a folder where it has none.
+    """The writer for a path: a video by its suffix, a folder without suffix.
 
     Args:
-        path: ends in .mp4, .avi or .mkv, or in nothing.
-        fps: frames a second.
-        size: width and height of the pictures, px.
+        path: a path with the suffix .mp4, .avi or .mkv, or without suffix.
+        fps: frames per second.
+        size: width and height of the images, px.
         bits: 8 or 16.
 
     Raises:
-        CmpDesignError: another ending, or pictures that a video of this kind cannot hold.
-        OutputError: the folder holds something already.
+        CmpDesignError: another suffix, or a video of this kind cannot hold the images.
+        OutputError: the folder is not empty.
     """
     if not path.suffix:
         return PngFolderWriter(path)
@@ -54,7 +54,7 @@ def open_frame_writer(path: Path, fps: float, size: tuple[int, int], bits: int) 
 
 
 class PngFolderWriter:
-    """frame_000000.png and so on; written beside, then renamed."""
+    """A folder of frame_000000.png and so on, written under another name and renamed by ``close``."""
 
     def __init__(self, path: Path) -> None:
         if path.exists() and not (path.is_dir() and not any(path.iterdir())):
@@ -62,10 +62,10 @@ class PngFolderWriter:
         self._path, self._part, self._frames = path, path.with_name(path.name + ".part"), 0
 
     def add(self, picture: Image) -> None:
-        """Append a picture (H, W, 3) BGR.
+        """Append an image (H, W, 3) BGR.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: the image cannot be written.
         """
         from cmpdesign.files.images import to_png
 
@@ -79,10 +79,10 @@ class PngFolderWriter:
         self._frames += 1
 
     def close(self) -> None:
-        """Put the folder in its place.
+        """Move the folder to its path.
 
         Raises:
-            OutputError: it cannot take its place.
+            OutputError: the folder cannot be moved.
         """
         try:
             self._part.replace(self._path)
@@ -90,5 +90,5 @@ class PngFolderWriter:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
     def discard(self) -> None:
-        """Leave nothing behind."""
+        """Delete all that was written."""
         shutil.rmtree(self._part, ignore_errors=True)

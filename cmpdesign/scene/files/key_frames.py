@@ -1,4 +1,4 @@
-"""Values that change over a sequence: piecewise linear between key frames, written into a document by their path."""
+"""Values that change over a sequence: piecewise linear between key frames, inserted into a document by dotted path."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KeyFrames = tuple[tuple[float, float | tuple[float, ...]], ...]
 
 
 def flatten_table(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested tables as one, with dotted paths: TOML reads contact.motion.press_mm = ... as tables in tables."""
+    """Nested tables as one table with dotted paths: TOML reads contact.motion.press_mm = ... as tables in tables."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         path = f"{before}.{key}" if before else key
@@ -24,7 +24,7 @@ def flatten_table(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def interpolate_key_frames(keys: KeyFrames, time_s: float) -> float | list[float]:
-    """Between two keys straight, before the first and after the last one constant."""
+    """The value at a time: linear between key frames, constant before the first and after the last."""
     times = [key[0] for key in keys]
     rows = np.array([key[1] for key in keys], dtype=np.float64)
     if rows.ndim == 1:
@@ -35,10 +35,10 @@ def interpolate_key_frames(keys: KeyFrames, time_s: float) -> float | list[float
 def document_at_time(
     document: Mapping[str, Any], values: Mapping[str, KeyFrames], time_s: float
 ) -> dict[str, Any]:
-    """The document with every path's value at a time.
+    """A copy of the document with the values of all paths at a time.
 
     Raises:
-        SceneError: a path leads to no table of the document.
+        SceneError: a path does not exist in the document.
     """
     changed = copy.deepcopy(dict(document))
     for path, keys in values.items():
@@ -50,13 +50,13 @@ def document_at_time(
     return changed
 
 
-def _find_table(target: Any, name: str, path: str, at: str) -> Any:
+def _find_table(target: Any, name: str, path: str, parent_path: str) -> Any:
     known = [str(i) for i in range(len(target))] if isinstance(target, list) else list(target)
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f" (did you mean {near[0]}?)" if near else ""
+        similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        hint = f" (did you mean {similar[0]}?)" if similar else ""
         raise SceneError(
-            f"[sequence] values.{path}: there is no {name}{' in ' + at if at else ''}{hint}; "
+            f"[sequence] values.{path}: there is no {name}{' in ' + parent_path if parent_path else ''}{hint}; "
             "give its starting value in the file"
         )
     found = target[int(name)] if isinstance(target, list) else target[name]

@@ -1,4 +1,4 @@
-"""Scene files: a TOML that composes a scene or a sequence of them; what is absent is not computed."""
+"""Scene files: a TOML that composes a scene or a sequence of scenes; absent parts are not computed."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class SceneFile:
     """A scene file with a layout.
 
     Attributes:
-        path: where it lies; a background's picture is looked for beside it.
+        path: the file's path; relative paths in the file start at its folder.
         layout: the pattern.
-        document: the TOML as it was read, its [sequence] left out.
+        document: the TOML document without [sequence].
         size_px: the image's (width, height).
-        frames: 1 without [sequence].
-        fps: frames a second; None without [sequence].
+        frames: number of frames; 1 without [sequence].
+        fps: frames per second; None without [sequence].
         values: key frames by dotted path.
     """
 
@@ -56,34 +56,34 @@ class SceneFile:
     values: Mapping[str, KeyFrames] = field(default_factory=dict)
 
     def time_s(self, frame: int) -> float:
-        """When a frame is seen."""
+        """The time of a frame in s."""
         return frame / self.fps if self.fps else 0.0
 
     @property
     def bits(self) -> int:
-        """Of the pictures."""
+        """Bits per channel of the images."""
         sensor = self._tables(0).sensor
         return sensor.bits if sensor else 8
 
     def scene(self) -> Scene:
-        """The scene; of a sequence the first frame's.
+        """The scene; of a sequence the first frame's scene.
 
         Raises:
-            SceneError: names file, table and key.
+            SceneError: the message names file, table and key.
         """
         return next(self.scenes())
 
     def scenes(self) -> Iterator[Scene]:
-        """The scene of every frame, in order; each is made when it is asked for.
+        """The scene of every frame, in order; each is made when it is requested.
 
         Raises:
-            SceneError: names file, table and key.
+            SceneError: the message names file, table and key.
         """
         with _errors_with_path(self.path):
-            pressed = self._pressed()
+            contacts = self._contacts()
             for frame in range(self.frames):
                 tables = self._tables(frame)
-                contact = next(pressed, None)
+                contact = next(contacts, None)
                 parts = list(_make_deformations(tables.surface, self.document))
                 if contact is not None:
                     parts.append(contact.surface())
@@ -95,8 +95,8 @@ class SceneFile:
                     warnings=() if contact is None else contact.warnings,
                 )
 
-    def _pressed(self) -> Iterator[Any]:
-        """The contact of every frame; nothing, and nothing imported, without [contact]."""
+    def _contacts(self) -> Iterator[Any]:
+        """The contact of every frame; empty, without importing the solver, if there is no [contact]."""
         if "contact" not in self.document:
             return
         from cmpdesign.scene.files.contacts import solve_contacts
@@ -110,7 +110,7 @@ class SceneFile:
 
 @contextmanager
 def _errors_with_path(path: Path) -> Iterator[None]:
-    """Errors open with the file's name."""
+    """Prefix the messages of scene errors with the file's path."""
     try:
         yield
     except SceneError as error:
@@ -120,36 +120,36 @@ def _errors_with_path(path: Path) -> Iterator[None]:
 def load_scene(
     path: str | Path, layout: Layout, *, size_px: tuple[int, int] | None = None, seed: int | None = None
 ) -> SceneFile:
-    """Read and check a scene file, at every key frame of a sequence, too; nothing is drawn or solved yet.
+    """Read and check a scene file, at every key frame of a sequence, without drawing or solving.
 
     Args:
         path: the TOML file.
         layout: the pattern.
-        size_px, seed: in place of the file's own.
+        size_px, seed: values that replace those of the file.
 
     Raises:
-        SceneError: the file cannot be read, is no TOML, or has a name or value that is not allowed.
+        SceneError: the file cannot be read, is not TOML, or has a name or value that is not allowed.
     """
     path = Path(path)
     with _errors_with_path(path):
         document = _read_toml(path)
-        given = {"size_px": size_px and list(size_px), "seed": seed}
-        document |= {name: value for name, value in given.items() if value is not None}
+        replacements = {"size_px": size_px and list(size_px), "seed": seed}
+        document |= {name: value for name, value in replacements.items() if value is not None}
         sequence = document.pop("sequence", None)
         if isinstance(sequence, dict) and isinstance(sequence.get("values"), dict):
             sequence = {**sequence, "values": flatten_table(sequence["values"])}
         tables = read_tables(document if sequence is None else {**document, "sequence": sequence})
-        found = SceneFile(path, layout, document, tables.size_px)
+        scene_file = SceneFile(path, layout, document, tables.size_px)
         if tables.sequence is not None:
             frames, fps, values = tables.sequence.frames, tables.sequence.fps, tables.sequence.values
-            found = replace(found, frames=frames, fps=fps, values=MappingProxyType(values))
-        for time_s in sorted({0.0} | {key[0] for keys in found.values.values() for key in keys}):
-            _check_tables(read_tables(document_at_time(document, found.values, time_s)), found)
-    return found
+            scene_file = replace(scene_file, frames=frames, fps=fps, values=MappingProxyType(values))
+        for time_s in sorted({0.0} | {key[0] for keys in scene_file.values.values() for key in keys}):
+            _check_tables(read_tables(document_at_time(document, scene_file.values, time_s)), scene_file)
+    return scene_file
 
 
 def _check_tables(tables: SceneTables, file: SceneFile) -> None:
-    """What can be wrong before anything is solved or drawn."""
+    """Check all that needs no solution and no drawing."""
     _make_parts(tables, file)
     if tables.contact is not None:
         from cmpdesign.scene.files.contacts import check_contact
@@ -169,7 +169,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _make_parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
-    """All but the surface, which may have to be solved for."""
+    """The arguments of ``Scene`` except for the surface, which may need a solution."""
     return {
         "layout": file.layout,
         "camera": _make_camera(tables),
@@ -183,7 +183,7 @@ def _make_parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
 
 
 def _make_camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
-    """One [[view]] is a view as any other; several make a tuple, and the truth gets a leading axis."""
+    """The camera: one [[view]] is a pinhole, several are a tuple, which gives the truth a leading axis."""
     if tables.view is None:
         return tables.camera or Camera()
     cameras = []
@@ -196,7 +196,7 @@ def _make_camera(tables: SceneTables) -> Camera | Pinhole | tuple[Pinhole, ...]:
 
 
 def _make_deformations(table: SurfaceTable | None, document: Mapping[str, Any]) -> Iterator[PointMap]:
-    """In the order in which the file has them."""
+    """The deformations of [surface] in the file's order."""
     if table is not None:
         for name in document["surface"]:
             yield getattr(table, name)
@@ -205,13 +205,13 @@ def _make_deformations(table: SurfaceTable | None, document: Mapping[str, Any]) 
 def _make_background(tables: SceneTables, path: Path) -> Background:
     if tables.background is None:
         return Plain()
-    found = read_background(tables.background)
-    if not isinstance(found, BackgroundTable):
-        return found  # type: ignore[no-any-return]
+    background = read_background(tables.background)
+    if not isinstance(background, BackgroundTable):
+        return background  # type: ignore[no-any-return]
     from cmpdesign.files.images import ImageFileError, read_image
 
     try:
-        picture = read_image(path.parent / found.path)
+        picture = read_image(path.parent / background.path)
     except ImageFileError as error:
         raise SceneError(f"[background] path: {error}") from None
     return Picture(picture.astype(np.uint8) if picture.dtype == np.uint8 else (picture >> 8).astype(np.uint8))

@@ -1,6 +1,6 @@
-"""The tables of a scene file, checked: every name and number, before anything is drawn.
+"""The tables of a scene file: every name and number is checked before drawing.
 
-A part's table has the names of its dataclass (``Camera``, ``Light`` ...), so there is one definition of each.
+A part's table has the names of its dataclass (``Camera``, ``Light`` ...), so every part has one definition.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ LOOKING_KEYS = (
     "back",
 )
 BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
-# A place may be given as [x, y] or [x, y, z] and a value as a number: all are rows of numbers to the key frames.
+# A key frame's value is a number, or a position as [x, y] or [x, y, z].
 Value = float | tuple[float, ...]
 
 
 class Table(BaseModel):
-    """Strict and frozen, as all tables are."""
+    """Base of all tables: strict and frozen."""
 
     model_config = ConfigDict(frozen=True, **STRICT)  # type: ignore[typeddict-item]
 
 
 class ViewTable(Table):
-    """[[view]]: a pinhole, placed by its pose or by what it looks at."""
+    """[[view]]: a pinhole, placed by its pose or by its target."""
 
     name: str = ""
     area_px: tuple[int, int, int, int] | None = None
@@ -71,19 +71,23 @@ class ViewTable(Table):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         given = self.model_fields_set
-        looking = [name for name in LOOKING_KEYS if name in given]
-        placed = [name for name in POSE_KEYS if name in given]
-        if looking and placed:
-            raise ValueError(f"{placed[0]} and {looking[0]} place the camera twice; leave one of the two out")
-        needed = LOOKING_KEYS[:2] if looking else POSE_KEYS
+        aimed = [name for name in LOOKING_KEYS if name in given]
+        posed = [name for name in POSE_KEYS if name in given]
+        if aimed and posed:
+            raise ValueError(f"{posed[0]} and {aimed[0]} place the camera twice; leave one of the two out")
+        needed = LOOKING_KEYS[:2] if aimed else POSE_KEYS
         for name in needed:
             if name not in given:
-                other = POSE_KEYS if looking else LOOKING_KEYS[:2]
+                other = POSE_KEYS if aimed else LOOKING_KEYS[:2]
                 raise ValueError(f"{name} is missing (or give {', '.join(other)} alone)")
         return self
 
     def pinhole(self, size: tuple[int, int]) -> Pinhole:
-        """The camera, in an image of ``size``."""
+        """The camera in an image of ``size`` (width, height) px.
+
+        Raises:
+            SceneError: a value is out of range, or ``mirrored`` contradicts the pose.
+        """
         if self.distance_mm is None:
             camera = Pinhole(
                 cast(tuple[float, float], self.focal_px),
@@ -94,11 +98,11 @@ class ViewTable(Table):
                 self.area_px,
                 self.name,
             )
-            odd = bool(np.linalg.det(camera.R_camera_from_layout) < 0)
-            if self.mirrored is not None and self.mirrored != odd:
+            reflects = bool(np.linalg.det(camera.R_camera_from_layout) < 0)
+            if self.mirrored is not None and self.mirrored != reflects:
                 raise SceneError(
                     f"mirrored is {str(self.mirrored).lower()}, but the determinant of R_camera_from_layout is "
-                    f"{-1 if odd else 1}; it is -1 where an odd number of mirrors stands between, leave one out"
+                    f"{-1 if reflects else 1}; it is -1 where an odd number of mirrors stands between, leave one out"
                 )
             return camera
         looking = {name: getattr(self, name) for name in (*LOOKING_KEYS, "distortion", "area_px", "name")}
@@ -106,7 +110,7 @@ class ViewTable(Table):
 
 
 class SurfaceTable(Table):
-    """[surface]: deformations, in the order in which the file has them."""
+    """[surface]: deformations, applied in the file's order."""
 
     press: Press | None = None
     twist: Twist | None = None
@@ -115,9 +119,9 @@ class SurfaceTable(Table):
 
 
 class SequenceTable(Table):
-    """[sequence]: how many frames, and which values go from where to where.
+    """[sequence]: the number of frames, and the values that change.
 
-    ``values`` holds, for a dotted path of names, key frames [time in s, value]; between them a value goes straight.
+    ``values`` holds, for a dotted path of names, key frames [time in s, value]. Values are linear between key frames.
     """
 
     frames: int = Field(ge=1, le=1_000_000)
@@ -140,14 +144,14 @@ class SequenceTable(Table):
 
 
 class BackgroundTable(Table):
-    """[background] of a picture; those that are generated have the names of their dataclass."""
+    """[background] of a picture; generated backgrounds have the names of their dataclass."""
 
     kind: Literal["picture"]
     path: str
 
 
 class SceneTables(Table):
-    """A whole scene file. What is absent is None and neither asked for nor computed."""
+    """A whole scene file. Absent tables are None and not computed."""
 
     size_px: tuple[int, int] = (640, 480)
     seed: int = Field(default=0, ge=0)
@@ -175,16 +179,16 @@ class SceneTables(Table):
 
 
 def read_tables(document: Mapping[str, Any]) -> SceneTables:
-    """A TOML document as tables.
+    """The checked tables of a TOML document.
 
     Raises:
-        SceneError: names table, key, value and limit; for an unknown name the nearest known one.
+        SceneError: the message names table, key, value and limit; for an unknown name a similar known one.
     """
     return cast(SceneTables, _validate_table(SceneTables, document, ""))
 
 
 def read_background(table: Mapping[str, Any]) -> Any:
-    """[background]: the part itself, or a ``BackgroundTable`` for a picture.
+    """[background] as its part, or as a ``BackgroundTable`` for a picture.
 
     Raises:
         SceneError: see ``read_tables``.
@@ -204,10 +208,10 @@ def read_background(table: Mapping[str, Any]) -> Any:
 
 def _validate_table(model: type, table: Mapping[str, Any], where: str) -> Any:
     try:
-        # As JSON, a list may become a tuple and a table a dataclass, and yet a text is no number.
+        # Strict validation of JSON accepts lists for tuples and tables for dataclasses, but no texts for numbers.
         return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        # A value that fits none of several types is reported once for each of them.
+        # pydantic reports a value once for each type that does not fit.
         messages = dict.fromkeys(_error_message(item, model, where) for item in error.errors())
         raise SceneError("; ".join(messages)) from None
 
@@ -216,7 +220,7 @@ def _error_message(item: Any, model: type, where: str) -> str:
     inner = [part for part in item["loc"] if not _is_type_name(part)]
     path: list[int | str] = [where, *inner] if where else inner
     text, kind = item["msg"].removeprefix("Value error, ").removeprefix("Input should be "), item["type"]
-    if kind == "value_error":  # a part's own check: its path leads to the part, and the message names the key
+    if kind == "value_error":  # a part's own check: the message names the key
         return f"{_table_label(path)}{text}"
     table, key = _table_label(path[:-1]), str(path[-1])
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
@@ -237,21 +241,21 @@ def _error_message(item: Any, model: type, where: str) -> str:
 
 
 def _is_type_name(part: int | str) -> bool:
-    """Pydantic puts the types that it tried, too, into a place's path."""
+    """Whether a part of an error's path is a type: pydantic inserts the types of unions into paths."""
     return isinstance(part, str) and (part in ("float", "str") or "[" in part)
 
 
 def _table_label(path: list[int | str]) -> str:
-    """ "[light] leds.0." of the path to a table; nothing at the top."""
+    """The prefix of messages for the path of a table, such as "[light] leds.0."; empty for the document."""
     if not path:
         return ""
-    name, *rest = path
-    head = f"[[view]] {rest.pop(0)}: " if name == "view" and rest else f"[{name}] "
-    return head + "".join(f"{part}." for part in rest)
+    if path[0] == "view" and len(path) > 1:
+        return f"[[view]] {path[1]}: " + "".join(f"{part}." for part in path[2:])
+    return f"[{path[0]}] " + "".join(f"{part}." for part in path[1:])
 
 
 def _known_names(model: Any, path: list[int | str]) -> list[str]:
-    """The names that the table at a path may have."""
+    """The names that are allowed in the table at a path."""
     for part in path:
         if not isinstance(part, int):
             model = _inner_table_class(_type_hints(model)[part])
@@ -266,7 +270,7 @@ def _type_hints(model: Any) -> dict[str, Any]:
 
 
 def _inner_table_class(hint: Any) -> Any:
-    """The table's class in "Led | None" or "tuple[Led, ...]"."""
+    """The table's class in a type such as "Led | None" or "tuple[Led, ...]"."""
     if get_origin(hint) in (Union, UnionType, tuple):
         return next(
             found for found in map(_inner_table_class, get_args(hint)) if found not in (type(None), Ellipsis)

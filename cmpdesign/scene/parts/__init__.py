@@ -1,4 +1,4 @@
-"""The parts that a scene is composed of: background, light, optics, sensor, damage, surface.
+"""The parts of a scene: background, light, optics, sensor, damage, surface.
 
-In: a few parameters each. Out: frozen values that can draw or map.
+In: parameters of each part. Out: frozen values that draw planes or map points.
 """

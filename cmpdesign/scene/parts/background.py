@@ -1,4 +1,4 @@
-"""What lies behind the pattern: a color, a picture, or something generated that may look like a pattern."""
+"""Backgrounds of the pattern: a color, a picture, or generated clutter that may resemble a pattern."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Planes = NDArray[np.float32]
 
 
 class Background(Protocol):
-    """Draws itself as (3, height, width) float32, channels B, G, R, 0 to 255."""
+    """``planes`` draws (3, height, width) float32, channels B, G, R, 0 to 255, for an image of (width, height) px."""
 
     def planes(self, size: tuple[int, int], rng: np.random.Generator) -> Planes: ...
 
@@ -36,7 +36,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class Gradient:
-    """A color that turns into another along a direction, counter-clockwise from the right."""
+    """A linear gradient from one color to another along a direction, counter-clockwise from the right."""
 
     __pydantic_config__: ClassVar = STRICT
 
@@ -84,8 +84,8 @@ class Busy:
     """A cluttered desk: discs, boxes, lines and triangles in all colors.
 
     Attributes:
-        shapes: how many.
-        triangles: draw triangles in red, green, blue and white only, the hardest clutter for this pattern.
+        shapes: the number of shapes.
+        triangles: draw only triangles in red, green, blue and white, the hardest clutter for this pattern.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -99,28 +99,28 @@ class Busy:
         width, height = size
         scale = min(size) / 12
         image = np.full((height, width, 3), rng.uniform(40, 200, 3), dtype=np.float32)
-        pure = [(45, 50, 200), (60, 150, 40), (190, 60, 45), (235, 235, 235)]
+        inks = [(45, 50, 200), (60, 150, 40), (190, 60, 45), (235, 235, 235)]
         for _ in range(self.shapes):
             centre = rng.uniform((0, 0), (width, height))
-            reach = scale * rng.uniform(0.15, 1.0)
-            color = pure[rng.integers(4)] if self.triangles else tuple(rng.uniform(0, 255, 3))
+            radius = scale * rng.uniform(0.15, 1.0)
+            color = inks[rng.integers(4)] if self.triangles else tuple(rng.uniform(0, 255, 3))
             kind = 3 if self.triangles else rng.integers(4)
             turn = rng.uniform(0, 2 * np.pi)
             if kind == 0:
-                cv2.circle(image, centre.astype(int).tolist(), int(reach), color, -1, cv2.LINE_AA)
+                cv2.circle(image, centre.astype(int).tolist(), int(radius), color, -1, cv2.LINE_AA)
             elif kind == 1:
-                far = centre + 4 * reach * np.array([np.cos(turn), np.sin(turn)])
-                cv2.line(image, centre.astype(int).tolist(), far.astype(int).tolist(), color, 2, cv2.LINE_AA)
+                end = centre + 4 * radius * np.array([np.cos(turn), np.sin(turn)])
+                cv2.line(image, centre.astype(int).tolist(), end.astype(int).tolist(), color, 2, cv2.LINE_AA)
             else:
                 corners = turn + 2 * np.pi * np.arange(6 - kind) / (6 - kind)
-                points = centre + reach * np.stack([np.cos(corners), np.sin(corners)], axis=-1)
+                points = centre + radius * np.stack([np.cos(corners), np.sin(corners)], axis=-1)
                 cv2.fillPoly(image, [points.astype(np.int32)], color, cv2.LINE_AA)
         return np.ascontiguousarray(image.transpose(2, 0, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """An image (H, W, 3) uint8 BGR, stretched over the whole frame."""
+    """An image (H, W, 3) uint8 BGR, resized to the whole image."""
 
     image: NDArray[np.uint8]
 

@@ -1,4 +1,4 @@
-"""The light: smooth gains for each channel, fixed to the camera's image."""
+"""The light: a smooth gain of each channel, fixed to the camera's image."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Led:
     """A light at the image's rim.
 
     Attributes:
-        angle_deg: where it stands, counter-clockwise from the right, seen from the image's centre.
-        rgb: its gain at the rim, for each channel.
-        reach: distance, in half diagonals of the image, over which it falls by exp(-1/2).
+        angle_deg: direction from the image's centre, counter-clockwise from the right.
+        rgb: gain of each channel at the rim.
+        reach: distance, in half diagonals of the image, over which the gain falls by exp(-1/2).
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -35,9 +35,9 @@ class Light:
     """Gain of every pixel: (ambient * gradient + LEDs) * vignetting.
 
     Attributes:
-        rgb: the ambient light's gain for each channel; (1, 1, 1) shows the inks as they are.
+        rgb: the ambient light's gain of each channel; (1, 1, 1) keeps the inks' colors.
         gradient: relative change of the ambient light from the centre to the right and to the upper side.
-        vignetting: relative loss in the image's corners, falling with the square of the distance; 0 to 1.
+        vignetting: relative loss in the image's corners, proportional to the squared distance; 0 to 1.
         leds: further lights at the rim.
     """
 
@@ -57,29 +57,33 @@ class Light:
 
 
 def light_gain(light: Light, size: tuple[int, int]) -> NDArray[np.float32]:
-    """(3, height, width) float32, channels B, G, R, never negative.
+    """(3, height, width) float32 gain, channels B, G, R, never negative, for an image of (width, height) px.
 
-    The fields vary over many pixels, so they multiply the blurred image.
+    The gain varies slowly, so it multiplies the blurred image.
     """
     width, height = size
     x = np.linspace(-1.0, 1.0, width, dtype=np.float32)[None, :]
     y = np.linspace(1.0, -1.0, height, dtype=np.float32)[:, None]
     ambient = np.maximum(1 + light.gradient[0] * x + light.gradient[1] * y, 0)
-    field = np.stack([np.broadcast_to(level * ambient, (height, width)) for level in light.rgb[::-1]])
+    gain = np.stack([np.broadcast_to(level * ambient, (height, width)) for level in light.rgb[::-1]])
     diagonal = np.hypot(width, height)
     for led in light.leds:
         angle = np.radians(led.angle_deg)
         across = (x - np.cos(angle)) * np.float32(width / diagonal)
         up = (y - np.sin(angle)) * np.float32(height / diagonal)
-        bell = np.exp(-0.5 * (across**2 + up**2) / np.float32(led.reach) ** 2)
-        field = field + np.asarray(led.rgb[::-1], dtype=np.float32)[:, None, None] * bell
+        falloff = np.exp(-0.5 * (across**2 + up**2) / np.float32(led.reach) ** 2)
+        gain = gain + np.asarray(led.rgb[::-1], dtype=np.float32)[:, None, None] * falloff
     if light.vignetting:
-        field = field * (1 - np.float32(light.vignetting) * 0.5 * (x**2 + y**2))
-    return np.ascontiguousarray(field, dtype=np.float32)
+        gain = gain * (1 - np.float32(light.vignetting) * 0.5 * (x**2 + y**2))
+    return np.ascontiguousarray(gain, dtype=np.float32)
 
 
 def colored_leds(count: int = 3, strength: float = 0.7, ambient: float = 0.35, reach: float = 0.7) -> Light:
-    """Two or three LEDs evenly around the image, red, green and blue in turn, over a weak white light."""
+    """One to three LEDs at equal angles, red, green and blue in turn, over a weak white light.
+
+    Raises:
+        SceneError: another number of LEDs.
+    """
     if not 1 <= count <= 3:
         raise SceneError(f"count is {count}; colored_leds has 1 to 3 LEDs")
     weak = 0.25 * strength

@@ -1,13 +1,13 @@
-"""The optics: a Gaussian blur over the pixel's box, as weights of cubic B-splines.
+"""The optics: a Gaussian blur and the pixel's box, as weights of cubic B-splines.
 
 A pixel is the integral of the scene over its box, after a Gaussian blur. Coverage that is sampled by boxes
-and blurred afterwards is off by up to a twelfth of a square pixel in the blur, because where an edge lies
-inside a pixel is partly lost. So coverage is sampled by cubic B-splines instead (exactly, see ``coverage``)
-and the wanted point spread, box * Gaussian, is a sum of such splines: its least-squares fit, at least 1.2
-samples to a sigma.
+and blurred afterwards has an error of up to a twelfth of a square pixel in the squared blur, because boxes partly lose
+the position of an edge inside a pixel. Therefore coverage is sampled by cubic B-splines (exactly, see ``coverage``).
+The point spread, box * Gaussian, is approximated by a sum of these splines: a least-squares fit with at least 1.2
+samples per sigma.
 
-The remaining error, for every blur from 0.1 to 20 px: an edge's profile is off by less than 5e-4 of its
-height, its position by less than 2e-4 px. A test measures both.
+The remaining error for every blur from 0.1 to 20 px: less than 5e-4 of the height of an edge's profile, and
+less than 2e-4 px of its position. A test measures both.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from cmpdesign.scene.errors import STRICT, SceneError
 
 SAMPLES_PER_SIGMA = 1.2
-REACH_SIGMA = 5.5
+REACH_SIGMA = 5.5  # extent of the point spread
 
 
 @dataclass(frozen=True)
 class Optics:
-    """Gaussian blur; ``blur_px`` is its sigma, 0 or 0.1 to 20 px."""
+    """Gaussian blur; ``blur_px`` is the sigma, 0 or 0.1 to 20 px."""
 
     __pydantic_config__: ClassVar = STRICT
 
@@ -43,8 +43,8 @@ class PointSpread:
     """A point spread function as a sum of B-splines.
 
     Attributes:
-        degree: the splines' degree: 0 (the bare pixel box) or 3.
-        oversampling: spline samples to a pixel, along x and y.
+        degree: the splines' degree: 0 (only the pixel's box) or 3.
+        oversampling: spline samples per pixel, along x and y.
         weights: (2 * reach + 1,) float32, of the samples around the pixel's centre; their sum is 1.
     """
 
@@ -59,15 +59,15 @@ class PointSpread:
 
 @lru_cache(maxsize=64)
 def make_point_spread(blur_px: float) -> PointSpread:
-    """The splines' weights for a blur; the box alone where the blur is 0."""
+    """The point spread of a blur; the pixel's box alone for blur 0."""
     if blur_px == 0:
         return PointSpread(0, 1, np.ones(1, dtype=np.float32))
     oversampling = int(np.ceil(SAMPLES_PER_SIGMA / blur_px - 1e-9))
     reach = int(np.ceil((REACH_SIGMA * blur_px + 1.0) * oversampling))
     centres = np.arange(-reach, reach + 1)
-    fine = np.arange(-(reach + 2) * 32, (reach + 2) * 32 + 1) / 32
-    splines = cubic_spline(fine[:, None] - centres) * oversampling
-    weights = np.linalg.lstsq(splines, box_gaussian(fine / oversampling, blur_px), rcond=None)[0]
+    positions = np.arange(-(reach + 2) * 32, (reach + 2) * 32 + 1) / 32
+    splines = cubic_spline(positions[:, None] - centres) * oversampling
+    weights = np.linalg.lstsq(splines, box_gaussian(positions / oversampling, blur_px), rcond=None)[0]
     weights = 0.5 * (weights + weights[::-1])
     return PointSpread(3, oversampling, (weights / weights.sum()).astype(np.float32))
 
@@ -81,7 +81,7 @@ def cubic_spline(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def box_gaussian(x: NDArray[np.float64], blur_px: float) -> NDArray[np.float64]:
-    """The wanted point spread along one axis: a unit box convolved with a Gaussian of sigma ``blur_px``."""
+    """The exact point spread along one axis: a unit box convolved with a Gaussian of sigma ``blur_px``."""
     from scipy.special import erf
 
     root = np.sqrt(2) * blur_px

@@ -15,13 +15,13 @@ Depth = TypeVar("Depth", np.uint8, np.uint16)
 
 @dataclass(frozen=True)
 class Sensor:
-    """What turns light into numbers.
+    """The image sensor.
 
     Attributes:
         noise: sigma of the white Gaussian noise, in units of an 8-bit step (noise 2 is 2/255).
-        gamma: out = 255 (in / 255) ** gamma, after the noise; 1 changes nothing.
+        gamma: out = 255 (in / 255) ** gamma, after the noise; 1: linear.
         bits: 8 or 16.
-        jpeg_quality: 1 to 100; None: not compressed. 8 bits only.
+        jpeg_quality: 1 to 100; None: no compression. 8 bits only.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -47,7 +47,7 @@ class Sensor:
 def expose_sensor(
     sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Planes (3, H, W) in 8-bit units, B, G, R -> the image (H, W, 3)."""
+    """The image (H, W, 3) of planes (3, H, W) float32 in 8-bit units, channels B, G, R; uint8 or uint16."""
     light = planes
     if sensor.noise:
         light = rng.standard_normal(planes.shape, dtype=np.float32)

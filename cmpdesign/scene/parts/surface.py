@@ -1,4 +1,4 @@
-"""The surface's state: smooth maps of the layout's plane onto itself or into space, mm to mm, one after the other."""
+"""The surface's state: smooth maps of the layout's plane to itself or into space, mm to mm, applied in sequence."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Deformation(Protocol):
     def __call__(self, xy_mm: Points, /) -> Points: ...
 
 
-def _offsets_and_bell(
+def _offsets_and_gaussian(
     xy_mm: Points, centre_mm: tuple[float, float], radius_mm: float
 ) -> tuple[Points, Points]:
-    """Offsets (N, 2) from the centre in units of the radius, and the bell exp(-r^2 / 2) as (N, 1)."""
+    """Offsets (N, 2) from the centre in units of the radius, and the Gaussian exp(-r^2 / 2) as (N, 1)."""
     offset = (xy_mm - np.asarray(centre_mm, dtype=np.float64)) / radius_mm
     return offset, np.exp(-0.5 * np.sum(offset * offset, axis=1, keepdims=True))
 
@@ -35,7 +35,7 @@ def _require_radius(radius_mm: float) -> None:
 
 @dataclass(frozen=True)
 class Press:
-    """Moves points away from (depth_mm > 0, a bulge) or towards (a pinch) a centre.
+    """Moves points away from a centre (depth_mm > 0, a bulge) or towards it (a pinch).
 
     The displacement is depth_mm * r exp((1 - r^2) / 2), r = distance / radius_mm: it peaks at the radius with
     exactly ``depth_mm``. It folds where depth_mm / radius_mm leaves (-0.61, 1.36).
@@ -51,13 +51,13 @@ class Press:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        offset, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
-        return np.asarray(xy_mm + self.depth_mm * np.exp(0.5) * bell * offset)
+        offset, gaussian = _offsets_and_gaussian(xy_mm, self.centre_mm, self.radius_mm)
+        return np.asarray(xy_mm + self.depth_mm * np.exp(0.5) * gaussian * offset)
 
 
 @dataclass(frozen=True)
 class Twist:
-    """Turns points about a centre, counter-clockwise by ``angle_deg`` there, fading as exp(-r^2 / 2)."""
+    """Rotates points about a centre, counter-clockwise by ``angle_deg`` at the centre, decaying as exp(-r^2 / 2)."""
 
     __pydantic_config__: ClassVar = STRICT
 
@@ -69,8 +69,8 @@ class Twist:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        offset, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
-        angle = np.radians(self.angle_deg) * bell[:, 0]
+        offset, gaussian = _offsets_and_gaussian(xy_mm, self.centre_mm, self.radius_mm)
+        angle = np.radians(self.angle_deg) * gaussian[:, 0]
         cos, sin = np.cos(angle), np.sin(angle)
         x, y = offset.T
         turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
@@ -79,7 +79,7 @@ class Twist:
 
 @dataclass(frozen=True)
 class Shear:
-    """Drags points by ``shift_mm`` at a centre, fading as exp(-r^2 / 2), as a contact drags the skin."""
+    """Shifts points by ``shift_mm`` at a centre, decaying as exp(-r^2 / 2), like a tangential contact."""
 
     __pydantic_config__: ClassVar = STRICT
 
@@ -91,16 +91,16 @@ class Shear:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        _, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
-        return np.asarray(xy_mm + bell * np.asarray(self.shift_mm))
+        _, gaussian = _offsets_and_gaussian(xy_mm, self.centre_mm, self.radius_mm)
+        return np.asarray(xy_mm + gaussian * np.asarray(self.shift_mm))
 
 
 @dataclass(frozen=True)
 class Dent:
-    """Moves points towards -z (depth_mm > 0), as an object does that is pressed into the front.
+    """Moves points towards -z (depth_mm > 0), like an object pressed into the front.
 
-    The depth is depth_mm * exp(-r^2 / 2), r = distance / radius_mm: the simplest surface in space. It stands for no
-    contact; ``cmpdesign.contact`` has those.
+    The depth is depth_mm * exp(-r^2 / 2), r = distance / radius_mm. This is the simplest surface in space and no model
+    of a contact; see ``cmpdesign.contact`` for contacts.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -113,32 +113,32 @@ class Dent:
         _require_radius(self.radius_mm)
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        _, bell = _offsets_and_bell(xy_mm, self.centre_mm, self.radius_mm)
-        return np.concatenate([xy_mm, -self.depth_mm * bell], axis=1)
+        _, gaussian = _offsets_and_gaussian(xy_mm, self.centre_mm, self.radius_mm)
+        return np.concatenate([xy_mm, -self.depth_mm * gaussian], axis=1)
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Deformations applied in order; any smooth callable of (N, 2) mm points will do.
+    """Deformations applied in order; a deformation is any smooth callable of (N, 2) mm points.
 
-    Each moves what the ones before it made of x and y; heights add up.
+    Each deformation maps the x and y of the deformation before. Heights are added.
     """
 
     deformations: tuple[Deformation | Callable[[Points], Points], ...]
 
     def __call__(self, xy_mm: Points, /) -> Points:
-        """Positions (N, 2) in mm after all deformations, (N, 3) where one of them leads out of the plane."""
+        """Positions (N, 2) in mm after all deformations; (N, 3) where one of them leaves the plane."""
         height: Points | None = None
         for deform in self.deformations:
-            at = deform(xy_mm)
-            xy_mm = at[:, :2]
-            if at.shape[1] == 3:
-                height = at[:, 2] if height is None else height + at[:, 2]
+            deformed = deform(xy_mm)
+            xy_mm = deformed[:, :2]
+            if deformed.shape[1] == 3:
+                height = deformed[:, 2] if height is None else height + deformed[:, 2]
         return xy_mm if height is None else np.column_stack([xy_mm, height])
 
 
 def composed(*deformations: Deformation | Callable[[Points], Points]) -> Surface:
-    """The surface after these deformations, the first one first."""
+    """The surface after these deformations, applied in the given order."""
     return Surface(tuple(deformations))
 
 
@@ -146,7 +146,7 @@ def require_no_fold(surface: Callable[[Points], Points], xy_mm: Points, step_mm:
     """Check the map's Jacobian determinant (central differences over ``step_mm``) at the points (N, 2).
 
     Raises:
-        SceneError: the map folds or is not finite somewhere; names the place and the determinant.
+        SceneError: the map folds or is not finite; the message names the position and the determinant.
     """
     jacobian = jacobian_determinant(surface, xy_mm, step_mm)
     folded = ~(jacobian > 0)  # also catches NaN
@@ -162,13 +162,13 @@ def require_no_fold(surface: Callable[[Points], Points], xy_mm: Points, step_mm:
 def jacobian_determinant(mapped: Callable[[Points], Points], xy_mm: Points, step_mm: float) -> Points:
     """(N,) the Jacobian determinant of a map of (N, 2) points to (N, 2), by central differences over ``step_mm``."""
     x_step, y_step = np.array([step_mm, 0.0]), np.array([0.0, step_mm])
-    along_x = (mapped(xy_mm + x_step) - mapped(xy_mm - x_step)) / (2 * step_mm)
-    along_y = (mapped(xy_mm + y_step) - mapped(xy_mm - y_step)) / (2 * step_mm)
-    return np.asarray(along_x[:, 0] * along_y[:, 1] - along_x[:, 1] * along_y[:, 0])
+    by_x = (mapped(xy_mm + x_step) - mapped(xy_mm - x_step)) / (2 * step_mm)
+    by_y = (mapped(xy_mm + y_step) - mapped(xy_mm - y_step)) / (2 * step_mm)
+    return np.asarray(by_x[:, 0] * by_y[:, 1] - by_x[:, 1] * by_y[:, 0])
 
 
 def fold_check_points(markers_mm: Points, cells: Sequence[NDArray[np.int32]] | NDArray[np.int32]) -> Points:
-    """Markers, cell centroids and cell sides' midpoints (N, 2) mm: close enough together to catch a fold."""
+    """(N, 2) mm: markers, cell centroids and midpoints of cell sides, dense enough to detect a fold."""
     corners = markers_mm[np.asarray(cells)]
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
     return np.concatenate([markers_mm, corners.mean(axis=1), middles.reshape(-1, 2)])

@@ -11,7 +11,7 @@ from cmpdesign.contact import Ball, Contact, Elastomer, Motion, solve
 
 DOTS_PER_INCH = 110
 INK, FAINT, ACCENT = "#2b2f36", "#6a7078", "#c8322d"
-LAYER, BALL = Elastomer(4.0, 0.3), Ball(10.0)
+ELASTOMER, BALL = Elastomer(4.0, 0.3), Ball(10.0)
 MOTIONS = (Motion(1.0), Motion(1.0, (0.6, 0.0)))
 SIZE_MM, GRID, SHOWN_MM = (24.0, 24.0), 120, 8.0
 
@@ -24,7 +24,7 @@ def figures() -> dict[str, bytes]:
     import matplotlib.pyplot as plt
 
     pressed, sheared = (
-        solve(LAYER, BALL, motion, friction=0.5, size_mm=SIZE_MM, grid=GRID) for motion in MOTIONS
+        solve(ELASTOMER, BALL, motion, friction=0.5, size_mm=SIZE_MM, grid=GRID) for motion in MOTIONS
     )
     with plt.rc_context({"font.family": "DejaVu Sans", "text.color": INK, "font.size": 9}):
         figure, axes = plt.subplots(
@@ -49,10 +49,10 @@ def _pressure(axes: Any, contact: Contact) -> None:
 
 
 def _section(axes: Any, contact: Contact) -> None:
-    """The surface along y = 0, drawn to scale, with lines that were upright and evenly spaced."""
+    """The surface along y = 0, to scale, with points that were evenly spaced."""
     x = np.linspace(-SHOWN_MM, SHOWN_MM, 400)
     line = contact.surface()(np.stack([x, 0 * x], axis=1))
-    support = -LAYER.thickness_mm
+    support = -ELASTOMER.thickness_mm
     axes.fill_between(line[:, 0], line[:, 2], support, color="#dfe6ee", lw=0)
     axes.plot(line[:, 0], line[:, 2], color=INK, lw=1.6)
     marks = contact.surface()(np.stack([np.arange(-7.5, 7.6, 1.5), np.zeros(11)], axis=1))
@@ -83,7 +83,7 @@ def _slip(axes: Any, contact: Contact) -> None:
 
 
 def _arrows(axes: Any, contact: Contact, times: float) -> None:
-    """Displacement in the plane, some times its size."""
+    """In-plane displacement, enlarged ``times``."""
     every = (slice(2, None, 6), slice(2, None, 6))
     x, y = np.meshgrid(contact.x_mm, contact.y_mm)
     axes.quiver(

@@ -1,4 +1,4 @@
-"""The drawings of docs/conventions.md. Ids, colors and places come from real layouts."""
+"""The drawings of docs/conventions.md. Ids, colors and positions come from real layouts."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ def figures() -> dict[str, bytes]:
 
 
 def small(layers: int, border_mm: float = 0.35) -> Layout:
+    """A honeycomb layout with a pitch of 1 mm."""
     return build_layout(Design(pattern="honeycomb", layers=layers, pitch_mm=1.0, border_mm=border_mm))
 
 
@@ -96,15 +97,20 @@ def pixel_centre() -> Sketch:
 
 
 def numbering() -> Sketch:
-    """Ids of the layers 0 to 2 and the way in which they run."""
+    """Ids of the layers 0 to 2 and their order."""
     sketch = Sketch((620, 500), (-3.45, -2.78, 3.75, 3.03))
     layout = small(2, 0.5)
     sketch.cells(layout)
     for layer in (1, 2):
-        ring = layout.marker_xy_mm[layout.marker_layer == layer]
-        for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        ring_xy = layout.marker_xy_mm[layout.marker_layer == layer]
+        for start, end in zip(ring_xy, np.roll(ring_xy, -1, axis=0), strict=True):
             sketch.line(start, end, YELLOW, 1.6)
-        sketch.arrow(ring[0] + 0.3 * (ring[1] - ring[0]), ring[0] + 0.68 * (ring[1] - ring[0]), YELLOW, 3.0)
+        sketch.arrow(
+            ring_xy[0] + 0.3 * (ring_xy[1] - ring_xy[0]),
+            ring_xy[0] + 0.68 * (ring_xy[1] - ring_xy[0]),
+            YELLOW,
+            3.0,
+        )
     sketch.line((0, 0), 1.42 * layout.marker_xy_mm[7], ACCENT, 1.6, "5 4")
     for marker, xy in enumerate(layout.marker_xy_mm):
         sketch.dot(xy, 11 if marker < 10 else 12, WHITE, INK)
@@ -170,10 +176,10 @@ def edges() -> Sketch:
     sketch.cells(layout)
     colored = layout.cell_color != BLACK
     sides = np.stack([layout.cell_corners, np.roll(layout.cell_corners, -1, axis=1)], axis=-1)
-    seen = {tuple(sorted(pair)) for pair in sides[colored].reshape(-1, 2).tolist()}
+    with_contrast = {tuple(sorted(pair)) for pair in sides[colored].reshape(-1, 2).tolist()}
     for start, end in layout.edges.tolist():
         ends = layout.marker_xy_mm[[start, end]]
-        if (start, end) in seen:
+        if (start, end) in with_contrast:
             sketch.line(*ends, "#dfe3e8", 1.0)
         else:
             sketch.line(*ends, YELLOW, 2.4, "5 4")

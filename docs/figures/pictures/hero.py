@@ -14,7 +14,7 @@ from .sample import Sample, sample
 
 DOTS_PER_INCH = 110
 INK, FAINT = "#2b2f36", "#6a7078"
-# Left, top, right, bottom of the parts of the frame that are shown.
+# Left, top, right, bottom of the shown parts of the frame.
 IDS_WINDOW_PX = (225, 136, 415, 278.5)
 ARROWS_WINDOW_PX = (115, 65, 475, 335)
 
@@ -111,7 +111,7 @@ def _outline() -> list[Any]:
 
 
 def _quantised(png: bytes) -> bytes:
-    """Colors in steps of 4, which the eye does not see and PNG packs better."""
+    """Colors in steps of 4, which are invisible and compress better as PNG."""
     import cv2
 
     image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)

@@ -1,4 +1,4 @@
-"""The sample that the pictures show: the template tac3d, at rest and pressed, rendered and extracted."""
+"""The sample of the pictures: the template tac3d, at rest and pressed, rendered and extracted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from extractor import Extractor, Markers, Reference, parse_layout
 
 SIZE = (640, 480)
 CAMERA = Camera(pitch_px=21.0, rotation_deg=9.0, tilt_deg=12.0, tilt_axis_deg=25.0)
-# A ball that bulges the surface beside the centre and drags it along.
+# A press with shear beside the centre.
 CONTACT = composed(Press(4.5, 1.0, (-2.5, 1.5)), Shear(5.0, (0.55, -0.35), (-2.5, 1.5)))
 BEHIND = Gradient((150.0, 150.0, 152.0), (96.0, 97.0, 100.0), 60.0)
 

@@ -1,4 +1,4 @@
-"""What the scene templates show: one picture with all of them."""
+"""One picture of all scene templates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cmpdesign.scene import Scene, load_scene, render
 ORDER = ("flat-print", "pressed-ball", "tac3d-binocular", "press-and-twist")
 TILE_PX = (400, 300)
 GAP_PX = 8
-STEP = 8  # of the colors: what PNG packs better
+STEP = 8  # of the colors, which compresses better as PNG
 
 
 def figures() -> dict[str, bytes]:
@@ -31,19 +31,19 @@ def figures() -> dict[str, bytes]:
 def _tiles() -> Iterator[tuple[str, NDArray[np.uint8]]]:
     layout = build_layout(load_design("tac3d"))
     for name in ORDER:
-        file = load_scene(scene_templates()[name], layout)
-        *_, last = file.scenes()
-        picture = render(_quiet(last), size=file.size_px).image
+        scene_file = load_scene(scene_templates()[name], layout)
+        *_, last_scene = scene_file.scenes()
+        picture = render(_quiet(last_scene), size=scene_file.size_px).image
         yield name, _scaled(picture.astype(np.uint8))
 
 
 def _quiet(scene: Scene) -> Scene:
-    """Without noise, which a small file cannot hold."""
+    """The scene without noise, which would need a large file."""
     return replace(scene, sensor=None)
 
 
 def _scaled(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Into the middle of a tile, as large as fits."""
+    """The picture in the middle of a tile, as large as fits."""
     import cv2
 
     height, width = picture.shape[:2]

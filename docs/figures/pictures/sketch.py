@@ -1,4 +1,4 @@
-"""Line drawings as SVG: a sheet with y up in units of its own, arrows, labels, cells of a layout."""
+"""Line drawings as SVG with y up and their own units: arrows, labels, cells of a layout."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Point = tuple[float, float] | NDArray[np.float64]
 
 
 class Sketch:
-    """A drawing of ``size`` px; ``window`` (left, bottom, right, top) is what its own units show, y up."""
+    """A drawing of ``size`` px that shows ``window`` (left, bottom, right, top) in its own units, y up."""
 
     def __init__(self, size: tuple[int, int], window: tuple[float, float, float, float]) -> None:
         import svgwrite
@@ -46,7 +46,7 @@ class Sketch:
         self._svg.add(self._svg.circle(self.px(at), radius_px, fill=fill, stroke=stroke, stroke_width=1.2))
 
     def text(self, at: Point, words: str, size: float = 13, color: str = INK, **options: Any) -> None:
-        """``anchor`` start, middle or end; ``bold``; ``halo``: a color behind the letters."""
+        """Write a text. Options: ``anchor`` start, middle or end; ``bold``; ``halo``, a color behind the letters."""
         x, y = self.px(at)
         style: dict[str, Any] = {
             "font_family": FONT,
@@ -70,7 +70,7 @@ class Sketch:
     def turn(
         self, centre: Point, radius: float, start_deg: float, end_deg: float, color: str = ACCENT
     ) -> None:
-        """A round arrow about ``centre``, angles counter-clockwise from the right."""
+        """Draw an arc with an arrowhead about ``centre``, angles counter-clockwise from the right."""
         angles = np.radians(np.linspace(start_deg, end_deg, 40))
         places = [self.px(np.asarray(centre) + radius * np.array([np.cos(a), np.sin(a)])) for a in angles]
         self._svg.add(self._svg.polyline(places[:-2], fill="none", stroke=color, stroke_width=2.2))
@@ -87,7 +87,7 @@ class Sketch:
         self._svg.add(self._svg.polygon([tuple(np.round(c, 2).tolist()) for c in corners], fill=color))
 
     def cells(self, layout: Layout, shift: Point = (0, 0), mirrored: bool = False) -> None:
-        """The ground and the colored cells of a layout, its millimetres taken for this drawing's units."""
+        """Draw the ground and the colored cells of a layout; millimetres are the drawing's units."""
 
         def placed(points: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.asarray(points * ((-1 if mirrored else 1), 1) + np.asarray(shift))

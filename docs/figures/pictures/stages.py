@@ -1,4 +1,4 @@
-"""The extractor's tour: what every stage makes of the pressed sample."""
+"""The results of the extractor's stages for the pressed sample."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .sample import SIZE, sample
 
 Picture = NDArray[np.uint8]
 
-# The part of the frame that is shown, and stages that are shown as a whole.
+# The shown part of the frame, and the stages that are shown completely.
 WINDOW_PX = (150, 75, 410, 270)  # left, top, right, bottom
 WHOLE = ("target",)
 WIDTH_PX = 520
@@ -44,6 +44,6 @@ def _reduced(picture: Picture, width: int) -> Picture:
 
 
 def _png(picture: Picture) -> bytes:
-    """Colors in steps of 8, which the eye does not see in a drawing and PNG packs better."""
+    """Colors in steps of 8, which are invisible in a drawing and compress better as PNG."""
     stepped = (picture // 8 * 8 + 4).astype(np.uint8)
     return bytes(cv2.imencode(".png", stepped, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1])

@@ -1,4 +1,4 @@
-"""A reconstructed surface: what two views see of a pressed ball, and what they make of it."""
+"""A reconstructed surface: the image of two views of a pressed ball, and the reconstruction."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def figures() -> dict[str, bytes]:
 
 
 def _map(figure: Any, axis: Any, layout: Layout, reconstructor: Reconstructor, shape: Shape) -> None:
-    """Height by color, motion within the plane by arrows, at the markers and between them."""
+    """Height by color, at and between the markers; in-plane displacement of the markers by arrows."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
     x, y = np.meshgrid(*(np.arange(low[k], high[k], STEP_MM) for k in (0, 1)))
     grid = np.column_stack([x.ravel(), y.ravel()])
@@ -78,7 +78,7 @@ def _map(figure: Any, axis: Any, layout: Layout, reconstructor: Reconstructor, s
 
 
 def _packed(png: bytes) -> bytes:
-    """Colors in steps of 8, as the other pictures."""
+    """Colors in steps of 8, as in the other pictures."""
     pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
     stepped: NDArray[np.uint8] = (np.asarray(pixels) // 8 * 8 + 4).astype(np.uint8)
     return bytes(cv2.imencode(".png", stepped, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1])
