@@ -1,4 +1,4 @@
-"""``make demo``: from a design to a verified sample in three commands, compared with the ground truth."""
+"""``make demo``: three commands from a design to a verified sample, and a comparison with the ground truth."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class DemoScore:
     """Markers against the ground truth.
 
     Attributes:
-        visible: markers that the image shows.
-        measured, repaired, lost: how many of them were found, and how.
-        wrong: markers that lie nearer to another marker's true place than to their own.
+        visible: number of markers that the image shows.
+        measured, repaired, lost: numbers of visible markers by status.
+        wrong: number of markers that are nearer to another marker's true place than to their own.
         rms_px: root mean square error of the measured markers, per axis.
-        max_px: the largest distance from the true place.
+        max_px: largest distance of a measured marker from its true place.
     """
 
     visible: int
@@ -55,12 +55,12 @@ def score_markers(markers: Markers, truth: Truth) -> DemoScore:
     nearest = cKDTree(truth.marker_xy_px).query(markers.xy_px[found])[1]
     measured = status == 1
     error = markers.xy_px[measured] - truth.marker_xy_px[measured]
-    seen = status[truth.visible]
+    visible = status[truth.visible]
     return DemoScore(
-        visible=len(seen),
-        measured=int((seen == 1).sum()),
-        repaired=int((seen >= 2).sum()),
-        lost=int((seen == 0).sum()),
+        visible=len(visible),
+        measured=int((visible == 1).sum()),
+        repaired=int((visible >= 2).sum()),
+        lost=int((visible == 0).sum()),
         wrong=int((nearest != found).sum()),
         rms_px=float(np.sqrt(np.mean(error**2))) if len(error) else float("nan"),
         max_px=float(np.hypot(*error.T).max()) if len(error) else float("nan"),
@@ -68,7 +68,7 @@ def score_markers(markers: Markers, truth: Truth) -> DemoScore:
 
 
 def main() -> int:
-    """Run the commands, print the table; returns the worst exit code."""
+    """Run the commands and print the table; the exit code of the first command that fails, or 0."""
     from cmpdesign.cli.app import app
     from cmpdesign.cli.terminal import console
 
@@ -83,7 +83,7 @@ def main() -> int:
 
 
 def _measure_table() -> Table:
-    """The sample once more, warm: figures against the truth, and the median run's stages."""
+    """Extract the sample again, warm: the score against the truth, and the stages of the median run."""
     from cmpdesign.files.images import read_image
     from cmpdesign.scene import load_truth
     from extractor import Extractor, load_layout
@@ -97,7 +97,7 @@ def _measure_table() -> Table:
     )
 
 
-def _make_table(figures: DemoScore, markers: Markers, size: str) -> Table:
+def _make_table(score: DemoScore, markers: Markers, size: str) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -107,13 +107,13 @@ def _make_table(figures: DemoScore, markers: Markers, size: str) -> Table:
     table.add_column("stage", min_width=12)
     table.add_column("ms", justify="right", min_width=6)
     left = [
-        ("visible", f"{figures.visible}"),
-        ("measured", f"{figures.measured}"),
-        ("repaired", f"{figures.repaired}"),
-        ("lost", f"{figures.lost}"),
-        ("wrong ids", f"{figures.wrong}"),
-        ("RMS error per axis", f"{figures.rms_px:.4f} px"),
-        ("largest error", f"{figures.max_px:.4f} px"),
+        ("visible", f"{score.visible}"),
+        ("measured", f"{score.measured}"),
+        ("repaired", f"{score.repaired}"),
+        ("lost", f"{score.lost}"),
+        ("wrong ids", f"{score.wrong}"),
+        ("RMS error per axis", f"{score.rms_px:.4f} px"),
+        ("largest error", f"{score.max_px:.4f} px"),
     ]
     times = markers.timings_ms
     right = [(name, f"{ms:.2f}") for name, ms in times.items()]

@@ -1,4 +1,4 @@
-"""The command line: it parses, calls and prints; one file a command; nothing heavy until one runs."""
+"""The command line: parses, calls and prints. One file per command; heavy modules are imported when a command runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The application: its commands, and the one place where errors become a line and an exit code."""
+"""The application: its commands, and the conversion of errors into a line and an exit code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from cmpdesign.cli.terminal import EXIT_BAD_INPUT, is_expected, print_error
 
 
 class OneLineErrors(TyperGroup):
-    """Errors raised on purpose end as one line on stderr and exit code 2, never as a traceback."""
+    """Prints expected errors as one line on stderr, with exit code 2 and without a traceback."""
 
     def invoke(self, ctx: Any) -> Any:
         try:

@@ -1,4 +1,4 @@
-"""What the commands share that follow a source to its end."""
+"""Progress and exit codes of the commands that run from a source: ``track`` and ``reconstruct``."""
 
 from __future__ import annotations
 
@@ -19,10 +19,14 @@ EXIT_INTERRUPTED = 130
 
 
 def run_with_progress(run: TrackingRun, doing: str) -> None:
-    """Run to the end, or to the first Ctrl-C, with a bar that says what is being done.
+    """Run to the end or to the first Ctrl-C, with a progress bar.
+
+    Args:
+        run: the run.
+        doing: text of the progress bar.
 
     Raises:
-        OutputError: something could not be written.
+        OutputError: a file could not be written.
     """
     from cmpdesign.tracking.run import stop_on_signal
 
@@ -32,7 +36,7 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
 
 @contextmanager
 def _progress_bar(run: TrackingRun, doing: str) -> Iterator[Callable[[Any], None]]:
-    """A bar on stderr where a terminal shows it: frames, and how many are tracked."""
+    """A progress bar on stderr (if a terminal): frames and tracked frames; yields the function to call per frame."""
     terminal = console(stderr=True)
     if not terminal.is_terminal:
         yield lambda frame: None
@@ -50,24 +54,32 @@ def _progress_bar(run: TrackingRun, doing: str) -> Iterator[Callable[[Any], None
     with Progress(*columns, console=terminal, transient=True) as progress:
         task = progress.add_task(doing, total=total, note="")
         yield lambda frame: progress.update(
-            task, advance=1, note=f"{run.tally.tracked} tracked, {frame.elapsed_ms:.1f} ms"
+            task, advance=1, note=f"{run.statistics.tracked} tracked, {frame.elapsed_ms:.1f} ms"
         )
 
 
 def exit_with_status(run: TrackingRun) -> None:
-    """The exit code: 0 done, 1 ended early or nothing tracked, 130 stopped by hand."""
-    if run.stop.asked:
-        by_design = run.source.name.startswith("camera")  # there is no other way to end a camera's run
-        raise typer.Exit(0 if by_design else EXIT_INTERRUPTED)
-    if not run.tally.frames:
+    """Exit with 1 if the run ended early or tracked nothing, with 130 if it was stopped by hand.
+
+    Raises:
+        CmpDesignError: no frame could be read.
+    """
+    if run.stop.is_requested:
+        is_camera = run.source.name.startswith("camera")  # a stop is the only way to end a camera's run
+        raise typer.Exit(0 if is_camera else EXIT_INTERRUPTED)
+    if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:
         print_warning(f"{run.ended_early}; these are written")
-    if run.ended_early or not run.tally.tracked:
+    if run.ended_early or not run.statistics.tracked:
         raise typer.Exit(EXIT_NOT_TRACKED)
 
 
 def require_positive(option: str, value: float | None) -> None:
-    """A number above 0, where one is given."""
+    """Check that the value of an option is finite and above 0, or not given.
+
+    Raises:
+        CmpDesignError: another value.
+    """
     if value is not None and not 0 < value < float("inf"):
         raise CmpDesignError(f"{option} is {value:g}; expected a number above 0")

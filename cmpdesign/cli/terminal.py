@@ -1,4 +1,4 @@
-"""What all commands share in talking to the terminal."""
+"""Output to the terminal for all commands."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ EXIT_BAD_INPUT = 2
 
 
 def console(stderr: bool = False) -> Console:
-    """Plain text where no terminal reads it; values are never taken for markup."""
+    """A console on stdout or stderr: plain text without a terminal; markup in values is not interpreted."""
     from rich.console import Console
 
     return Console(stderr=stderr, highlight=False, markup=False, soft_wrap=True)
 
 
 def is_expected(error: BaseException) -> bool:
-    """True for the errors raised on purpose, by either package; the extractor is not imported to ask."""
+    """True for errors that either package raises on purpose; does not import the extractor."""
     from_extractor = sys.modules.get("extractor.errors")
     if from_extractor is not None and isinstance(error, from_extractor.ExtractorError):
         return True
@@ -41,6 +41,6 @@ def print_warning(text: str) -> None:
 
 
 def printable_path(path: object) -> str:
-    """A path as it may go to a terminal."""
+    """The path as text, with unprintable characters escaped."""
     text = str(path)
     return text if text.isprintable() else ascii(text)

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: written beside their place, then renamed."""
+"""Atomic writing of files: a complete file is written next to its place, then renamed."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from cmpdesign.errors import OutputError
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
-    """Write text (UTF-8, "\\n") or bytes; what stood there before stays until the new file is complete.
+    """Write text (UTF-8, "\\n") or bytes; an earlier file stays until the new file is complete.
 
     Raises:
-        OutputError: the file cannot be written.
+        OutputError: the file cannot be written; an earlier file is unchanged.
     """
     path = Path(path)
     with _as_output_error(path):
@@ -32,13 +32,13 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
 
     Args:
         folder: made if missing.
-        files: name -> content; a name may lead into sub-folders ("laser/1-red.svg"), which are made.
+        files: name -> content; sub-folders in a name ("laser/1-red.svg") are made.
 
     Returns:
         The paths in the order of ``files``.
 
     Raises:
-        OutputError: one of them cannot be written; then none of them has been replaced.
+        OutputError: a file cannot be written; no file has been replaced.
     """
     folder = Path(folder)
     paths = [folder / name for name in files]
@@ -57,7 +57,7 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
 
 
 def _write_and_sync(path: Path, content: str | bytes) -> None:
-    """Write and sync: a full disk shows here, not after the rename."""
+    """Write and sync, so that a full disk raises an error here and not after the rename."""
     data = content.encode("utf-8") if isinstance(content, str) else content
     with path.open("wb") as file:
         file.write(data)

@@ -1,7 +1,7 @@
-"""Files that an earlier build left in a product's folder and this one no longer makes: they are taken away.
+"""Removal of files that an earlier build wrote into a product's folder and this build does not make.
 
-Each folder that a build fills holds a list of what was written, with digests. Only what is on the list and still as
-it was written is removed: nothing of the user's, and nothing that was changed since.
+Each product's folder holds a list of the written files with digests. Only files on the list with an unchanged digest
+are removed, so files of the user and changed files stay.
 """
 
 from __future__ import annotations
@@ -16,50 +16,56 @@ LIST_NAME = ".cmpdesign-files.json"
 
 
 def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict[str, str | bytes]:
-    """The files, and in each of these folders that they fill the list of those in it.
+    """Add the list of files of every folder that has files.
 
     Args:
         files: path relative to the output folder, with "/" -> content.
         folders: products' folders, as "mold/".
+
+    Returns:
+        The files and the lists.
     """
     result = dict(files)
     for folder in folders:
-        made = {
+        digests = {
             path.removeprefix(folder): _content_digest(data)
             for path, data in files.items()
             if path.startswith(folder)
         }
-        if made:
-            document = {"format": "cmp-files", "version": 1, "sha256": dict(sorted(made.items()))}
+        if digests:
+            document = {"format": "cmp-files", "version": 1, "sha256": dict(sorted(digests.items()))}
             result[folder + LIST_NAME] = json.dumps(document, indent=1) + "\n"
     return result
 
 
 def find_stale_files(output: Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """What earlier builds' lists name, this build does not make, and nobody has changed.
+    """Find unchanged files that are on earlier lists and that this build does not make.
 
     Args:
-        output: the output folder, before this build is written.
-        files: this build's, with its lists.
+        output: the output folder, before the files of this build are written.
+        files: files of this build with lists, from ``files_with_lists``.
+
+    Returns:
+        Sorted paths.
     """
     found = []
     for name in files:
         if PurePosixPath(name).name != LIST_NAME:
             continue
         folder = (output / name).parent
-        kept = {output / other for other in files}
-        for path, digest in _read_file_list(output / name).items():
-            stale = folder / path
-            if stale not in kept and _is_below(stale, folder) and _is_unchanged(stale, digest):
-                found.append(stale)
+        current = {output / other for other in files}
+        for listed, digest in _read_file_list(output / name).items():
+            path = folder / listed
+            if path not in current and _is_below(path, folder) and _is_unchanged(path, digest):
+                found.append(path)
     return sorted(found)
 
 
 def remove_files(paths: Iterable[Path]) -> list[Path]:
-    """Remove files, and their folders where that leaves them empty; those that went."""
+    """Remove files, and folders that become empty; the removed files."""
     removed = []
     for path in paths:
-        # What cannot be removed stays; it does no harm.
+        # A file that cannot be removed stays without harm.
         with suppress(OSError):
             path.unlink()
             removed.append(path)
@@ -68,7 +74,7 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
 
 
 def _read_file_list(path: Path) -> dict[str, str]:
-    """An earlier list; none where there is none, or one that cannot be understood."""
+    """File name -> digest from an earlier list; empty without a valid list."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if (document["format"], document["version"]) != ("cmp-files", 1):
@@ -79,7 +85,7 @@ def _read_file_list(path: Path) -> dict[str, str]:
 
 
 def _is_below(path: Path, folder: Path) -> bool:
-    """A list may have been edited: nothing outside its folder is touched, nor through links."""
+    """True if the path lies below the folder without links; an edited list may name other paths."""
     return (
         path.resolve() == folder.resolve() / path.relative_to(folder)
         if path.is_relative_to(folder)

@@ -1,4 +1,4 @@
-"""Image files as arrays, whatever camera or program wrote them."""
+"""Reading of image files as arrays, and writing of PNG."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class ImageFileError(CmpDesignError, ValueError):
-    """A file that holds no color picture that markers could be found in."""
+    """A file that is not a color image of sufficient size."""
 
 
 def read_image(path: str | Path) -> Image:
-    """An image file's pixels.
+    """Read the pixels of an image file.
 
-    An alpha channel is dropped. A rotation noted in EXIF is not applied: the sensor's pixels are measured.
+    An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured.
 
     Returns:
         (H, W, 3) uint8 or uint16, BGR.
 
     Raises:
-        ImageFileError: the file cannot be read, is no image, has one channel, is no 8- or 16-bit image, or is
+        ImageFileError: the file cannot be read, is no image, has one channel, has other than 8 or 16 bits, or is
             smaller than 16 x 16 pixels.
     """
     import cv2
@@ -44,7 +44,7 @@ def read_image(path: str | Path) -> Image:
         raise ImageFileError(f"{path}: is empty; expected an image")
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # what OpenCV refuses to decode: too many pixels, a type that it does not know
+    except cv2.error:  # OpenCV refuses to decode: too many pixels, or an unknown type
         pixels = None
     if pixels is None:
         raise ImageFileError(
@@ -70,7 +70,7 @@ def _to_bgr(pixels: NDArray[Any], path: Path) -> Image:
 
 
 def to_png(pixels: Image) -> bytes:
-    """A (H, W, 3) BGR picture as the bytes of a PNG file."""
+    """Encode a (H, W, 3) BGR image as PNG."""
     import cv2
 
     return bytes(cv2.imencode(".png", pixels)[1])

@@ -1,4 +1,4 @@
-"""layout.json, version 1: columns, mm, UTF-8, the same bytes for the same layout. The format is in docs/."""
+"""Writing of ``layout.json``, version 1: columns, mm, UTF-8, the same bytes for the same layout. See docs/."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write_layout(layout: Layout, path: str | Path) -> None:
 
 
 def layout_to_json(layout: Layout) -> str:
-    """The layout file's text, one column a line; numbers are the shortest that read back exactly."""
+    """Format the layout file, one column per line; numbers are the shortest that read back exactly."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -61,7 +61,7 @@ def layout_to_json(layout: Layout) -> str:
 
 
 def _format_object(value: Mapping[str, Any], indent: str) -> str:
-    """An object with one member a line; lists stay on theirs."""
+    """Format an object with one member per line; a list stays on one line."""
     inner = indent + "  "
     lines = [
         f"{inner}{_format_value(key)}: "

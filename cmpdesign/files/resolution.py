@@ -1,19 +1,20 @@
-"""What an image file says of its own resolution, where that can be believed."""
+"""The resolution that an image file states, if the statement is plausible."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-# Cameras and programs that know no resolution write 72 or 96; no scan as coarse shows a sheet's code.
+# Cameras and programs without a resolution write 72 or 96; the code of a sheet is not legible in such coarse scans.
 LEAST_DPI = 100.0
-# EXIF: the camera's own directory; time and aperture of an exposure, which no scanner has.
+# EXIF: directory of the camera; time and aperture of an exposure, which scanners do not write.
 _CAMERA, _EXPOSURE = 0x8769, (0x829A, 0x829D)
 
 
 def resolution_dpi(path: str | Path) -> tuple[float, float] | str:
-    """Pixels per inch in x and y as the file states them, or in a few words why it does not.
+    """Read the resolution of a PNG (pHYs), JPEG (JFIF or EXIF), TIFF or BMP file.
 
-    Read are PNG (pHYs), JPEG (JFIF or EXIF), TIFF and BMP.
+    Returns:
+        Pixels per inch in x and y, or a text that states the reason for the failure.
     """
     from PIL import Image, UnidentifiedImageError
 

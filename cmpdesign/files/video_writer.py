@@ -1,4 +1,4 @@
-"""Frames into a video file, which appears whole or not at all."""
+"""Atomic writing of a video file, frame by frame."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}  # FFV1 is lossless
 
 
 class VideoWriter:
-    """Writes beside the file's place; ``close`` completes it.
+    """Writes frames to ``<stem>.part<suffix>``; ``close`` completes and renames the file.
 
     Args:
-        path: its ending is one of ``CODECS``.
-        fps: frames a second.
+        path: file with a suffix of ``CODECS``.
+        fps: frames per second.
     """
 
     def __init__(self, path: Path, fps: float) -> None:
@@ -27,7 +27,7 @@ class VideoWriter:
         self._writer: Any = None
 
     def add(self, picture: NDArray[np.uint8]) -> None:
-        """Append a frame (H, W, 3) BGR, as large as the first one.
+        """Append a frame (H, W, 3) BGR of the size of the first frame.
 
         Raises:
             OutputError: the video cannot be written.
@@ -50,10 +50,10 @@ class VideoWriter:
             raise OutputError(f"{self._path}: cannot be written as a video")
 
     def close(self) -> None:
-        """Complete the video and look whether it can be read: OpenCV reports no full disk.
+        """Complete the video and check the number of frames, because OpenCV does not report a full disk.
 
         Raises:
-            OutputError: it is not complete, or cannot take its place.
+            OutputError: frames are missing, or the file cannot be renamed.
         """
         import cv2
 
@@ -73,7 +73,7 @@ class VideoWriter:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
     def discard(self) -> None:
-        """Leave nothing behind."""
+        """Remove the unfinished file."""
         if self._writer is not None:
             self._writer.release()
             self._part.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Layout files and pictures read back: a ``Layout`` from ``layout.json``, and the verdict on a picture.
+"""Reading of layout files, and verification of images against a layout.
 
 In: a layout file, images. Out: a ``Layout``; a ``Verdict`` with its reason.
 """

@@ -1,4 +1,4 @@
-"""A written layout file as a ``Layout`` again, so that scenes show what was handed to the printer."""
+"""Reading of a layout file as a ``Layout``, so that scenes show the pattern as printed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def read_layout(path: str | Path) -> Layout:
-    """The layout in a ``layout.json``, read and checked by the extractor's own reader.
+    """Read a ``layout.json`` with the extractor's reader, which checks the file.
 
     Raises:
         extractor.errors.LayoutError: the file cannot be read or contradicts itself.
@@ -23,7 +23,7 @@ def read_layout(path: str | Path) -> Layout:
 
 
 def layout_from_reference(reference: Reference) -> Layout:
-    """The same values under the generator's names; the arrays are shared (both sides hold them read-only)."""
+    """Convert a ``Reference`` to a ``Layout``; both share the read-only arrays."""
     return Layout(
         pattern=reference.pattern,
         parameters=reference.parameters,

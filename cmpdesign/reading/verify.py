@@ -1,6 +1,6 @@
-"""Is this picture the pattern that the layout describes, seen and numbered as designed?
+"""Verification of an image against a layout: pattern, colors, numbering and viewed side.
 
-The colors are judged here once more, from picture and layout alone, without the extractor's own bookkeeping.
+The colors are checked from image and layout alone, independently of the extractor's classification.
 """
 
 from __future__ import annotations
@@ -20,26 +20,27 @@ if TYPE_CHECKING:
     from extractor.layout.reference import Reference
     from extractor.result import Markers
 
+# Least share of the present markers that must be measured.
 MIN_SHARE = 0.9
-# How far samples lie from a cell's centre towards its corners: clear of the blurred edges.
+# Place of samples from a cell's centre (0) to a corner (1), clear of the blurred edges.
 _SAMPLE_REACH = 0.35
-# Share of the inks' chroma: below it a cell shows no color of its own (glare, dust, black).
+# Least chroma of a colored cell, as a share of the inks' chroma; glare, dust and black are below.
 _MIN_CHROMA_SHARE = 0.4
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What was found in one image.
+    """The verdict on one image.
 
     Attributes:
-        verified: reference found, no contradiction, enough markers measured, view side as designed.
-        reason: one sentence that says why not; None when verified.
-        present: markers that can be seen in this layout.
-        measured, repaired, fitted, lost: how many of them.
+        verified: markers found, no contradiction, enough markers measured, viewed side as designed.
+        reason: one sentence on the failure; None when verified.
+        present: number of markers that are visible in this layout.
+        measured, repaired, fitted, lost: numbers of present markers by status.
         share: measured / present.
-        mirrored: seen from the back; None when nothing was found.
-        contradictions: cells whose color in the image is not the layout's.
-        markers: the extraction's result.
+        mirrored: the image shows the back; None when no marker was found.
+        contradictions: cells whose color in the image contradicts the layout.
+        markers: result of the extraction.
     """
 
     verified: bool
@@ -75,15 +76,16 @@ class Verdict:
 
 
 def verify(extractor: Extractor, reference: Reference, image: Image, min_share: float = MIN_SHARE) -> Verdict:
-    """Extract one image and judge it.
+    """Extract the markers of one image and judge them.
 
     Args:
-        extractor: made for ``reference``.
-        image: (H, W, 3) BGR.
-        min_share: of the markers present in the layout, from 0 to 1, how many must be measured.
+        extractor: extractor for ``reference``.
+        reference: the layout.
+        image: (H, W, 3) BGR, uint8 or uint16.
+        min_share: least share of the present markers that must be measured, 0 to 1.
 
     Raises:
-        CmpDesignError: ``min_share`` is no share.
+        CmpDesignError: ``min_share`` is not from 0 to 1.
     """
     if not 0 <= min_share <= 1:
         raise CmpDesignError(f"min_share is {min_share:g}; expected a share from 0 to 1")
@@ -93,7 +95,7 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
 def judge_markers(
     reference: Reference, image: Image, markers: Markers, min_share: float = MIN_SHARE
 ) -> Verdict:
-    """The verdict on an image that is extracted already."""
+    """The verdict on an image from its extracted markers."""
     status = markers.status[reference.present]
     lost, measured, repaired, fitted = (int(np.count_nonzero(status == code)) for code in range(4))
     present = len(status)
@@ -143,12 +145,12 @@ def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) 
 def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
     if markers.mirrored == reference.mirrored:
         return None
-    seen, designed = ("back", "front") if markers.mirrored else ("front", "back")
-    return f"the pattern is seen from the {seen}, but designed to be seen from the {designed}"
+    viewed, designed = ("back", "front") if markers.mirrored else ("front", "back")
+    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}"
 
 
 def _too_few_reason(measured: int, present: int, min_share: float) -> str | None:
-    # Rounding must not refuse 90 of 100 at a share of 0.9.
+    # The tolerance accepts 90 of 100 at a share of 0.9 despite rounding.
     if measured >= min_share * present - 1e-9:
         return None
     found = f"{measured} of {present} markers measured ({measured / present:.1%})"
@@ -158,11 +160,19 @@ def _too_few_reason(measured: int, present: int, min_share: float) -> str | None
 def find_color_contradictions(
     reference: Reference, image: Image, xy_px: NDArray[np.float64]
 ) -> tuple[int, ...]:
-    """Cells with all corners found whose color in the image is decidedly not the layout's.
+    """Find cells whose color in the image contradicts the layout.
 
-    The inks are taken from the image: each is the median over the cells that the layout gives that color.
-    They must be the right way round (in each channel, the ink named after it leads): a numbering turned by a
-    third, in which all cells agree with each other, is found out too; then every colored cell is returned.
+    The level of each ink is the median over the cells to which the layout gives this ink. In each channel the ink of
+    the channel's name must be the brightest. A numbering turned by a third, in which all cells agree with each other,
+    fails this test, and all colored cells are returned.
+
+    Args:
+        reference: the layout.
+        image: (H, W, 3) BGR.
+        xy_px: (M, 2) found markers, NaN where not found; only cells with all corners found are tested.
+
+    Returns:
+        Numbers of the cells.
     """
     cells = np.flatnonzero(np.isfinite(xy_px[reference.cell_corners]).all(axis=(1, 2)))
     color = reference.cell_color[cells]
@@ -177,20 +187,20 @@ def find_color_contradictions(
         return tuple(cells[color < BLACK].tolist())
     chroma, ink_chroma = _chroma((level - black) / gain), _chroma(medians / gain)
     ink_size = np.linalg.norm(ink_chroma, axis=1)
-    usual = float(ink_size.min())
+    least_size = float(ink_size.min())
     nearest = (chroma @ (ink_chroma / ink_size[:, None]).T).argmax(axis=1)
-    colored = np.linalg.norm(chroma, axis=1) > _MIN_CHROMA_SHARE * usual
+    colored = np.linalg.norm(chroma, axis=1) > _MIN_CHROMA_SHARE * least_size
     wrong = colored & (nearest != color) & (color != WHITE)
     return tuple(cells[wrong].tolist())
 
 
 def _chroma(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) what remains without the gray part."""
+    """(N, 3) levels less their mean over the channels."""
     return np.asarray(rgb - rgb.mean(axis=1, keepdims=True))
 
 
 def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) mean R, G, B inside (N, K, 2) cells: at the centre and part of the way to each corner."""
+    """(N, 3) mean R, G, B of (N, K, 2) cells, sampled at the centre and part of the way to each corner."""
     import cv2
 
     centre = corners.mean(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""What the tables of tracking and of reconstruction share: the columns of a frame, and what every sink needs."""
+"""The columns that the tables of tracking and of reconstruction share, and the interface of a table."""
 
 from __future__ import annotations
 
@@ -11,35 +11,34 @@ from numpy.typing import NDArray
 Columns = dict[str, NDArray[Any]]
 
 
+# Texts of the frame status codes.
 FRAME_STATUS = ("", "tracked", "lost", "unreadable", "other size")
-
-
+# dtype of reasons.
 REASON = "U120"
-
-
-HEAD = ("frame", "time_s", "frame_status", "reason")  # opens every row of a long form
+# First columns of every long form.
+HEAD = ("frame", "time_s", "frame_status", "reason")
 
 
 class FrameTable(Protocol):
-    """Frames as arrays, and as a long form of one row for every frame and point.
+    """A table of frames as arrays; its long form has one row for every frame and point.
 
     Attributes:
-        digits: the long form's columns after ``HEAD``: decimals in text, 0 for whole numbers.
+        digits: column of the long form after ``HEAD`` -> decimals in text; 0 for whole numbers.
     """
 
     digits: Mapping[str, int]
 
     def batch(self, frames: Sequence[Any]) -> Columns:
-        """F frames as arrays with a leading axis of F."""
+        """The columns of F frames: arrays with a leading axis of F."""
         ...
 
     def about(self) -> Columns:
-        """What is the same for all frames, with ``format``, by which ``long_form_of`` knows the table."""
+        """The columns that all frames share; ``format`` selects the long form in ``table_long_form``."""
         ...
 
 
 def head_columns(frames: Sequence[Any]) -> Columns:
-    """What all tables say of a frame."""
+    """The columns (F,) of a frame that all tables have."""
     return {
         "frame": np.array([frame.index for frame in frames], np.int64),
         "time_s": np.array([frame.time_s for frame in frames], np.float64),
@@ -50,7 +49,7 @@ def head_columns(frames: Sequence[Any]) -> Columns:
 
 
 def long_head_columns(columns: Columns, count: int) -> Columns:
-    """``HEAD`` for ``count`` rows of every frame."""
+    """The columns of ``HEAD`` in the long form, for ``count`` rows per frame."""
     long: Columns = {name: np.repeat(columns[name], count) for name in ("frame", "time_s")}
     long["frame_status"] = np.repeat(np.array(FRAME_STATUS)[columns["frame_status"]], count)
     long["reason"] = np.repeat(columns["reason"], count)

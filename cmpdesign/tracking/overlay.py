@@ -1,4 +1,4 @@
-"""The overlay video: every frame with what was found in it."""
+"""The overlay video: every frame with its markers, displacements and status."""
 
 from __future__ import annotations
 
@@ -18,17 +18,22 @@ if TYPE_CHECKING:
 
 Picture = NDArray[np.uint8]
 
-EMPTY_SIZE = (640, 480)  # of the video when its first frame has no image
+EMPTY_SIZE = (640, 480)  # (width, height) of the video when its first frame has no image, px
 ARROW_BGR = (255, 200, 0)
 WHITE_BGR = (255, 255, 255)
 FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
 
 
 class OverlayWriter:
-    """Writes beside the file's place; ``close`` completes it.
+    """Writes the overlay video; ``close`` completes the file.
+
+    Args:
+        path: file with a suffix of ``CODECS``.
+        reference: the layout.
+        fps: frames per second.
 
     Raises:
-        CmpDesignError: an ending that names no codec.
+        CmpDesignError: the suffix names no codec.
         OutputError: the video cannot be written.
     """
 
@@ -40,22 +45,35 @@ class OverlayWriter:
         self._size: tuple[int, int] | None = None
 
     def add(self, image: NDArray[Any] | None, frame: Tracked, rest: Rest | None) -> None:
+        """Append a frame; pictures of another size than the first are scaled to its size."""
         picture = draw_frame(image, self._reference, frame, rest, self._size or EMPTY_SIZE)
         if self._size is None:
             self._size = (picture.shape[1], picture.shape[0])
-        self._video.add(_fit_picture(picture, self._size))
+        self._video.add(_letterbox(picture, self._size))
 
     def close(self) -> None:
+        """Complete the video.
+
+        Raises:
+            OutputError: see ``VideoWriter.close``.
+        """
         self._video.close()
 
 
 def draw_frame(
     image: NDArray[Any] | None, reference: Reference, frame: Tracked, rest: Rest | None, size: tuple[int, int]
 ) -> Picture:
-    """A frame's picture: gridlines, markers by status, arrows from their rest, and what the frame says of itself.
+    """Draw a frame: gridlines, markers by status, arrows from the places at rest, and a caption.
 
     Args:
-        size: (width, height) of the picture for a frame without an image.
+        image: (H, W, 3) BGR; None for a frame without an image.
+        reference: the layout.
+        frame: the tracked frame.
+        rest: the rest frame, if known.
+        size: (width, height) of the picture for a frame without an image, px.
+
+    Returns:
+        (H, W, 3) uint8 BGR.
     """
     from extractor.draw import draw_markers
 
@@ -92,13 +110,13 @@ def _draw_caption(picture: Picture, text: str) -> None:
 
     size = float(np.clip(picture.shape[1] / 1600, 0.4, 1.0))
     cv2.rectangle(picture, (0, 0), (picture.shape[1], round(34 * size)), (25, 25, 25), -1)
-    at = (round(12 * size), round(23 * size))
+    origin = (round(12 * size), round(23 * size))
     ascii_text = text.encode("ascii", "replace").decode()
-    cv2.putText(picture, ascii_text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+    cv2.putText(picture, ascii_text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
 
 
-def _fit_picture(picture: Picture, size: tuple[int, int]) -> Picture:
-    """In the middle of a picture of the video's size, as large as fits."""
+def _letterbox(picture: Picture, size: tuple[int, int]) -> Picture:
+    """Scale a picture to (width, height) with its aspect ratio kept, centred on black."""
     import cv2
 
     height, width = picture.shape[:2]

@@ -1,4 +1,4 @@
-"""The quiver plot: where the markers of one frame went from their rest, as arrows."""
+"""The quiver plot: the displacements of one frame's markers from rest, as arrows."""
 
 from __future__ import annotations
 
@@ -17,23 +17,26 @@ Picture = NDArray[np.uint8]
 SIDE_PX = 1000  # the longer side of the drawing
 MARGIN_PX = 60
 FOOT_PX = 70
-LONGEST_EDGES = 1.5  # the longest arrow is drawn about as long as this many edges
-FIXED_BITS = 4
+LONGEST_EDGES = 1.5  # length of the longest arrow (about), in median edges
+FIXED_BITS = 4  # fractional bits of OpenCV's coordinates
 GRID_BGR = (215, 215, 215)
 TEXT_BGR = (40, 40, 40)
 
 
 def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
-    """(H, W, 3) uint8 BGR: the gridlines at rest and an arrow for every marker that has a displacement.
+    """Draw the gridlines at rest and an arrow for every marker with a displacement.
 
-    Arrows point as seen in the image; they are drawn magnified by the whole factor that the caption states, and
-    colored by their length.
+    Arrows have the direction of the image. They are magnified by the integer factor in the caption and colored by
+    their length.
+
+    Returns:
+        (H, W, 3) uint8 BGR.
     """
     import cv2
 
     known = np.isfinite(frame.displacement_px[:, 0])
-    scale, offset = _drawing_scale(rest.xy_px)
-    points = (rest.xy_px - offset) * scale + MARGIN_PX
+    scale, origin = _drawing_scale(rest.xy_px)
+    points = (rest.xy_px - origin) * scale + MARGIN_PX
     size = np.nanmax(points, axis=0) + MARGIN_PX
     canvas = np.full((int(size[1]) + FOOT_PX, int(size[0]), 3), 255, np.uint8)
     lines = points[reference.edges]
@@ -51,11 +54,13 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
 
 
 def _drawing_scale(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """The scale from image to drawing, and (2,) the image point at the drawing's margin."""
     low, high = np.nanmin(xy_px, axis=0), np.nanmax(xy_px, axis=0)
     return (SIDE_PX - 2 * MARGIN_PX) / max(float((high - low).max()), 1.0), low
 
 
 def _magnification(lines: NDArray[np.float64], longest: float) -> int:
+    """The factor for arrows, from (E, 2, 2) edges and the longest arrow in the drawing, px."""
     edge = float(np.nanmedian(np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1)))
     return max(1, int(LONGEST_EDGES * edge / max(longest, 1e-9))) if longest > 0 else 1
 
@@ -68,14 +73,14 @@ def _draw_polylines(canvas: Picture, lines: NDArray[np.float64], color: Any, thi
 
 
 def _draw_arrow(canvas: Picture, start: NDArray[np.float64], tip: NDArray[np.float64], color: Any) -> None:
-    along = tip - start
-    length = float(np.hypot(*along))
+    direction = tip - start
+    length = float(np.hypot(*direction))
     if length < 0.5:
         return
-    back = along / length * min(0.35 * length, 9.0)
-    side = 0.5 * np.array([-back[1], back[0]])
+    head = direction / length * min(0.35 * length, 9.0)
+    half_width = 0.5 * np.array([-head[1], head[0]])
     _draw_polylines(canvas, np.stack([start, tip])[None], color, 2)
-    _draw_polylines(canvas, np.stack([tip - back + side, tip, tip - back - side])[None], color, 2)
+    _draw_polylines(canvas, np.stack([tip - head + half_width, tip, tip - head - half_width])[None], color, 2)
 
 
 def _draw_footer(canvas: Picture, frame: Tracked, largest_px: float, magnification: int) -> None:
@@ -89,5 +94,5 @@ def _draw_footer(canvas: Picture, frame: Tracked, largest_px: float, magnificati
     mm = np.linalg.norm(frame.displacement_mm, axis=1)
     largest_mm = f" = {np.nanmax(mm):.4g} mm" if np.isfinite(mm).any() else ""
     text = f"0 to {largest_px:.3g} px{largest_mm}; arrows x {magnification}; frame {frame.index}"
-    at = (left, top + 42)
-    cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)
+    baseline = (left, top + 42)
+    cv2.putText(canvas, text, baseline, cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""From a source through a tracker into what is written, until the source ends or somebody stops it."""
+"""The run from a source through a tracker into files, until the source ends or a stop is requested."""
 
 from __future__ import annotations
 
@@ -21,93 +21,106 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class StopRequest:
-    """Set from outside, looked at between two frames, so that no frame is torn."""
+    """A request to stop; the run tests the request between two frames, so that every frame is complete."""
 
-    asked: bool = False
+    is_requested: bool = False
 
 
 @dataclass(eq=False)
 class TrackingRun:
-    """One run's parts. ``tally`` and ``ended_early`` tell how it went.
+    """The parts of one run.
 
-    ``tracker`` makes a frame of an image, a time stamp and a problem; ``tally`` counts frames: a ``Tracker`` and a
-    ``Tally``, or a ``ShapeTracker`` and a ``ShapeTally``.
+    Attributes:
+        source: source of the frames.
+        tracker: ``Tracker`` or ``ShapeTracker``.
+        sink: sink of the tracked frames.
+        statistics: ``TrackStatistics`` or ``ShapeStatistics``.
+        overlay: writer of the overlay video, if any.
+        limit: largest number of frames, if any.
+        ended_early: reason for an early end; "" if all frames were tracked.
+        stop: request to stop.
     """
 
     source: FrameSource
     tracker: Any
     sink: FrameSink
-    tally: Any
+    statistics: Any
     overlay: OverlayWriter | None = None
     limit: int | None = None
     ended_early: str = ""
     stop: StopRequest = field(default_factory=StopRequest)
 
     def go(self, watch: Callable[[Any], None]) -> None:
-        """Track to the end; ``watch`` sees every frame.
+        """Track to the end; ``watch`` is called with every tracked frame.
 
         Raises:
-            OutputError: something could not be written; all that could be is complete, and the message says where.
+            OutputError: a file could not be written; the other files are complete, and the message names them.
         """
-        failed: list[str] = []
+        failures: list[str] = []
         try:
             self._track(watch)
         except OutputError as error:
-            failed.append(str(error))
+            failures.append(str(error))
         finally:
-            failed += self._closed()
-        if failed:
-            raise OutputError("; ".join(dict.fromkeys((*failed, self.sink.kept()))))
+            failures += self._close_files()
+        if failures:
+            raise OutputError("; ".join(dict.fromkeys((*failures, self.sink.kept()))))
 
     def _track(self, watch: Callable[[Any], None]) -> None:
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
             self.sink.add(tracked)
-            self.tally.add(tracked)
+            self.statistics.add(tracked)
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
             watch(tracked)
-            if self.stop.asked:
-                self.ended_early = f"stopped by hand after {self.tally.frames} frames"
+            if self.stop.is_requested:
+                self.ended_early = f"stopped by hand after {self.statistics.frames} frames"
                 return
-            if self.limit is not None and self.tally.frames >= self.limit:
+            if self.limit is not None and self.statistics.frames >= self.limit:
                 return
         self.ended_early = self.source.ended_early
 
-    def _closed(self) -> list[str]:
-        """Complete the files, each of them whatever becomes of the others; what could not be."""
-        failed = []
-        for part in (self.sink, self.overlay):
+    def _close_files(self) -> list[str]:
+        """Complete each file, also after a failure of another file; the failures."""
+        failures = []
+        for writer in (self.sink, self.overlay):
             try:
-                if part is not None:
-                    part.close()
+                if writer is not None:
+                    writer.close()
             except OutputError as error:
-                failed.append(str(error))
-        return failed
+                failures.append(str(error))
+        return failures
 
 
 @contextmanager
 def stop_on_signal(stop: StopRequest) -> Iterator[None]:
-    """Ctrl-C and a request to terminate end the run after the current frame; a second one ends it at once."""
+    """Within this context, the first SIGINT or SIGTERM ends the run after the current frame, the second at once."""
 
-    def ask(number: int, frame: Any) -> None:
-        if stop.asked:
+    def request_stop(number: int, frame: Any) -> None:
+        if stop.is_requested:
             raise KeyboardInterrupt
-        stop.asked = True
+        stop.is_requested = True
 
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    earlier = {number: signal.signal(number, request_stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in earlier.items():
             signal.signal(number, handler)
 
 
 def read_rest_markers(text: str, source: str, reference: Reference, fps: float | None) -> Markers:
-    """The markers at rest: of a frame of the source by its number, or of an image file.
+    """Extract the markers at rest.
+
+    Args:
+        text: number of a frame of the source, or path of an image file.
+        source: the source, see ``open_source``.
+        reference: the layout.
+        fps: see ``open_source``.
 
     Raises:
-        CmpDesignError: there is no such frame or image, or no pattern is found in it.
+        CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
     from extractor import Extractor
 
@@ -119,10 +132,10 @@ def read_rest_markers(text: str, source: str, reference: Reference, fps: float |
 
 
 def read_rest_image(text: str, source: str, fps: float | None) -> Any:
-    """The picture at rest: a frame of the source by its number, or an image file.
+    """Read the image at rest; arguments as for ``read_rest_markers``.
 
     Raises:
-        CmpDesignError: there is no such frame or image.
+        CmpDesignError: no such frame or image.
     """
     image = _read_frame(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
     if image is None:

@@ -1,9 +1,9 @@
-"""What a run of reconstruction amounts to, counted frame by frame."""
+"""Statistics of a run of reconstruction, counted frame by frame."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,16 @@ if TYPE_CHECKING:
     from extractor.space.views import ShapeFrame
 
 
+class _LargestDisplacement(NamedTuple):
+    """The largest displacement of a run with its frame and marker; -1 before the first displacement."""
+
+    mm: float = -1.0
+    frame: int = -1
+    marker: int = -1
+
+
 class ShapeStatistics:
-    """Counts of a reconstructor's frames."""
+    """The statistics of a reconstructor's frames."""
 
     def __init__(self, reconstructor: Reconstructor) -> None:
         self._reconstructor = reconstructor
@@ -26,17 +34,20 @@ class ShapeStatistics:
         self._markers = np.zeros(4, np.int64)
         self._lost: Counter[int] = Counter()
         self._sigmas_um: list[np.ndarray] = []
-        self._largest = (-1.0, -1, -1)
+        self._largest = _LargestDisplacement()
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return len(self._elapsed_ms)
 
     @property
     def tracked(self) -> int:
+        """Number of tracked frames."""
         return self._statuses["tracked"]
 
     def add(self, frame: ShapeFrame) -> None:
+        """Count a frame."""
         shape = frame.shape
         self._elapsed_ms.append(frame.elapsed_ms)
         self._statuses[frame.status.name.lower()] += 1
@@ -49,17 +60,24 @@ class ShapeStatistics:
         variances = shape.cov_mm2[known][:, [0, 1, 2], [0, 1, 2]]
         self._sigmas_um.append(1e3 * np.sqrt(np.median(variances, axis=0)))
         length = np.linalg.norm(shape.displacement_mm, axis=1)
-        if np.isfinite(length).any() and np.nanmax(length) > self._largest[0]:
-            self._largest = (float(np.nanmax(length)), frame.index, int(np.nanargmax(length)))
+        if np.isfinite(length).any() and np.nanmax(length) > self._largest.mm:
+            self._largest = _LargestDisplacement(
+                float(np.nanmax(length)), frame.index, int(np.nanargmax(length))
+            )
 
     def to_json(self, source: str, declared: int | None, ended: str) -> dict[str, Any]:
-        """The summary as it is written; see docs/reconstruction.md."""
+        """The summary as JSON values, see docs/reconstruction.md.
+
+        Args:
+            source: name of the source.
+            declared: number of frames that the source declares, if any.
+            ended: reason for an early end, or "".
+        """
         from extractor import PointReason
 
         layout, poses = self._reconstructor.layout, self._reconstructor.poses
         total = max(int(self._markers.sum()), 1)
         lost, measured, repaired, fitted = (float(n) / total for n in self._markers)
-        mm, frame, marker = self._largest
         sigmas = np.median(self._sigmas_um, axis=0).tolist() if self._sigmas_um else None
         return {
             "format": "cmp-reconstruction",
@@ -85,5 +103,5 @@ class ShapeStatistics:
                 for view, rms in zip(poses.views, poses.rms_px, strict=True)
             ],
             "model_px": self._reconstructor.model_px,
-            "largest_displacement": None if frame < 0 else {"mm": mm, "frame": frame, "marker": marker},
+            "largest_displacement": None if self._largest.frame < 0 else self._largest._asdict(),
         }

@@ -1,4 +1,4 @@
-"""The columns that reconstruction writes: the surface of every frame, by the names that users of Tac3D read."""
+"""The table of reconstruction: the surface of every frame, with the column names of Tac3D."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ UPPER = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
 
 
 class ShapeTable:
-    """A reconstructor's frames: F frames by N points, the layout's M markers first, then its virtual markers.
+    """The table of a reconstructor's frames: F frames by N points, first the M markers, then the virtual markers.
 
     Args:
-        reconstructor: whose layout, poses and rest frame are written beside the frames.
+        reconstructor: its layout, poses and rest frame are the shared columns.
     """
 
     digits: Mapping[str, int] = (
@@ -52,7 +52,7 @@ class ShapeTable:
         return columns
 
     def about(self) -> Columns:
-        """The layout, the views in their places, and the surface at rest."""
+        """The layout, the poses of the views, and the surface at rest."""
         reconstructor = self._reconstructor
         layout, poses = reconstructor.layout, reconstructor.poses
         markers, count = len(layout.layer), layout.virtual_per_edge
@@ -87,7 +87,7 @@ def _reason_texts(shape: Shape) -> np.ndarray:
 
 
 def shape_long_form(columns: Columns, fixed: Columns) -> Columns:
-    """One row for every frame and point, lost ones too; triples become columns of their own."""
+    """The long form: one row for every frame and point (also lost points), one column per axis of a triple."""
     frames, count = columns["status"].shape
     long = long_head_columns(columns, count)
     long["point"] = np.tile(np.arange(count, dtype=np.int32), frames)

@@ -1,8 +1,7 @@
-"""Where frames go, as they come: whatever happens, what was written so far can be read.
+"""Sinks of frames: tables that are written while a run goes on, so that a killed run loses at most some seconds.
 
-CSV grows beside its place as ``FILE.part``. NPZ and Parquet cannot grow: their frames go to ``FILE.part/``, a folder
-of chunks, each of them an .npz of its own, and are assembled at the end. A killed run leaves these for
-``recover_table``.
+CSV is written to ``FILE.part``. NPZ and Parquet cannot grow: their frames go to the folder ``FILE.part/`` as chunks,
+each an .npz file, which are assembled at the end. After a killed run, ``recover_table`` completes the file.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from cmpdesign.tracking.columns import HEAD, Columns, FrameTable
 from cmpdesign.tracking.table import table_long_form
 
 CHUNK_FRAMES = 256
-CHUNK_S = 5.0  # what a crash can cost
+CHUNK_S = 5.0  # largest time between two chunks, lost in a crash
 KINDS = (".npz", ".parquet", ".csv")
 
 
 class FrameSink(Protocol):
     """A table that is written frame by frame.
 
-    ``add`` and ``close`` raise ``OutputError``; after that, ``kept`` says how many frames are where.
+    ``add`` and ``close`` raise ``OutputError``. ``kept`` states the number of written frames and their file.
     """
 
     def add(self, frame: Any) -> None: ...
@@ -40,11 +39,11 @@ class FrameSink(Protocol):
 
 
 def open_sink(path: Path, table: FrameTable) -> FrameSink:
-    """The sink for a file's ending.
+    """Open the sink for the suffix of a file.
 
     Raises:
-        CmpDesignError: another ending, Parquet without pyarrow, or an interrupted run's frames are there.
-        OutputError: nothing can be written there.
+        CmpDesignError: another suffix, Parquet without pyarrow, or frames of an interrupted run exist.
+        OutputError: the file cannot be written.
     """
     _require_kind(path)
     part = _part_path(path)
@@ -62,11 +61,14 @@ def open_sink(path: Path, table: FrameTable) -> FrameSink:
 
 
 def recover_table(path: Path) -> int:
-    """Make the file that an interrupted run left in pieces; returns how many frames it has.
+    """Complete the file of an interrupted run from its chunks or its text.
+
+    Returns:
+        The number of frames.
 
     Raises:
-        CmpDesignError: there are no pieces.
-        OutputError: the file cannot be written; the pieces are still there.
+        CmpDesignError: no interrupted run.
+        OutputError: the file cannot be written; the chunks or the text are kept.
     """
     _require_kind(path)
     part = _part_path(path)
@@ -74,9 +76,9 @@ def recover_table(path: Path) -> int:
         raise CmpDesignError(f"{part}: there is nothing to recover")
     try:
         if path.suffix == ".csv":
-            rows = _truncate_to_whole_lines(part)
+            frames = _truncate_to_whole_lines(part)
             part.replace(path)
-            return rows
+            return frames
         return _assemble_chunks(part, path)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); {part} is kept") from None
@@ -105,7 +107,7 @@ def _pyarrow() -> Any:
 
 
 class CsvSink:
-    """The long form as text, flushed frame by frame; a frame that does not fit on the disk is cut off again."""
+    """Writes the long form as text, frame by frame; a frame that does not fit on the disk is removed again."""
 
     def __init__(self, path: Path, table: FrameTable) -> None:
         self._path, self._part, self._table = path, _part_path(path), table
@@ -144,18 +146,18 @@ class CsvSink:
 
 
 def _csv_lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
-    """A frame's rows; an empty field where nothing is known."""
+    """The rows of a frame; unknown values are empty fields."""
     reason = io.StringIO()
     csv.writer(reason, lineterminator="").writerow([columns["reason"][0]])
     time_s, status = _format_number(columns["time_s"][0], 6), columns["frame_status"][0]
     head = f"{columns['frame'][0]},{time_s},{status},{reason.getvalue()},"
     if not columns["reason"][0]:
         head = head.replace('""', "")
-    cells = [
+    fields = [
         [_format_number(v, places) if places else str(v) for v in columns[name].tolist()]
         for name, places in digits.items()
     ]
-    return "".join(head + ",".join(row) + "\n" for row in zip(*cells, strict=True)).encode()
+    return "".join(head + ",".join(row) + "\n" for row in zip(*fields, strict=True)).encode()
 
 
 def _format_number(value: float, digits: int) -> str:
@@ -163,7 +165,7 @@ def _format_number(value: float, digits: int) -> str:
 
 
 def _truncate_to_whole_lines(part: Path) -> int:
-    """Cut a line that was being written; returns how many frames have all their rows."""
+    """Cut off an incomplete last line; the number of frames in the file."""
     with part.open("r+b") as file:
         data = file.read()
         end = data.rfind(b"\n") + 1
@@ -173,7 +175,7 @@ def _truncate_to_whole_lines(part: Path) -> int:
 
 
 class ChunkSink:
-    """Frames in chunks of some seconds, assembled at the end."""
+    """Writes frames in chunks of some seconds, which are assembled at the end."""
 
     def __init__(self, path: Path, table: FrameTable) -> None:
         self._path, self._part, self._table = path, _part_path(path), table
@@ -191,21 +193,21 @@ class ChunkSink:
         try:
             _save_chunk(self._part / "about.npz", self._table.about())
             if self._frames:
-                self._save(self._frames)
+                self._save_frames(self._frames)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
         self._frames, self._last = [], time.monotonic()
 
-    def _save(self, frames: list[Any]) -> None:
-        """As one chunk; where it does not fit, as two halves, so that a full disk takes what it can."""
+    def _save_frames(self, frames: list[Any]) -> None:
+        """Save frames as one chunk; if the chunk does not fit on the disk, as two halves."""
         try:
             _save_chunk(self._part / f"{self._chunks:06d}.npz", self._table.batch(frames))
         except OSError:
             if len(frames) == 1:
                 raise
             half = len(frames) // 2
-            self._save(frames[:half])
-            self._save(frames[half:])
+            self._save_frames(frames[:half])
+            self._save_frames(frames[half:])
             return
         self._chunks += 1
         self._kept += len(frames)
@@ -224,41 +226,41 @@ class ChunkSink:
 
 
 def _save_chunk(path: Path, columns: Columns) -> None:
-    """A chunk is there whole or not at all."""
-    beside = path.with_suffix(".new")
+    """Write a chunk atomically."""
+    unfinished = path.with_suffix(".new")
     try:
-        with beside.open("wb") as file:
+        with unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **columns)
-        beside.replace(path)
+        unfinished.replace(path)
     except OSError:
-        beside.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         raise
 
 
 def _read_chunks(part: Path) -> Iterator[Columns]:
-    """The chunks in order, one in memory at a time."""
+    """Read the chunks in order, one at a time."""
     for path in sorted(part.glob("[0-9]*.npz")):
         with np.load(path, allow_pickle=False) as file:
             yield {name: file[name] for name in file.files}
 
 
 def _assemble_chunks(part: Path, path: Path) -> int:
-    """The chunks as one file; they are removed when it is complete. Returns the number of frames."""
+    """Assemble the chunks into one file and remove them; the number of frames."""
     with np.load(part / "about.npz", allow_pickle=False) as file:
         fixed = {name: file[name] for name in file.files}
-    beside = part / ("whole" + path.suffix)
+    unfinished = part / ("whole" + path.suffix)
     try:
-        frames = (_write_npz if path.suffix == ".npz" else _write_parquet)(part, beside, fixed)
+        frames = (_write_npz if path.suffix == ".npz" else _write_parquet)(part, unfinished, fixed)
     except OSError:
-        beside.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         raise
-    beside.replace(path)
+    unfinished.replace(path)
     shutil.rmtree(part)
     return frames
 
 
 def _write_npz(part: Path, path: Path, fixed: Columns) -> int:
-    """Array by array and chunk by chunk, so that an hour of frames needs no more memory than a chunk."""
+    """Write array by array and chunk by chunk, so that the memory in use is that of one chunk."""
     import zipfile
 
     shapes: dict[str, tuple[np.dtype[Any], list[int]]] = {}
@@ -294,7 +296,7 @@ def _zip_member(name: str) -> Any:
 
 
 def _write_parquet(part: Path, path: Path, fixed: Columns) -> int:
-    """The long form, a row group for every chunk."""
+    """Write the long form with one row group per chunk."""
     arrow = _pyarrow()
     frames, writer = 0, None
     try:

@@ -1,4 +1,4 @@
-"""Where frames come from: a video, a folder of images, a camera. A frame that cannot be read is a frame, too."""
+"""Sources of frames: a video, a folder of images, a camera. An unreadable frame counts as a frame."""
 
 from __future__ import annotations
 
@@ -14,16 +14,22 @@ from cmpdesign.files.images import ImageFileError, read_image
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
-MAX_FAILED_READS = 10  # frames that may fail one after the other before a stream counts as ended
+MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
 
 
 class SourceError(CmpDesignError, ValueError):
-    """A source that cannot be opened; names it and what is expected."""
+    """A source that cannot be opened."""
 
 
 @dataclass(frozen=True, eq=False)
 class SourceFrame:
-    """What a source hands on: an image (of several sources: a list of them), or None and why there is none."""
+    """A frame of a source.
+
+    Attributes:
+        time_s: time stamp.
+        image: (H, W, 3) BGR, or None; of several views a list of these.
+        problem: reason for a missing image, or "".
+    """
 
     time_s: float
     image: Any
@@ -34,10 +40,10 @@ class FrameSource(Protocol):
     """A sequence of frames that is read once.
 
     Attributes:
-        name: for messages.
-        total: how many frames it says it has; None: not known.
-        fps: frames per second; None: not known.
-        ended_early: after the last frame: why there are no more, "" where all were read.
+        name: name for messages.
+        total: number of frames that the source declares; None if unknown.
+        fps: frames per second; None if unknown.
+        ended_early: after the last frame, the reason for an early end; "" if all frames were read.
     """
 
     name: str
@@ -49,13 +55,14 @@ class FrameSource(Protocol):
 
 
 def open_source(text: str, fps: float | None = None) -> FrameSource:
-    """The source that a text names: a number is a camera, else a folder of images or a video file.
+    """Open a source.
 
     Args:
-        fps: frames per second of a folder (30 without) or of a video whose own rate is wrong.
+        text: number of a camera, or path of a folder of images or of a video file.
+        fps: frames per second of a folder (default 30), or in place of a video's own rate.
 
     Raises:
-        SourceError: nothing to track there.
+        SourceError: the source cannot be opened.
     """
     path = Path(text)
     if text.isdecimal() and not path.exists():
@@ -66,10 +73,10 @@ def open_source(text: str, fps: float | None = None) -> FrameSource:
 
 
 def open_sources(text: str, fps: float | None = None) -> FrameSource:
-    """The source that a text names, or several, one for each view, where it is a list with commas.
+    """Open a source, or of a list with commas one source for each view; see ``open_source``.
 
     Raises:
-        SourceError: nothing to track there.
+        SourceError: a source cannot be opened.
     """
     names = split_list(text)
     return (
@@ -80,12 +87,12 @@ def open_sources(text: str, fps: float | None = None) -> FrameSource:
 
 
 def split_list(text: str) -> list[str]:
-    """The names in a list with commas; a file whose own name has a comma is one."""
+    """Split a list with commas; a text that is the path of a file is one name."""
     return [text] if Path(text).exists() else text.split(",")
 
 
 class MultiViewSource:
-    """Sources that run side by side, one for each view; they end together with the shortest of them."""
+    """Sources that run at the same time, one for each view; all end with the shortest."""
 
     def __init__(self, sources: list[FrameSource]) -> None:
         self._sources = sources
@@ -95,26 +102,26 @@ class MultiViewSource:
         self.fps = sources[0].fps
 
     def frames(self) -> Iterator[SourceFrame]:
-        """The first source's time stamps; a frame that one of them lacks is None in the list."""
+        """The frames of all sources, with the first source's time stamps; an unreadable image is None in the list."""
         streams = [source.frames() for source in self._sources]
         while True:
             frames = [next(stream, None) for stream in streams]
-            together = [frame for frame in frames if frame is not None]
-            if len(together) < len(frames):
+            views = [frame for frame in frames if frame is not None]
+            if len(views) < len(frames):
                 break
-            problems = [frame.problem for frame in together if frame.problem]
-            yield SourceFrame(together[0].time_s, [frame.image for frame in together], "; ".join(problems))
-        said = [source.ended_early for source in self._sources if source.ended_early]
-        if together and not said:
-            short = [
+            problems = [frame.problem for frame in views if frame.problem]
+            yield SourceFrame(views[0].time_s, [frame.image for frame in views], "; ".join(problems))
+        reasons = [source.ended_early for source in self._sources if source.ended_early]
+        if views and not reasons:
+            shorter = [
                 source.name for source, frame in zip(self._sources, frames, strict=True) if frame is None
             ]
-            said = [f"{' and '.join(short)} has fewer frames than the others"]
-        self.ended_early = "; ".join(said)
+            reasons = [f"{' and '.join(shorter)} has fewer frames than the others"]
+        self.ended_early = "; ".join(reasons)
 
 
 class FolderSource:
-    """The images of a folder in the order of their names, numbers in them counted as numbers."""
+    """The images of a folder in the natural order of their names."""
 
     def __init__(self, path: Path, fps: float) -> None:
         try:
@@ -142,7 +149,7 @@ class FolderSource:
 
 
 def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
-    """Sorts frame2 before frame10."""
+    """The key of the natural order: frame2 before frame10."""
     parts: list[tuple[int, int | str]] = []
     digits = ""
     for letter in path.name + "\0":
@@ -157,7 +164,7 @@ def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
 
 
 class VideoSource:
-    """A video file, read by OpenCV; time stamps are the file's own, or counted at ``fps`` where that is given."""
+    """A video file, read by OpenCV; time stamps are those of the file, or counted at ``fps`` if given."""
 
     def __init__(self, path: Path, fps: float | None) -> None:
         if not path.is_file():
@@ -179,14 +186,14 @@ class VideoSource:
         self._counted = fps is not None
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Every frame that comes out; one in the middle that cannot be decoded is handed on as unreadable."""
+        """All frames; a frame in the middle that cannot be decoded has no image."""
         import cv2
 
         index, failed = 0, 0
         try:
             while failed < MAX_FAILED_READS:
-                good, image = self._capture.read()
-                if not good or image is None:
+                success, image = self._capture.read()
+                if not success or image is None:
                     if self.total is None or index + failed >= self.total:
                         break
                     failed += 1
@@ -208,7 +215,7 @@ class VideoSource:
 
 
 class CameraSource:
-    """A camera by its number; time stamps are taken when a frame arrives, counted from the first one."""
+    """A camera by its number; time stamps are times of arrival, counted from the first frame."""
 
     def __init__(self, number: int) -> None:
         self._capture = _open_capture(number)
@@ -221,15 +228,15 @@ class CameraSource:
         self.fps: float | None = None
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Until the camera stops, or for ever."""
+        """Frames until the camera stops."""
         start: float | None = None
         failed, index = 0, 0
         try:
             while failed < MAX_FAILED_READS:
-                good, image = self._capture.read()
+                success, image = self._capture.read()
                 now = time.monotonic()
                 start = now if start is None else start
-                if good and image is not None:
+                if success and image is not None:
                     failed = 0
                     yield SourceFrame(now - start, image)
                 else:
@@ -242,7 +249,7 @@ class CameraSource:
 
 
 def _open_capture(source: str | int) -> Any:
-    """OpenCV's reader, which would tell on stderr of every damaged frame; a frame's status says it."""
+    """Open OpenCV's reader without its messages on stderr; damaged frames are reported by their status."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     import cv2
 

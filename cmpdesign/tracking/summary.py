@@ -1,9 +1,9 @@
-"""What a run of tracking amounts to, counted frame by frame."""
+"""Statistics of a run of tracking, counted frame by frame."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,24 @@ if TYPE_CHECKING:
     from extractor.track.tracker import Tracked
 
 AT_REST_PX = 0.2  # median displacement below which the pattern counts as resting
-MIN_REST_PAIRS = 10  # resting frames after resting frames, below which no jitter is stated
+MIN_REST_PAIRS = 10  # least number of consecutive resting frames (pairs) for a jitter
+
+
+class _LargestDisplacement(NamedTuple):
+    """The largest displacement of a run with its frame and marker; -1 before the first displacement."""
+
+    px: float = -1.0
+    frame: int = -1
+    marker: int = -1
+    mm: float = float("nan")
 
 
 class TrackStatistics:
-    """Counts; ``farthest`` is the frame with the largest RMS displacement, for the quiver plot."""
+    """The statistics of a tracker's frames.
+
+    Attributes:
+        farthest: the frame with the largest RMS displacement, for the quiver plot.
+    """
 
     def __init__(self, reference: Reference) -> None:
         self._reference = reference
@@ -28,19 +41,22 @@ class TrackStatistics:
         self._markers = np.zeros(4, np.int64)
         self._resting: Tracked | None = None
         self._pairs, self._squares, self._values = 0, 0.0, 0
-        self._largest = (-1.0, -1, -1, float("nan"))
+        self._largest = _LargestDisplacement()
         self._farthest_px = -1.0
         self.farthest: Tracked | None = None
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return len(self._elapsed_ms)
 
     @property
     def tracked(self) -> int:
+        """Number of tracked frames."""
         return self._statuses["tracked"]
 
     def add(self, frame: Tracked) -> None:
+        """Count a frame."""
         self._elapsed_ms.append(frame.elapsed_ms)
         self._statuses[frame.status.name.lower()] += 1
         self._reasons[frame.reason] += 1
@@ -54,9 +70,9 @@ class TrackStatistics:
             self._resting = None
             return
         marker = int(np.nanargmax(length))
-        if length[marker] > self._largest[0]:
+        if length[marker] > self._largest.px:
             mm = float(np.linalg.norm(frame.displacement_mm[marker]))
-            self._largest = (float(length[marker]), frame.index, marker, mm)
+            self._largest = _LargestDisplacement(float(length[marker]), frame.index, marker, mm)
         rms = float(np.sqrt(np.nanmean(length**2)))
         if rms > self._farthest_px:
             self._farthest_px, self.farthest = rms, frame
@@ -64,22 +80,29 @@ class TrackStatistics:
             self._resting = None
             return
         if self._resting is not None:
-            step = frame.markers.xy_px - self._resting.markers.xy_px
-            step = step[np.isfinite(step)]
+            motion = frame.markers.xy_px - self._resting.markers.xy_px
+            motion = motion[np.isfinite(motion)]
             self._pairs += 1
-            self._squares += float(np.sum(step**2))
-            self._values += len(step)
+            self._squares += float(np.sum(motion**2))
+            self._values += len(motion)
         self._resting = frame
 
     @property
     def jitter_px(self) -> float | None:
-        """A resting marker's standard deviation per axis, from frame to frame; None with too few resting frames."""
+        """Standard deviation of a resting marker per axis, from frame to frame; None with too few resting frames."""
         if self._pairs < MIN_REST_PAIRS or not self._values:
             return None
         return float(np.sqrt(self._squares / self._values / 2))
 
     def to_json(self, source: str, declared: int | None, ended: str, rest: Rest | None) -> dict[str, Any]:
-        """The summary as it is written; see docs/tracking.md."""
+        """The summary as JSON values, see docs/tracking.md.
+
+        Args:
+            source: name of the source.
+            declared: number of frames that the source declares, if any.
+            ended: reason for an early end, or "".
+            rest: the rest frame, if known.
+        """
         total = max(int(self._markers.sum()), 1)
         lost, measured, repaired, fitted = (float(n) / total for n in self._markers)
         return {
@@ -108,14 +131,15 @@ class TrackStatistics:
         }
 
     def _largest_json(self) -> dict[str, Any] | None:
-        px, frame, marker, mm = self._largest
-        if frame < 0:
+        largest = self._largest
+        if largest.frame < 0:
             return None
-        return {"px": px, "mm": mm if np.isfinite(mm) else None, "frame": frame, "marker": marker}
+        mm = largest.mm if np.isfinite(largest.mm) else None
+        return {"px": largest.px, "mm": mm, "frame": largest.frame, "marker": largest.marker}
 
 
 def percentiles(elapsed_ms: list[float]) -> dict[str, float]:
-    """The 50th, 95th and 99th; 0 without values."""
+    """The 50th, 95th and 99th percentile; 0 without values."""
     values = np.percentile(elapsed_ms, (50, 95, 99)) if elapsed_ms else np.zeros(3)
     return dict(zip(("p50", "p95", "p99"), (float(v) for v in values), strict=True))
 

@@ -1,4 +1,4 @@
-"""Tables that are written frame by frame: what every sink needs of one, and the columns that tracking writes."""
+"""The table of tracking, and the long form of tables."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 class TrackTable:
-    """A tracker's frames.
+    """The table of a tracker's frames.
 
     Args:
-        tracker: whose layout and rest frame are written beside the frames.
+        tracker: its layout and rest frame are the shared columns.
     """
 
     digits: Mapping[str, int] = {name: 0 for name in ("marker", "layer", "index", "status")} | {
@@ -36,7 +36,7 @@ class TrackTable:
 
 
 def table_long_form(columns: Columns, fixed: Columns) -> Columns:
-    """The long form of frames, whichever table they are of."""
+    """The long form of the columns of frames; ``fixed``: the shared columns, whose ``format`` tells the table."""
     if str(fixed["format"]) == "cmp-reconstruction":
         from cmpdesign.tracking.shape_table import shape_long_form as of_shapes
 
@@ -45,7 +45,7 @@ def table_long_form(columns: Columns, fixed: Columns) -> Columns:
 
 
 def frame_columns(frames: Sequence[Tracked]) -> Columns:
-    """Frames as columns: F frames by M markers."""
+    """The columns of F frames by M markers."""
     cov = np.stack([frame.markers.cov_px2 for frame in frames])
     return {
         **head_columns(frames),
@@ -59,7 +59,7 @@ def frame_columns(frames: Sequence[Tracked]) -> Columns:
 
 
 def fixed_columns(tracker: Tracker) -> Columns:
-    """The layout, and the rest frame as far as it is known by now."""
+    """The shared columns: the layout, and the rest frame (NaN where unknown so far)."""
     reference, rest = tracker.layout, tracker.rest
     unknown = np.full((3, 3), np.nan)
     homography = rest.layout_from_image if rest is not None else None
@@ -78,7 +78,7 @@ def fixed_columns(tracker: Tracker) -> Columns:
 
 
 def track_long_form(columns: Columns, fixed: Columns) -> Columns:
-    """One row for every frame and marker, lost ones too; pairs become columns of their own."""
+    """The long form: one row for every frame and marker (also lost markers), one column per axis of a pair."""
     frames, count = columns["status"].shape
     pairs = {
         "xy_px": ("x_px", "y_px"),

@@ -1,1 +1,1 @@
-"""Kept for programs written against version 0.1; new ones take these names from ``cmpdesign``."""
+"""Compatibility with version 0.1. New programs import these names from ``cmpdesign``."""

@@ -1,4 +1,4 @@
-"""Kept for programs written against version 0.1: ``from cmpdesign.writers.layout_file import layout_to_json``."""
+"""Compatibility with version 0.1: ``from cmpdesign.writers.layout_file import layout_to_json``."""
 
 from __future__ import annotations
 

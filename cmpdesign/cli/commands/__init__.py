@@ -1,4 +1,4 @@
-"""The commands, one file each. They parse, call and print.
+"""The commands, one file each. Commands parse, call and print.
 
-In: the words of a command line. Out: files, lines, an exit code.
+In: the arguments of a command line. Out: files, lines, an exit code.
 """

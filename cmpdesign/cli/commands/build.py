@@ -1,4 +1,4 @@
-"""``cmpdesign build``: a design's files."""
+"""``cmpdesign build``: writes the files of a design."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def build(
     names = chosen_products(only)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
-    figures = design_report(parameters, layout)
-    files, findings = make_products(names, parameters, layout, figures)
+    report = design_report(parameters, layout)
+    files, findings = make_products(names, parameters, layout, report)
     listed = files_with_lists(files, product_folders())
     stale = find_stale_files(output, listed)
     for path in write_folder(output, listed):
@@ -56,35 +56,40 @@ def build(
             console().print(f"wrote {printable_path(path)}")
     for path in remove_files(stale):
         console().print(f"removed {printable_path(path)}, of an earlier build")
-    print_report(figures)
-    for finding in (*figures.findings, *findings):
+    print_report(report)
+    for finding in (*report.findings, *findings):
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
 
 
 def parse_overrides(texts: list[str] | None) -> dict[str, str]:
-    """``--set`` as name -> text; raises ``CmpDesignError`` where a text has no name or no "="."""
-    found: dict[str, str] = {}
+    """Parse the values of ``--set`` to name -> text.
+
+    Raises:
+        CmpDesignError: a value has no name or no "=".
+    """
+    overrides: dict[str, str] = {}
     for text in texts or []:
         name, equals, value = text.partition("=")
         if not equals or not name.strip():
             raise CmpDesignError(f"--set {text}: expected NAME=VALUE, as in pitch_mm=1.5mm")
-        found[name.strip()] = value.strip()
-    return found
+        overrides[name.strip()] = value.strip()
+    return overrides
 
 
-def print_report(figures: DesignReport) -> None:
+def print_report(report: DesignReport) -> None:
+    """Print the key figures of a design."""
     from rich.table import Table
 
-    cells = ", ".join(f"{count} {color}" for color, count in figures.cells.items() if count)
-    unseen = figures.markers - figures.present_markers
+    cells = ", ".join(f"{count} {color}" for color, count in report.cells.items() if count)
+    absent = report.markers - report.present_markers
     rows = {
-        "pattern": f"{figures.pattern}, {figures.layers} layers, pitch {figures.pitch_mm:.4g} mm",
-        "markers": f"{figures.present_markers}" + (f" ({unseen} more ids are never seen)" if unseen else ""),
-        "virtual markers": f"{figures.virtual_markers} on {figures.edges} edges ({figures.points} points)",
-        "cells": f"{sum(figures.cells.values())}: {cells}",
-        "overall size": "{:.2f} x {:.2f} mm, border included".format(*figures.size_mm),
-        "smallest feature": f"{figures.smallest_feature_mm:.3f} mm (circle inside the narrowest cell)",
+        "pattern": f"{report.pattern}, {report.layers} layers, pitch {report.pitch_mm:.4g} mm",
+        "markers": f"{report.present_markers}" + (f" ({absent} more ids are never seen)" if absent else ""),
+        "virtual markers": f"{report.virtual_markers} on {report.edges} edges ({report.points} points)",
+        "cells": f"{sum(report.cells.values())}: {cells}",
+        "overall size": "{:.2f} x {:.2f} mm, border included".format(*report.size_mm),
+        "smallest feature": f"{report.smallest_feature_mm:.3f} mm (circle inside the narrowest cell)",
     }
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():

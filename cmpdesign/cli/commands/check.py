@@ -1,4 +1,4 @@
-"""``cmpdesign check``: what of a design cannot be made or read."""
+"""``cmpdesign check``: lists the findings on a design."""
 
 from __future__ import annotations
 
@@ -43,6 +43,11 @@ def check(
 
 
 def _parse_pixels(text: str) -> tuple[int, int]:
+    """Width and height from "640x480".
+
+    Raises:
+        CmpDesignError: another text.
+    """
     match = re.fullmatch(r"([1-9]\d{1,4})x([1-9]\d{1,4})", text)
     if not match:
         raise CmpDesignError(f"--camera {text}: expected WIDTHxHEIGHT in pixels, as in 640x480")

@@ -129,7 +129,11 @@ def designs(
 
 
 def _design_entries(designs: Sequence[str]) -> list[DesignEntry]:
-    """The designs by the names that tell them apart."""
+    """Load designs under the stems of their names.
+
+    Raises:
+        CmpDesignError: two designs have the same name.
+    """
     from cmpdesign.design.design import load_design
     from cmpdesign.evaluate.designs import design_entries
 
@@ -150,6 +154,7 @@ def _run_experiment(
     preset: str,
     designs: Sequence[DesignEntry] = (),
 ) -> Mapping[str, Any]:
+    """Run an experiment and print the written files; the document of the report."""
     from cmpdesign.evaluate.experiments import find_experiment, run_experiment
     from cmpdesign.evaluate.runner import RunOptions
     from cmpdesign.evaluate.simulated.sensor import load_sensor

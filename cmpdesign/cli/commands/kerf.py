@@ -1,4 +1,4 @@
-"""``cmpdesign kerf``: the kerf from a photo or scan of a cut coupon."""
+"""``cmpdesign kerf``: measures the kerf in a photo or scan of a cut coupon."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def kerf(
     from cmpdesign.products.laser.coupon.design import load_coupon
     from cmpdesign.products.laser.coupon.photo import PhotoError, read_coupon
 
-    piece = load_coupon(coupon)
-    picture = read_image(photo)
+    cut_coupon = load_coupon(coupon)
+    image = read_image(photo)
     try:
-        reading = read_coupon(piece, picture)
+        reading = read_coupon(cut_coupon, image)
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
     if as_json:
         print(json.dumps(_reading_to_json(reading), indent=2))
         return
     _print_kerf_table(reading)
-    console().print(f"\nfor the file of {piece.material}, the settings of {piece.machine}:")
-    for one in reading.patches:
-        console().print(_material_file_lines(one, photo.name))
+    console().print(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
+    for patch_kerf in reading.patches:
+        console().print(_material_file_lines(patch_kerf, photo.name))
 
 
 def _print_kerf_table(reading: CouponReading) -> None:
@@ -50,19 +50,21 @@ def _print_kerf_table(reading: CouponReading) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("patch", "power", "speed", "times over", "kerf x", "kerf y"):
         table.add_column(heading, justify="left" if heading == "patch" else "right")
-    for one in reading.patches:
-        patch = one.patch
-        widths = [f"{width.value_mm:.4f} +- {width.sigma_mm:.4f} mm" for width in (one.x, one.y)]
+    for patch_kerf in reading.patches:
+        patch = patch_kerf.patch
+        widths = [
+            f"{width.value_mm:.4f} +- {width.sigma_mm:.4f} mm" for width in (patch_kerf.x, patch_kerf.y)
+        ]
         power, speed = f"{patch.power_percent:g} %", f"{patch.speed_mm_s:g} mm/s"
         table.add_row(patch.name, power, speed, str(patch.passes), *widths)
     console().print(table)
 
 
-def _material_file_lines(one: PatchKerf, photo: str) -> str:
-    """The material file's lines of one patch."""
-    patch = one.patch
+def _material_file_lines(patch_kerf: PatchKerf, photo: str) -> str:
+    """The lines of the material's file for one patch."""
+    patch = patch_kerf.patch
     lines = [f"# {patch.name}: {patch.power_percent:g} %, {patch.speed_mm_s:g} mm/s, {patch.passes} times"]
-    for axis, width in (("x", one.x), ("y", one.y)):
+    for axis, width in (("x", patch_kerf.x), ("y", patch_kerf.y)):
         source = json.dumps(f"coupon {patch.name}, {photo}, +- {width.sigma_mm:.4f} mm", ensure_ascii=False)
         lines.append(f"kerf_{axis}_mm = {{ value = {width.value_mm:.4f}, source = {source} }}")
     return "\n".join(lines)

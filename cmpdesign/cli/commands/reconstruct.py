@@ -1,11 +1,11 @@
-"""``cmpdesign reconstruct``: the surface in space, from two views or more, through a sequence."""
+"""``cmpdesign reconstruct``: reconstructs the surface in space from two or more views, through a sequence."""
 
 from __future__ import annotations
 
 import json
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -65,11 +65,12 @@ def reconstruct(
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
-    run = _prepare_run(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
+    options = _Options(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
+    run = _prepare_run(options)
     run.limit = frames
     try:
         run_with_progress(run, "reconstructing")
-    except OutputError:  # what could be done is told all the same
+    except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
             _write_summary(run, source, output)
         raise
@@ -77,19 +78,23 @@ def reconstruct(
     exit_with_status(run)
 
 
-def _prepare_run(
-    layout: Path,
-    rig: Path,
-    rest: str,
-    source: str,
-    output: Path,
-    from_rest: bool,
-    flatness_mm: float,
-    model_px: float | None,
-    fps: float | None,
-    cold: bool,
-) -> TrackingRun:
-    """Everything that can be refused is refused here, before a file is made."""
+class _Options(NamedTuple):
+    """Arguments and options of the command."""
+
+    layout: Path
+    rig: Path
+    rest: str
+    source: str
+    output: Path
+    from_rest: bool
+    flatness_mm: float
+    model_px: float | None
+    fps: float | None
+    cold: bool
+
+
+def _prepare_run(options: _Options) -> TrackingRun:
+    """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
@@ -97,38 +102,42 @@ def _prepare_run(
     from cmpdesign.tracking.sources import open_sources
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
-    known = load_rig(rig)
-    views = ViewExtractor(load_layout(layout), known.without_poses() if from_rest else known, "accurate")
-    at_rest = views.extract(_read_rest_image(rest, source, fps))
+    rig = load_rig(options.rig)
+    if options.from_rest:
+        rig = rig.without_poses()
+    views = ViewExtractor(load_layout(options.layout), rig, "accurate")
+    at_rest = views.extract(_read_rest_image(options))
+    flatness_mm = (0.0, 0.0, options.flatness_mm)
     reconstructor = Reconstructor(
-        views.layout, views.rig, at_rest, flatness_mm=(0.0, 0.0, flatness_mm), model_px=model_px
+        views.layout, views.rig, at_rest, flatness_mm=flatness_mm, model_px=options.model_px
     )
-    sink = open_sink(output, ShapeTable(reconstructor))
-    tracker = ShapeTracker(reconstructor, warm=not cold)
-    return TrackingRun(open_sources(source, fps), tracker, sink, ShapeStatistics(reconstructor))
+    sink = open_sink(options.output, ShapeTable(reconstructor))
+    tracker = ShapeTracker(reconstructor, warm=not options.cold)
+    source = open_sources(options.source, options.fps)
+    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor))
 
 
-def _read_rest_image(rest: str, source: str, fps: float | None) -> Any:
-    """The picture at rest; a list of one for each view where there are several sources."""
+def _read_rest_image(options: _Options) -> Any:
+    """The image at rest; of several sources a list with one image for each view."""
     from cmpdesign.tracking.run import read_rest_image
     from cmpdesign.tracking.sources import split_list
 
-    sources, rests = split_list(source), split_list(rest)
+    sources, rests = split_list(options.source), split_list(options.rest)
     if len(rests) == 1:
         rests = rests * len(sources)
     if len(rests) != len(sources):
         raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
-    pictures = [read_rest_image(name, of, fps) for name, of in zip(rests, sources, strict=True)]
-    return pictures if len(pictures) > 1 else pictures[0]
+    images = [read_rest_image(rest, name, options.fps) for rest, name in zip(rests, sources, strict=True)]
+    return images if len(images) > 1 else images[0]
 
 
 def _write_summary(run: TrackingRun, source: str, output: Path) -> None:
-    """The summary beside the table, and on the terminal; also after a failure."""
-    if not run.tally.frames:
+    """Write the summary next to the table and print it; also after a failure."""
+    if not run.statistics.frames:
         return
     from cmpdesign.files.atomic import write_file
 
-    summary = run.tally.to_json(source, run.source.total, run.ended_early)
+    summary = run.statistics.to_json(source, run.source.total, run.ended_early)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
     write_file(output.with_suffix(".summary.json"), text)
@@ -139,9 +148,9 @@ def _print_summary(summary: dict[str, Any]) -> None:
 
     frames, sigma, largest = summary["frames"], summary["sigma_um"], summary["largest_displacement"]
     others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
-    said = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
+    not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
     rows = {
-        "frames": f"{frames['read']} read, {frames['tracked']} tracked{said}",
+        "frames": f"{frames['read']} read, {frames['tracked']} tracked{not_tracked}",
         "views": "; ".join(f"{view['name']} {view['rms_px']:.3f} px at rest" for view in summary["views"]),
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in summary["marker_shares"].items()),
     }

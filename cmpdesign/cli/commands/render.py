@@ -1,4 +1,4 @@
-"""``cmpdesign render``: a picture of a pattern with its ground truth."""
+"""``cmpdesign render``: renders an image of a pattern with its ground truth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import typer
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError
 
-# Options that a scene file has names for.
+# Options with a key in a scene file.
 SCENE_FILE_KEYS = {
     "pitch": "[camera] pitch_px",
     "rotation": "[camera] rotation_deg",
@@ -27,7 +27,11 @@ SCENE_FILE_KEYS = {
 
 
 def require_finite(option: typer.CallbackParam, value: float | None) -> float | None:
-    """A number that is one: the parser takes "nan" and "inf" for numbers, too."""
+    """Check that the value of an option is finite: the parser accepts "nan" and "inf".
+
+    Raises:
+        CmpDesignError: a value that is not finite.
+    """
     if value is not None and not math.isfinite(value):
         raise CmpDesignError(f"{option.opts[0]} is {value}; expected a finite number")
     return value
@@ -104,7 +108,7 @@ def render(
     pixels = parse_image_size(size)
     pattern = read_layout(layout)
     radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
-    seen = Scene(
+    view = Scene(
         layout=pattern,
         camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
         surface=composed(Press(radius, press)) if press else None,
@@ -112,7 +116,7 @@ def render(
         sensor=Sensor(noise=noise) if noise else None,
         seed=seed,
     )
-    rendered = render_scene(seen, size=pixels)
+    rendered = render_scene(view, size=pixels)
     if truth is not None:
         save_truth(rendered.truth, truth)
         console().print(f"wrote {printable_path(truth)}")
@@ -124,10 +128,10 @@ def render(
 
 
 def _given_options(ctx: typer.Context) -> set[str]:
-    """The options that stand on the command line; beside a scene file only those that a file does not have.
+    """The names of the options on the command line, for use with a scene file.
 
     Raises:
-        CmpDesignError: an option that the file's tables have, too.
+        CmpDesignError: an option with a key in scene files.
     """
     sources = {name: ctx.get_parameter_source(name) for name in ctx.params}
     given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
@@ -140,7 +144,11 @@ def _given_options(ctx: typer.Context) -> set[str]:
 
 
 def parse_image_size(text: str) -> tuple[int, int]:
-    """Width and height from "640x480"; raises ``CmpDesignError``."""
+    """Width and height from "640x480".
+
+    Raises:
+        CmpDesignError: another text.
+    """
     match = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
     if not match:
         raise CmpDesignError(f"--size {text}: expected WIDTHxHEIGHT, 10 to 9999 pixels each, as in 640x480")

@@ -1,4 +1,4 @@
-"""``cmpdesign render --scene``: a scene file to an image, or a sequence to a video with the truth of every frame."""
+"""``cmpdesign render --scene``: renders a scene file to an image, or to a video or folder with the truth per frame."""
 
 from __future__ import annotations
 
@@ -25,10 +25,18 @@ def render_scene_file(
     size: tuple[int, int] | None,
     seed: int | None,
 ) -> None:
-    """Draw what a scene file says; size and seed come before the file's own.
+    """Render a scene file.
+
+    Args:
+        layout: the layout file.
+        scene: the scene file, or the name of a scene template.
+        output: image, video or folder to write.
+        truth: file for the ground truth, if any.
+        size: (width, height) in px in place of the file's, if any.
+        seed: seed in place of the file's, if any.
 
     Raises:
-        CmpDesignError: a value that cannot be drawn, or an ending that does not fit.
+        CmpDesignError: a value that cannot be rendered, or a suffix that does not suit the scene.
     """
     from cmpdesign.design.templates import find_scene
     from cmpdesign.reading.read_layout import read_layout
@@ -66,14 +74,14 @@ def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.scene import render, save_truths
     from cmpdesign.scene.files.frame_writer import open_frame_writer
 
-    film = open_frame_writer(output, file.fps or 1.0, file.size_px, file.bits)
+    writer = open_frame_writer(output, file.fps or 1.0, file.size_px, file.bits)
     truths: list[Truth] = []
     warnings: dict[str, int] = {}
     try:
         with _progress_bar(file.frames) as advance:
             for scene in file.scenes():
                 rendered = render(scene, size=file.size_px)
-                film.add(rendered.image)
+                writer.add(rendered.image)
                 truths.append(rendered.truth)
                 for warning in rendered.warnings:
                     warnings.setdefault(warning, scene.frame)
@@ -81,9 +89,9 @@ def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
         if truth is not None:
             save_truths(truths, [file.time_s(frame) for frame in range(file.frames)], truth)
             console().print(f"wrote {printable_path(truth)}")
-        film.close()
+        writer.close()
     except BaseException:
-        film.discard()
+        writer.discard()
         raise
     _print_scene_warnings(warnings, file)
     console().print(
@@ -92,7 +100,7 @@ def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
 
 
 def _print_scene_warnings(warnings: dict[str, int], file: SceneFile) -> None:
-    """The first frame that has each kind of warning, told by its words without numbers."""
+    """Print each kind of warning with its first frame; kinds are compared by letters, without numbers."""
     kinds: dict[str, str] = {}
     for text, frame in warnings.items():
         kind = "".join(letter for letter in text if letter.isalpha())
@@ -113,7 +121,7 @@ def _format_visible_count(truth: Truth) -> str:
 
 @contextmanager
 def _progress_bar(total: int) -> Iterator[Callable[[], None]]:
-    """A bar on stderr where a terminal shows it."""
+    """A progress bar on stderr (if a terminal); yields the function to call per frame."""
     terminal = console(stderr=True)
     if not terminal.is_terminal:
         yield lambda: None

@@ -1,4 +1,4 @@
-"""``cmpdesign schema``: the JSON Schema of a design."""
+"""``cmpdesign schema``: prints the JSON Schema of a design."""
 
 from __future__ import annotations
 

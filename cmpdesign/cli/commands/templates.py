@@ -1,4 +1,4 @@
-"""``cmpdesign templates``: the designs that are shipped."""
+"""``cmpdesign templates``: lists the shipped designs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cmpdesign track``: a pattern through a video, a folder of images or a camera's frames."""
+"""``cmpdesign track``: tracks a pattern through a video, a folder of images or the frames of a camera."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def track(
     run.limit = frames
     try:
         run_with_progress(run, "tracking")
-    except OutputError:  # no reason to keep from the user what could be tracked
+    except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
             _write_summary(run, reference, source, output, quiver)
         raise
@@ -87,7 +87,7 @@ def _prepare_run(
     overlay: Path | None,
     cold: bool,
 ) -> TrackingRun:
-    """Everything that can be refused is refused here, before a file is made."""
+    """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.overlay import OverlayWriter
     from cmpdesign.tracking.run import TrackingRun, read_rest_markers
     from cmpdesign.tracking.sinks import open_sink
@@ -108,17 +108,17 @@ def _prepare_run(
 def _write_summary(
     run: TrackingRun, reference: Reference, source: str, output: Path, quiver: Path | None
 ) -> None:
-    """The summary beside the table, the plot, and both on the terminal; also after a failure."""
-    if not run.tally.frames:
+    """Write the summary next to the table and the quiver plot, and print the summary; also after a failure."""
+    if not run.statistics.frames:
         return
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.tracking.quiver import draw_quiver
 
-    summary = run.tally.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
+    summary = run.statistics.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
     _print_summary(summary)
     paths = {output.with_suffix(".summary.json"): json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
-    farthest, rest = run.tally.farthest, run.tracker.rest
+    farthest, rest = run.statistics.farthest, run.tracker.rest
     contents: dict[Path, str | bytes] = dict(paths)
     if quiver is not None and farthest is not None and rest is not None:
         contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
@@ -133,10 +133,10 @@ def _print_summary(summary: dict[str, Any]) -> None:
 
     frames, shares, rate = summary["frames"], summary["marker_shares"], summary["frames_per_s"]
     others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
-    said = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
+    not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
     jitter, largest = summary["jitter_px"], summary["largest_displacement"]
     rows = {
-        "frames": f"{frames['read']} read, {frames['tracked']} tracked{said}",
+        "frames": f"{frames['read']} read, {frames['tracked']} tracked{not_tracked}",
         "starts": ", ".join(f"{count} {start}" for start, count in summary["starts"].items()) or "none",
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in shares.items()),
         "frames per second": ", ".join(f"{name} {value:.0f}" for name, value in rate.items() if value),

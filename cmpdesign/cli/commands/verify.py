@@ -1,6 +1,6 @@
-"""``cmpdesign verify``: are these pictures the layout's pattern, seen and numbered as designed?
+"""``cmpdesign verify``: verifies images against a layout.
 
-A picture that shows a print sheet's code is judged as a print: whose it is, and how true.
+An image that shows the code of a print sheet is judged as a print: its layout, scales and skew.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ EXIT_NOT_VERIFIED = 1
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One image's name with its verdict, or with the error that says why it could not be read."""
+    """The name of an image with its verdict, or with the error of reading the image."""
 
     name: str
     verdict: Verdict | SheetVerdict | None
@@ -37,6 +37,7 @@ class Outcome:
 
     @property
     def exit_code(self) -> int:
+        """0 verified, 1 not verified, 2 not readable."""
         if self.verdict is None:
             return EXIT_BAD_INPUT
         return 0 if self.verdict.verified else EXIT_NOT_VERIFIED
@@ -69,26 +70,27 @@ def verify(
     from extractor import Extractor, load_layout
 
     reference = load_layout(layout)
-    judge = _ImageVerifier(
+    verifier = _ImageVerifier(
         reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug
     )
     names = _unique_names([path.stem for path in images])
     outcomes = [
-        judge.verify_image(path, name) for path, name in _with_progress(list(zip(images, names, strict=True)))
+        verifier.verify_image(path, name)
+        for path, name in _with_progress(list(zip(images, names, strict=True)))
     ]
     report = _outcomes_to_json(reference, outcomes, min_share)
     if output is not None:
         from cmpdesign.files.atomic import write_file
 
         write_file(output / "verify.json", report)
-    # After the bar: while it stands, it redirects whatever is printed to its own stream.
+    # Printed after the progress bar has ended, because the bar redirects standard output.
     sys.stdout.write(report if as_json else _format_outcomes(outcomes))
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
 @dataclass(frozen=True, eq=False)
 class _ImageVerifier:
-    """What pictures are judged by; the extractor is made when the first picture needs it."""
+    """Verifies images; the extractor is made when the first image needs it."""
 
     reference: Reference
     extractor: Callable[[], Extractor]
@@ -98,7 +100,7 @@ class _ImageVerifier:
     debug: Path | None
 
     def verify_image(self, path: Path, name: str) -> Outcome:
-        """An image that cannot be read is reported and does not keep the others from being processed."""
+        """Verify one image and write its pictures; an unreadable image is reported on stderr."""
         from cmpdesign.files.images import ImageFileError, read_image
         from cmpdesign.products.sheet.verdict import judge_sheet
         from cmpdesign.reading.verify import verify as verify_image
@@ -135,7 +137,7 @@ def _write_pictures(
 
 
 def _format_outcomes(outcomes: list[Outcome]) -> str:
-    """A line for every image that was read; what could not be read has been reported on stderr."""
+    """One line for every image that was read."""
     return "".join(
         f"{item.name}: {_format_verdict(item.verdict)}\n" for item in outcomes if item.verdict is not None
     )
@@ -166,7 +168,7 @@ def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: 
 
 
 def _unique_names(stems: list[str]) -> list[str]:
-    """Names for the written files: stems, numbered where several images share one."""
+    """Names for the written files: the stems, numbered where several images have the same stem."""
     names: list[str] = []
     for stem in stems:
         name, number = stem, 1
@@ -178,7 +180,7 @@ def _unique_names(stems: list[str]) -> list[str]:
 
 
 def _with_progress(items: list[tuple[Path, str]]) -> Iterable[tuple[Path, str]]:
-    """The items; with a bar on stderr where there are several and a terminal shows it."""
+    """The items, with a progress bar if there are several and stderr is a terminal."""
     terminal = console(stderr=True)
     if len(items) < 2 or not terminal.is_terminal:
         return items
