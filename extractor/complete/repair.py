@@ -35,9 +35,7 @@ MAX_FITTED_DEVIATION = 0.05  # of a fitted marker: a layer's quadratic is wrong 
 MIN_RIM_SUPPORT = 6  # known neighbours of a lost marker that cells imply
 MAX_LEVERAGE = 1.2  # of the neighbours' errors on a repaired marker
 MAX_RIM_LEVERAGE = 2.0  # the same on a marker that cells imply
-OUTER_RING_ERROR = (
-    0.04  # possible error of the outer ring where too few markers of the inner ring can confirm it
-)
+OUTER_RING_ERROR = 0.04  # possible error of the outer ring where too little of the inner ring can confirm it
 MODEL_DEVIATION = 0.012  # deviation of a smooth surface from a quadratic map
 # Errors of repaired markers against the residual of the fit to their neighbours, from 300 rendered scenes with missing
 # cells and dirt on flat, tilted, pressed and twisted patterns: deviation = MILD_ERROR * leverage * residual, as the

@@ -215,14 +215,14 @@ class Reconstructor:
         reasons = np.bincount(points.reason[both], minlength=len(PointReason)) if both.any() else np.zeros(1)
         why = PointReason(int(reasons.argmax())) if both.any() else PointReason.ONE_VIEW
         names = " and ".join(repr(view.name) for view in self.rig.views)
-        says = {
+        texts = {
             PointReason.PARALLEL: "stand too near to each other to tell depth: a position's standard deviation would "
             f"exceed {self._max_sigma_mm:.3g} mm",
             PointReason.DISAGREE: "contradict each other at rest; check their intrinsics and which are mirrored",
             PointReason.ONE_VIEW: "show no marker in common",
             PointReason.NO_RAY: "have markers where the distortion has no inverse; check it",
         }
-        raise PoseError(f"views {names} {says.get(why, 'show no marker in common')}")
+        raise PoseError(f"views {names} {texts.get(why, 'show no marker in common')}")
 
     def _select_views(self, markers: Sequence[Markers | None]) -> tuple[list[Markers | None], str]:
         """The markers of the views that show the pattern's side that their pose faces, and the others' problems."""
