@@ -32,10 +32,10 @@ PACKAGES = ("extractor", "cmpdesign")
 ROOMS = {
     "extractor": (
         "errors result presets numeric layout image cells localmap numbering refine complete pipeline track space draw"
-    ).split(),
+    ),
     "cmpdesign": (
         "errors units patterns design layout files reading contact scene products tracking evaluate cli demo writers"
-    ).split(),
+    ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign", "cmpdesign.writers"}  # the tops, and what is kept for old programs
 EXTRACTOR_NEEDS = {"numpy", "cv2", "scipy", "numba", "llvmlite"}
@@ -140,7 +140,7 @@ def upward_imports(root: Path) -> list[str]:
     """Of a room that stands later, or of names that a package above only hands on."""
     found = []
     for tree in (tree_of(root, package) for package in PACKAGES):
-        order = ROOMS[tree.package]
+        order = ROOMS[tree.package].split()
         strange = sorted({name.split(".")[1] for name in tree.files if "." in name} - set(order))
         found += [f"{tree.package}.{room}: has no place in the order" for room in strange]
         for module, target, each in inner_imports(tree):
