@@ -1,4 +1,7 @@
-"""Maps where rings are not whole: for many markers at once what they are for one."""
+"""Maps where rings are not whole: for many markers at once what they are for one.
+
+Inside: which neighbours an image leaves a marker cannot be chosen one by one, and least squares by numpy can.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Maps through two rings: those laid side by side are those laid alone, and least squares."""
+"""Maps through two rings: those laid side by side are those laid alone, and least squares.
+
+Inside: which neighbours an image leaves a marker cannot be chosen one by one, and least squares by numpy can.
+"""
 
 from __future__ import annotations
 
