@@ -357,7 +357,9 @@ def test_parts_that_do_nothing_change_no_byte(written: Callable[..., SceneFile])
     def image(text: str) -> bytes:
         return render(written(plain + text).scene(), size=SIZE).image.tobytes()
 
-    idle = "[light]\nvignetting = 0\n[damage]\nbleed_mm = 0\nmissing_share = 0\n[sensor]\nnoise = 0\ngamma = 1"
+    idle = (
+        "[light]\nvignetting = 0\n[damage]\nbleed_mm = 0\nmissing_share = 0\n[sensor]\nnoise = 0\ngamma = 1"
+    )
     assert image("") == image(idle)
     for part in ("[light]\nvignetting = 0.1", "[damage]\nbleed_mm = 0.05", "[damage]\nmissing_share = 0.1"):
         assert image("") != image(part)

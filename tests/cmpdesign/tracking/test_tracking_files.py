@@ -18,7 +18,6 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.tracking import sources
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
 from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference

@@ -192,7 +192,9 @@ def black_layer(name: str) -> Any:
     if mold.crown is not None:
         dishes = [make_dish(mold, color, through=False) for color in mold.colors]
         cavities = {cell: (tip, root) for dish in dishes for cell, (root, tip) in dish.outlines.items()}
-        dish = replace(dishes[0], outlines=cavities)  # with all colors' cavities, from the base to the open side
+        dish = replace(
+            dishes[0], outlines=cavities
+        )  # with all colors' cavities, from the base to the open side
         layer = dished_sheet_solid(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), dish)
     else:
         pairs = [(b.tip, b.root) for color in mold.colors for b in boss_features(mold, mold.cells(color))]
