@@ -45,4 +45,4 @@ def test_of_cells_under_a_blot_only_these_are_lost(pattern: str) -> None:
         away = np.linalg.norm(true - true[marker], axis=1)
         assert (markers.status[away > 60] == Status.MEASURED).all()
         error = errors_px(markers, seen)
-        assert np.nanmedian(error) < 0.1 and np.nanmax(error) < 0.16 * 18.0
+        assert np.nanmedian(error) < 0.17 and np.nanmax(error) < 0.16 * 18.0
