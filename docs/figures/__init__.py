@@ -1,4 +1,4 @@
 """Every picture and generated page of the documentation, drawn by the project's own code.
 
-``python -m docs.figures`` writes them again; ``tests/test_docs.py`` compares them with what is committed.
+``python -m docs.figures`` writes them again; ``tests/docs/test_docs.py`` compares them with what is committed.
 """

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.source_trees import python_files
+from tests.house.source_trees import python_files
 
 ROOT = Path(__file__).parents[2]
 SOURCES = [*python_files(ROOT / "cmpdesign"), *python_files(ROOT / "extractor")]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.source_trees import (
+from tests.house.source_trees import (
     Function,
     Import,
     Tree,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 import extractor
-from tests.support.source_trees import Import, imports_of, parsed, python_files
+from tests.house.source_trees import Import, imports_of, parsed, python_files
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("extractor", "cmpdesign")
