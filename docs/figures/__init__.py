@@ -1,4 +1,4 @@
-"""All pictures and generated pages of the documentation, made by the project's own code.
+"""Every picture and generated page of the documentation, drawn by the project's own code.
 
-``python -m docs.figures`` writes them. ``tests/docs/test_docs.py`` compares them with the committed files.
+``python -m docs.figures`` writes them again; ``tests/docs/test_docs.py`` compares them with what is committed.
 """

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -19,7 +20,6 @@ from benchmarks.support.published import replace_blocks
 from benchmarks.support.scenes import SceneCase, checkerboard_layout, inner_markers
 from cmpdesign.patterns.colors import BLACK, RED, WHITE
 from cmpdesign.scene import Rendered, Truth, standard_layout
-from extractor.cells.region_growing import Regions
 
 ROOT = Path(__file__).parents[2]
 
@@ -122,10 +122,7 @@ def test_the_articles_corners_are_those_of_the_triangles() -> None:
     corner = np.array([[10, 60], [40, 12], [68, 64]])
     cv2.fillConvexPoly(owner, corner[:, None], 1)
     cv2.circle(owner, (110, 40), 22, 2, -1)
-    regions = Regions(
-        owner, np.array([2, 3], np.uint8), np.zeros((2, 2), np.int32), np.zeros((2, 10)), np.ones(2, int)
-    )
-    found = fit_plain_triangles(regions)
+    found = fit_plain_triangles(SimpleNamespace(region_map=owner, ink=np.array([2, 3], np.uint8)))
     assert list(found.region) == [0] and list(found.ink) == [2]
     away = np.linalg.norm(found.corner_px[0][:, None] - corner[None], axis=2)
     assert away.min(axis=0).max() < 1.0

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from benchmarks.support.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus
-from extractor.presets import PRESETS
 
 LAYERS = 8
 SIZE = (400, 360)
 SEEDS = 3
+PRESETS = ("fast", "balanced", "accurate")
 PATTERNS = ("honeycomb", "round", "elliptical")
 Squares = NDArray[np.float64]
 

@@ -16,10 +16,16 @@ LAYERS = 5
 
 
 @cache
-def extractor(pattern: str, preset: str = "balanced") -> Extractor:
-    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, LAYERS))), preset)  # type: ignore[arg-type]
+def extractor(pattern: str, preset: str = "balanced", layers: int = LAYERS) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, layers))), preset)  # type: ignore[arg-type]
 
 
-def shown(pattern: str = "round", blur: float = 1.0, **changes: Any) -> Rendered:
-    plain = standard_scene(standard_layout(pattern, LAYERS))
-    return render(replace(plain, optics=Optics(blur), **changes), size=SIZE)
+def shown(
+    pattern: str = "round",
+    blur: float = 1.0,
+    layers: int = LAYERS,
+    size: tuple[int, int] = SIZE,
+    **changes: Any,
+) -> Rendered:
+    plain = standard_scene(standard_layout(pattern, layers))
+    return render(replace(plain, optics=Optics(blur), **changes), size=size)

@@ -15,7 +15,7 @@ import pytest
 
 from cmpdesign import __version__
 from cmpdesign.design.templates import templates
-from extractor.layout.layout_file import load_layout
+from extractor import load_layout
 from tests.support.command import refused, run
 
 

@@ -15,9 +15,8 @@ from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
 from cmpdesign.reading.read_layout import read_layout
-from extractor.errors import LayoutError
-from extractor.layout.layout_file import SCHEMA_PATH, parse_layout
-from tests.support.layouts import small_document
+from extractor import LayoutError, parse_layout
+from tests.support.layouts import layout_schema, small_document
 
 
 @pytest.mark.parametrize("count", [3, 4])
@@ -46,7 +45,7 @@ def test_the_layout_file_carries_them(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.fiducials_mm, layout.fiducials_mm)
     assert again.fiducial_diameter_mm == 3.0
     assert layout_to_json(again) == path.read_text(encoding="utf-8")
-    jsonschema.validate(json.loads(path.read_text()), json.loads(SCHEMA_PATH.read_text(encoding="utf-8")))
+    jsonschema.validate(json.loads(path.read_text()), layout_schema())
 
 
 def test_a_file_without_them_still_reads() -> None:

@@ -351,26 +351,18 @@ def test_what_is_absent_is_not_even_imported(tmp_path: Path) -> None:
     assert contact <= loaded("size_px = [96, 80]\n" + BALL)
 
 
-def test_what_is_absent_is_not_called(written, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
-    module = sys.modules["cmpdesign.scene.drawing.render"]
-    called: list[str] = []
-    for name in ("gain", "add_hidden_parts", "bled", "missing", "_with_dirt", "point_spread"):
-        original = getattr(module, name)
+def test_parts_that_do_nothing_change_no_byte(written: Callable[..., SceneFile]) -> None:
+    plain = "size_px = [96, 80]\n[camera]\npitch_px = 16\n"
 
-        def noted(*args: object, _name: str = name, _original: object = original) -> object:
-            called.append(_name)
-            return _original(*args)  # type: ignore[operator]
+    def image(text: str) -> bytes:
+        return render(written(plain + text).scene(), size=SIZE).image.tobytes()
 
-        monkeypatch.setattr(module, name, noted)
-    found = sys.modules["cmpdesign.scene.drawing.view"]
-    monkeypatch.setattr(found, "find_occlusion", lambda *_: called.append("find_folds"))
-    monkeypatch.setattr("cmpdesign.scene.parts.sensor._jpeg_roundtrip", lambda *_: called.append("jpeg"))
-    file = written("size_px = [96, 80]\n[camera]\npitch_px = 16")
-    render(file.scene(), size=SIZE)
-    assert set(called) == {"point_spread"}  # of the pixel itself
-    full = "size_px = [96, 80]\n[light]\nvignetting = 0.1\n[damage]\nbleed_mm = 0.01\nmissing_share = 0.1\n"
-    render(written(full + "[surface.dent]\nradius_mm = 2\ndepth_mm = 0.1").scene(), size=SIZE)
-    assert {"gain", "bled", "missing", "find_folds"} <= set(called)
+    idle = (
+        "[light]\nvignetting = 0\n[damage]\nbleed_mm = 0\nmissing_share = 0\n[sensor]\nnoise = 0\ngamma = 1"
+    )
+    assert image("") == image(idle)
+    for part in ("[light]\nvignetting = 0.1", "[damage]\nbleed_mm = 0.05", "[damage]\nmissing_share = 0.1"):
+        assert image("") != image(part)
 
 
 @pytest.mark.parametrize("name", scene_templates())

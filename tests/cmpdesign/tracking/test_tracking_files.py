@@ -18,7 +18,6 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.tracking import sources
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
 from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference
@@ -232,7 +231,7 @@ class StoppingCamera:
 
 def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     camera = StoppingCamera(made / "frames", 8)
-    monkeypatch.setattr(sources, "_open_capture", lambda number: camera)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda number: camera)
     result = run("track", made / "layout.json", "0", "-o", tmp_path / "a.npz")
     assert result.exit_code == 1 and "the camera stopped after 8 frames" in result.stderr
     table = loaded(tmp_path / "a.npz")

@@ -1,4 +1,7 @@
-"""Stage 5 alone: ideal triangles are found exactly, from their moments and then from their edges."""
+"""Stage 5 alone: ideal triangles are found exactly, from their moments and then from their edges.
+
+Inside: refinement solves all cells together, so that an image does not show how well one triangle is found.
+"""
 
 from __future__ import annotations
 

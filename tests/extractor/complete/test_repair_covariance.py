@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from benchmarks.calibration import DAMAGE_KINDS, normalised_squares
-from extractor.presets import Preset
 
 
 @pytest.mark.parametrize(
@@ -19,7 +18,7 @@ from extractor.presets import Preset
     ],
 )
 @pytest.mark.parametrize(("status", "least"), [("repaired", 200), ("fitted", 80)])
-def test_the_covariance_of_a_repaired_marker_is_true(preset: Preset, status: str, least: int) -> None:
+def test_the_covariance_of_a_repaired_marker_is_true(preset: str, status: str, least: int) -> None:
     found = normalised_squares(preset)[status]
     assert len(found) >= least
     assert 0.8 < np.sqrt(found.mean()) < 1.3
@@ -28,7 +27,7 @@ def test_the_covariance_of_a_repaired_marker_is_true(preset: Preset, status: str
 
 @pytest.mark.parametrize("preset", ["balanced", pytest.param("accurate", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", DAMAGE_KINDS)
-def test_the_covariance_of_a_measured_marker_beside_damage_is_true(preset: Preset, kind: str) -> None:
+def test_the_covariance_of_a_measured_marker_beside_damage_is_true(preset: str, kind: str) -> None:
     found = normalised_squares(preset)[kind]
     assert len(found) > 6000
     assert 0.8 < np.sqrt(found.mean()) < 1.3

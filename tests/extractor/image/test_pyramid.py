@@ -1,4 +1,7 @@
-"""Reduced images: means of squares of pixels."""
+"""Reduced images: means of squares of pixels.
+
+Inside: a mean that is rounded to the wrong side moves markers by less than their noise.
+"""
 
 from __future__ import annotations
 

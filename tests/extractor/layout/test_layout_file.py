@@ -17,12 +17,10 @@ from hypothesis import strategies as st
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
-from extractor.errors import LayoutError
-from extractor.layout.layout_file import SCHEMA_PATH, load_layout, parse_layout
-from extractor.layout.reference import Reference
-from tests.support.layouts import PATTERNS, small_document, small_layout, small_text
+from extractor import LayoutError, Reference, load_layout, parse_layout
+from tests.support.layouts import PATTERNS, layout_schema, small_document, small_layout, small_text
 
-SCHEMA = json.loads(SCHEMA_PATH.read_text(encoding="utf-8"))
+SCHEMA = layout_schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 Damage = Callable[[dict[str, Any]], object]

@@ -1,4 +1,7 @@
-"""The triangulation against an independent one."""
+"""The triangulation against an independent one.
+
+Inside: the numbering of an image needs no more than most of the triangles, so that it hides a wrong one.
+"""
 
 from __future__ import annotations
 

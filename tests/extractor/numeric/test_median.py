@@ -1,4 +1,7 @@
-"""The median by ranks is the median."""
+"""The median by ranks is the median.
+
+Inside: of many medians in an image a wrong one is an outlier more, which other steps repair.
+"""
 
 from __future__ import annotations
 

@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from extractor import PoseError, View
-from extractor.space.pose import estimate_poses
-from tests.support.view_scenes import flat, looking, noisy, opencv_px, pair, reference, unplaced
+from extractor import Markers, PoseError, Reconstructor, Rig, Status, View
+from tests.support.view_scenes import flat, looking, noisy, pair, pressed, reference, unplaced
 
-NONE = (0.0, 0.0, 0.0)
+LAYOUT = reference()
+NEARLY_NONE = 1e-9  # px of noise
+Views = tuple[View, ...]
 
 
-def placed(views: tuple[View, ...], rng: np.random.Generator, spread=NONE, sigma_px: float = 0.02):
-    layout = reference()
-    seen = [noisy(layout, view, flat(layout), rng, sigma_px) for view in views]
-    xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
-    return estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, spread)
+def rest(
+    views: Views, seed: int, sigma_px: float = 0.02, xyz_mm: NDArray[np.float64] | None = None
+) -> list[Markers]:
+    rng, true = np.random.default_rng(seed), flat(LAYOUT) if xyz_mm is None else xyz_mm
+    return [noisy(LAYOUT, view, true, rng, sigma_px) for view in views]
+
+
+def placed(views: Views, seed: int, sigma_px: float = 0.02, **options: Any) -> Reconstructor:
+    """A rig without poses, its views placed by their markers at rest."""
+    return Reconstructor(LAYOUT, unplaced(views), rest(views, seed, sigma_px), **options)
+
+
+def without(markers: Markers, gone: NDArray[np.bool_]) -> Markers:
+    status = np.where(gone, np.uint8(Status.LOST), markers.status)
+    return replace(markers, status=status, xy_px=np.where(gone[:, None], np.nan, markers.xy_px))
 
 
 def pose_error(found: View, true: View) -> np.ndarray:
@@ -27,10 +42,10 @@ def pose_error(found: View, true: View) -> np.ndarray:
 
 
 @pytest.mark.parametrize("mirrored", [(False, False), (True, True), (True, False)])
-@pytest.mark.parametrize("tilt_deg", [0.0, 15.0, 50.0])
+@pytest.mark.parametrize("tilt_deg", [4.0, 15.0, 50.0])
 def test_poses_are_found_from_any_direction(tilt_deg: float, mirrored: tuple[bool, bool]) -> None:
     views = pair(tilt_deg, mirrored)
-    for found, true in zip(placed(views, np.random.default_rng(1)).views, views, strict=True):
+    for found, true in zip(placed(views, 1).poses.views, views, strict=True):
         assert np.abs(pose_error(found, true)).max() < 0.02
         assert found.mirrored == true.mirrored
 
@@ -39,22 +54,25 @@ def test_poses_are_found_from_any_direction(tilt_deg: float, mirrored: tuple[boo
 @pytest.mark.parametrize("azimuth_deg", [10, 100, 190, 280])
 def test_the_right_one_of_the_planes_two_poses(back: bool, azimuth_deg: float) -> None:
     """Weak perspective: the layout is 16 mm wide, 150 mm away; the second pose explains it nearly as well."""
-    view = looking("far", tilt_deg=30, azimuth_deg=azimuth_deg, distance_mm=150, focal_px=4000, back=back)
-    found = placed((view,), np.random.default_rng(2)).views[0]
-    assert np.degrees(np.linalg.norm(pose_error(found, view)[:3])) < 0.5
+    views = tuple(
+        looking(name, tilt_deg=30, azimuth_deg=azimuth_deg + turn, distance_mm=150, focal_px=4000, back=back)
+        for name, turn in (("far", 0), ("other", 180))
+    )
+    for found, true in zip(placed(views, 2).poses.views, views, strict=True):
+        assert np.degrees(np.linalg.norm(pose_error(found, true)[:3])) < 0.5
 
 
 def test_poses_that_cannot_be_told_apart_are_refused() -> None:
-    view = looking("far", tilt_deg=20, distance_mm=20000, focal_px=400000)
+    views = (looking("far", tilt_deg=20, distance_mm=20000, focal_px=400000), pair()[1])
     with pytest.raises(PoseError, match=r"view 'far': two poses, \d+\.\d degrees apart, explain the markers"):
-        placed((view,), np.random.default_rng(2), sigma_px=0.3)
+        placed(views, 2, sigma_px=0.3)
 
 
 def test_the_poses_covariance_is_calibrated() -> None:
-    views, rng = pair(), np.random.default_rng(3)
+    views = pair()
     squares, misfits = [], []
-    for _ in range(40):
-        poses = placed(views, rng)
+    for seed in range(40):
+        poses = placed(views, seed).poses
         error = np.concatenate([pose_error(f, t) for f, t in zip(poses.views, views, strict=True)])
         squares.append(error @ np.linalg.solve(poses.cov, error) / 12)
         misfits.append(poses.misfit)
@@ -64,14 +82,12 @@ def test_the_poses_covariance_is_calibrated() -> None:
 
 def test_a_dome_at_rest_is_a_dome_when_views_are_placed_jointly() -> None:
     """Surfaces are not flat at rest: assuming so turns each view; placed jointly they agree on the dome."""
-    layout, views, rng = reference(), pair(), np.random.default_rng(4)
-    dome = flat(layout)
-    dome[:, 2] = 0.3 - 0.004 * (layout.xy_mm**2).sum(axis=1)
-    seen = [noisy(layout, view, dome, rng) for view in views]
-    xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
+    views, dome = pair(), flat(LAYOUT)
+    dome[:, 2] = 0.3 - 0.004 * (LAYOUT.xy_mm**2).sum(axis=1)
+    seen = rest(views, 4, xyz_mm=dome)
     rigid, joint = (
-        estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, spread)
-        for spread in (NONE, (0.001, 0.001, 0.2))
+        Reconstructor(LAYOUT, unplaced(views), seen, flatness_mm=flatness).poses
+        for flatness in (0.0, (0.001, 0.001, 0.2))
     )
     assert rigid.misfit > 3 and joint.misfit < 1.2
     apart = [np.linalg.norm(p.views[0].position_mm - p.views[1].position_mm) for p in (rigid, joint)]
@@ -80,45 +96,48 @@ def test_a_dome_at_rest_is_a_dome_when_views_are_placed_jointly() -> None:
 
 
 def test_markers_that_lie_elsewhere_do_not_turn_the_pose() -> None:
-    layout, views = reference(), pair()
-    seen = [noisy(layout, view, flat(layout), np.random.default_rng(5)) for view in views]
-    xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
-    xy[0, [3, 40]] += (4.0, -6.0)
-    poses = estimate_poses(unplaced(views).views, layout.xy_mm, xy, cov, NONE)
-    assert not poses.used[[3, 40]].any() and poses.used.sum() == len(layout.xy_mm) - 2
+    views = pair()
+    left, right = rest(views, 5)
+    moved = left.xy_px.copy()
+    moved[[3, 40]] += (4.0, -6.0)
+    poses = Reconstructor(LAYOUT, unplaced(views), [replace(left, xy_px=moved), right]).poses
+    assert not poses.used[[3, 40]].any() and poses.used.sum() == len(LAYOUT.xy_mm) - 2
     assert np.abs(pose_error(poses.views[0], views[0])).max() < 0.005
 
 
 def test_a_given_pose_is_kept_and_exact() -> None:
     left, right = pair()
-    layout, rng = reference(), np.random.default_rng(6)
-    seen = [noisy(layout, view, flat(layout), rng) for view in (left, right)]
-    xy, cov = np.stack([m.xy_px for m in seen]), np.stack([m.cov_px2 for m in seen])
-    poses = estimate_poses((left, unplaced((right,)).views[0]), layout.xy_mm, xy, cov, NONE)
+    poses = Reconstructor(LAYOUT, Rig((left, *unplaced((right,)).views)), rest((left, right), 6)).poses
     assert poses.views[0] is left and not poses.cov[:6].any() and poses.cov[6:, 6:].diagonal().all()
 
 
 def test_too_few_markers_or_markers_on_a_line_are_refused() -> None:
-    layout, (view, _) = reference(), pair()
-    xy, cov = opencv_px(view, flat(layout))[None], np.tile(np.eye(2) * 1e-4, (1, len(layout.xy_mm), 1, 1))
-    few, line = np.full_like(xy, np.nan), np.full_like(xy, np.nan)
-    few[0, :5] = xy[0, :5]
-    row = np.flatnonzero(abs(layout.xy_mm[:, 1]) < 1e-9)
-    line[0, row] = xy[0, row]
-    for seen, said in ((few, "5 markers at rest; a pose needs 6"), (line, "lie on a line")):
+    views = pair()
+    left, right = rest(views, 7)
+    off_line = abs(LAYOUT.xy_mm[:, 1]) > 1e-9
+    for gone, said in (
+        (np.arange(len(off_line)) >= 5, "5 markers at rest; a pose needs 6"),
+        (off_line, "lie on a line"),
+    ):
         with pytest.raises(PoseError, match=f"view 'left': .*{said}"):
-            estimate_poses(unplaced((view,)).views, layout.xy_mm, seen, cov, NONE)
+            Reconstructor(LAYOUT, unplaced(views), [without(left, gone), right])
 
 
 def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
-    left, right = pair(mirrored=(True, False))
-    rig = unplaced((left, right)).views
+    left, right = views = pair(mirrored=(True, False))
+    seen = rest(views, 8, NEARLY_NONE)
+    rig = unplaced(views)
+    assert Reconstructor(LAYOUT, rig, seen).poses.views[0].position_mm[2] < 0
     wrong = View(left.name, left.focal_px, left.centre_px, left.distortion, mirrored=False)
-    layout = reference()
-    xy = np.stack([opencv_px(view, flat(layout)) for view in (left, right)])
-    cov = np.tile(np.eye(2) * 1e-4, (2, len(layout.xy_mm), 1, 1))
-    assert estimate_poses(rig, layout.xy_mm, xy, cov, NONE).views[0].position_mm[2] < 0
     with pytest.raises(
         PoseError, match="view 'left' would look at the pattern's front, view 'right' at its back"
     ):
-        estimate_poses((wrong, rig[1]), layout.xy_mm, xy, cov, NONE)
+        Reconstructor(LAYOUT, Rig((wrong, rig.views[1])), seen)
+    assert right.position_mm[2] < 0
+
+
+def test_a_surface_that_was_pressed_at_rest_is_not_taken_for_the_layout() -> None:
+    """What is no layout at rest shows in the misfit."""
+    views = pair()
+    poses = Reconstructor(LAYOUT, unplaced(views), rest(views, 9, xyz_mm=pressed(LAYOUT.xy_mm, 0.3))).poses
+    assert poses.misfit > 2

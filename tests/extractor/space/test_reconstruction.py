@@ -84,7 +84,8 @@ def test_the_whole_reconstruction_is_calibrated() -> None:
     """Poses from a noisy rest frame each time, so that their part of the covariance is counted, too."""
     views, rng = pair(mirrored=(True, False)), np.random.default_rng(4)
     position, moved, virtual = [], [], []
-    on_edge = Reconstructor(LAYOUT, Rig(views), None)._virtual(TRUE)
+    exact = [noisy(LAYOUT, view, TRUE, rng, 1e-9) for view in views]
+    on_edge = Reconstructor(LAYOUT, Rig(views), None).reconstruct(exact).virtual_xyz_mm
     for _ in range(25):
         rest, now = ([noisy(LAYOUT, v, xyz, rng) for v in views] for xyz in (flat(LAYOUT), TRUE))
         shape = Reconstructor(LAYOUT, unplaced(views), rest, model_px=0.0).reconstruct(now)

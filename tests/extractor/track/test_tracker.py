@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 
 from cmpdesign.scene import Camera, Light, Optics, Press, Rendered, composed, render
 from cmpdesign.scene.camera.plain import camera_homography
-from extractor import Extractor, FrameStatus, StartKind, Status, Tracker
-from extractor.errors import LayoutError
-from extractor.track.warm_tables import build_warm_tables, predict_missing_markers
+from extractor import Extractor, FrameStatus, LayoutError, StartKind, Status, Tracker
 from tests.support.tracking_scenes import (
     LAYERS,
     PITCH_MM,
@@ -257,16 +255,6 @@ def test_the_homography_at_rest_is_the_camera_s() -> None:
     true = camera_homography(Camera(PITCH_PX, 7.3, 25.0), scene().layout, SIZE)
     product = true @ tracker.rest.layout_from_image
     np.testing.assert_allclose(product / product[2, 2], np.eye(3), atol=0.02)
-
-
-def test_lost_markers_are_predicted_from_their_neighbours() -> None:
-    tables = build_warm_tables(reference())
-    true = shot(sensor=None, rotation_deg=33.0).truth.marker_xy_px
-    holed = true.copy()
-    holed[[0, 5, 60, 90]] = np.nan
-    np.testing.assert_allclose(predict_missing_markers(tables, holed), true, atol=1e-6)
-    nothing = np.full_like(true, np.nan)
-    assert np.isnan(predict_missing_markers(tables, nothing)).all()
 
 
 def test_a_square_pattern_is_refused() -> None:

@@ -29,8 +29,7 @@ from cmpdesign.products.laser.paths.order import order_cells, shortest_pause
 from cmpdesign.products.laser.paths.strokes import ragged_strokes
 from cmpdesign.products.laser.paths.timing import move_times_s
 from cmpdesign.products.laser.paths.tour import find_short_tour, tour_length_mm
-from extractor import Extractor
-from extractor.layout.layout_file import parse_layout
+from extractor import Extractor, parse_layout
 from tests.support.laser_tools import Points, groups_of, made_job, run_gcode
 
 PX_PER_MM = 20.0

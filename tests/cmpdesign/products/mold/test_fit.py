@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -12,9 +13,9 @@ import pytest
 from cmpdesign import build_layout, load_design
 from cmpdesign.products.mold import make
 from cmpdesign.products.mold.checks import facet_sag_mm
-from cmpdesign.products.mold.pad import _cavity_dish
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, boss_features
+from cmpdesign.products.mold.shapes.dish import make_dish
 from cmpdesign.products.mold.shapes.dished_solids import dished_sheet_solid
 from cmpdesign.products.mold.solids.measure import distance_mm, overlap_mm3, subshapes, volume_mm3
 from cmpdesign.products.mold.solids.slab_shells import Slab, make_slab_solid
@@ -189,7 +190,12 @@ def black_layer(name: str) -> Any:
     mold = stack(name)
     edges, thickness = mold.edges(1), mold.thickness_mm[1]
     if mold.crown is not None:
-        layer = dished_sheet_solid(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), _cavity_dish(mold))
+        dishes = [make_dish(mold, color, through=False) for color in mold.colors]
+        cavities = {cell: (tip, root) for dish in dishes for cell, (root, tip) in dish.outlines.items()}
+        dish = replace(
+            dishes[0], outlines=cavities
+        )  # with all colors' cavities, from the base to the open side
+        layer = dished_sheet_solid(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), dish)
     else:
         pairs = [(b.tip, b.root) for color in mold.colors for b in boss_features(mold, mold.cells(color))]
         layer = make_slab_solid(Slab(edges[0], 0.0, thickness, many_through=pairs, outer_top=edges[1]))

@@ -9,12 +9,14 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold import meshes as product
+from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import job_sheet_html
 from cmpdesign.products.mold.meshes import make_meshes, make_part_mesh
 from cmpdesign.products.mold.pad import pad_meshes
@@ -37,8 +39,6 @@ def content(made: ProductFiles, name: str) -> bytes:
 
 
 def trimesh_of(data: bytes, kind: str) -> Mapping[str, object]:
-    import trimesh
-
     scene = trimesh.load(io.BytesIO(data), file_type=kind)
     return dict(scene.geometry) if isinstance(scene, trimesh.Scene) else {"mesh": scene}
 
@@ -84,23 +84,26 @@ def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: Produc
     assert len(read_3mf(content(made, "mold.3mf"))) == 13
 
 
-def test_an_open_mesh_is_refused() -> None:
+def test_an_open_mesh_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1.0)])
     tent = TriangleMesh("tent", "#ff0000", points, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
     with pytest.raises(RuntimeError, match="tent: the mesh is not closed"):
         meshes_to_3mf([tent], "tent")
-    with pytest.raises(Exception, match="watertight False"):
-        product._add_checked_figures("tent", tent, tent.volume_mm3(), 1e-9, {})
+    monkeypatch.setattr(product, "pad_meshes", lambda stack: [(tent, tent.volume_mm3())])
+    design = load_design("honeycomb", {"layers": "1"})
+    with pytest.raises(MoldError, match="tent: watertight False"):
+        make_meshes(design, build_layout(design))
 
 
 @pytest.mark.parametrize("crown", ["sphere", "cylinder"])
 def test_crowned_meshes_are_closed(crown: str) -> None:
     design = load_design("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
     stack = make_stack(design, build_layout(design))
-    for mesh, volume in pad_meshes(stack):
-        product._add_checked_figures(mesh.name, mesh, volume, 1e-9, {})
-    for part in make_parts(stack):
-        product._add_checked_figures(part.name, *make_part_mesh(part), {})
+    made = [(mesh, volume, 1e-9) for mesh, volume in pad_meshes(stack)]
+    for mesh, volume, tolerance in made + [make_part_mesh(part) for part in make_parts(stack)]:
+        body = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
+        assert body.is_watertight and body.is_winding_consistent, mesh.name
+        assert mesh.volume_mm3() == pytest.approx(volume, rel=tolerance), mesh.name
 
 
 def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
