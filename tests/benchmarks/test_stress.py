@@ -158,7 +158,7 @@ def test_contrast_is_the_weakest_cells_under_its_light() -> None:
     assert shot.scene is not None
     size = (shot.image.shape[1], shot.image.shape[0])
     assert smallest_contrast(shot.scene, shot.truths[0], size) == 130  # green: 150 on 20
-    dim = plain_frame("honeycomb", 0).lit(rgb=(0.5, 0.5, 0.5))
+    dim = plain_frame("honeycomb", 0).with_light(rgb=(0.5, 0.5, 0.5))
     assert smallest_contrast(dim.scene, shot.truths[0], size) == 65
 
 

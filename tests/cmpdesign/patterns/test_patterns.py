@@ -26,7 +26,7 @@ SHAPES = st.builds(
 
 
 def positions(pattern: Pattern, shape: PatternShape) -> np.ndarray:
-    mesh = pattern.graph.mesh(shape.layers)
+    mesh = pattern.graph.make_graph(shape.layers)
     return pattern.positions(mesh.layer, mesh.index, shape)
 
 
@@ -60,7 +60,7 @@ def test_a_pattern_says_what_it_is_and_draws_itself(pattern: Pattern) -> None:
 def test_no_cell_is_inverted_and_none_overlap(pattern: Pattern, shape: PatternShape) -> None:
     xy = positions(pattern, shape)
     np.testing.assert_array_equal(xy[0], (0, 0))
-    area = areas(xy, pattern.graph.mesh(shape.layers).corners)
+    area = areas(xy, pattern.graph.make_graph(shape.layers).corners)
     assert area.min() > 0
     # Counter-clockwise cells that fill the rim's polygon exactly have no room to overlap: every point inside
     # is covered as often as the rim winds around it, which is once.
@@ -74,7 +74,7 @@ def test_the_union_of_the_cells_has_the_sum_of_their_areas(
     pattern: Pattern, spacing: str, aspect: float
 ) -> None:
     shape = PatternShape(4, aspect, spacing)
-    xy, corners = positions(pattern, shape), pattern.graph.mesh(4).corners
+    xy, corners = positions(pattern, shape), pattern.graph.make_graph(4).corners
     union = union_all([Polygon(xy[cell]) for cell in corners], grid_size=1e-10)
     assert union.area == pytest.approx(areas(xy, corners).sum(), rel=1e-7)
 
@@ -87,7 +87,7 @@ def test_the_rim_is_convex_and_counter_clockwise(pattern: Pattern, shape: Patter
     side = np.roll(rim, -1, axis=0) - rim
     turn = side[:, 0] * np.roll(side[:, 1], -1) - side[:, 1] * np.roll(side[:, 0], -1)
     assert turn.min() > -1e-9
-    mesh = pattern.graph.mesh(shape.layers)
+    mesh = pattern.graph.make_graph(shape.layers)
     assert set(zip(*pattern.graph.rim(shape.layers), strict=True)) <= set(
         zip(mesh.layer, mesh.index, strict=True)
     )
@@ -96,14 +96,14 @@ def test_the_rim_is_convex_and_counter_clockwise(pattern: Pattern, shape: Patter
 def test_honeycomb_edges_are_one_pitch_long() -> None:
     xy, corners = (
         positions(registered_patterns()["honeycomb"], PatternShape(7)),
-        registered_patterns()["honeycomb"].graph.mesh(7).corners,
+        registered_patterns()["honeycomb"].graph.make_graph(7).corners,
     )
     sides = xy[corners] - xy[np.roll(corners, 1, axis=1)]
     np.testing.assert_allclose(np.hypot(sides[..., 0], sides[..., 1]), 1, atol=1e-13)
 
 
 def test_round_markers_lie_on_circles_at_equal_angles() -> None:
-    mesh = TRIANGULAR_GRAPHS.mesh(5)
+    mesh = TRIANGULAR_GRAPHS.make_graph(5)
     xy = positions(registered_patterns()["round"], PatternShape(5))
     np.testing.assert_allclose(np.hypot(*xy.T), mesh.layer, atol=1e-13)
     for layer in range(1, 6):
@@ -130,7 +130,7 @@ def test_equal_parameter_angles_are_the_round_pattern_stretched() -> None:
 
 @pytest.mark.parametrize("aspect", [ASPECT_MIN, 0.7, 1.6, ASPECT_MAX])
 def test_equal_arc_length_by_numerical_integration(aspect: float) -> None:
-    mesh = TRIANGULAR_GRAPHS.mesh(3)
+    mesh = TRIANGULAR_GRAPHS.make_graph(3)
     xy = positions(registered_patterns()["elliptical"], PatternShape(3, aspect, "arc"))[mesh.layer == 3] / 3
     np.testing.assert_allclose(xy[:, 0] ** 2 + (xy[:, 1] / aspect) ** 2, 1, atol=1e-12)
     angle = np.unwrap(np.arctan2(xy[:, 1] / aspect, xy[:, 0]))

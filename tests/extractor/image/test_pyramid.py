@@ -19,4 +19,4 @@ def test_a_reduced_image_is_of_means(scale: int, size: tuple[int, int]) -> None:
     height, width = size[0] // scale, size[1] // scale
     whole = image[: height * scale, : width * scale].reshape(height, scale, width, scale, 3)
     sums = whole.astype(np.int64).sum(axis=(1, 3))
-    np.testing.assert_array_equal(Pyramid(image).at(scale).image, (2 * sums + scale**2) // (2 * scale**2))
+    np.testing.assert_array_equal(Pyramid(image).level(scale).image, (2 * sums + scale**2) // (2 * scale**2))

@@ -20,25 +20,25 @@ Array = NDArray[np.float64]
 
 def lone(xy: Array, mesh: Topology, m: int) -> Array:
     """(2, 5) the derivatives at one marker by numpy."""
-    known = [k for k, n in enumerate(mesh.near[m]) if n >= 0 and np.isfinite(xy[n, 0])]
+    known = [k for k, n in enumerate(mesh.ring_markers[m]) if n >= 0 and np.isfinite(xy[n, 0])]
     x, y = mesh.ring_vectors[m, known].T
     terms, weight = np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), (x * x + y * y) ** -2
     held = 1e9 if len(known) < 5 else 0.02 if len(known) < 8 else 0.001
     gram = (weight * terms) @ terms.T + np.diag([0.0, 0.0, held, held, held])
-    return np.asarray(np.linalg.solve(gram, (weight * terms) @ (xy[mesh.near[m, known]] - xy[m])).T)
+    return np.asarray(np.linalg.solve(gram, (weight * terms) @ (xy[mesh.ring_markers[m, known]] - xy[m])).T)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3, 0.75])
 def test_each_is_the_weighted_least_squares_quadratic(missing: float) -> None:
     mesh = topology_of(parse_layout(layout_to_json(standard_layout("honeycomb", 5))))
     rng = np.random.default_rng(int(100 * missing))
-    xy = rng.normal(size=(len(mesh.near), 2))
+    xy = rng.normal(size=(len(mesh.ring_markers), 2))
     xy[rng.random(len(xy)) < missing] = np.nan
     asked = np.flatnonzero(np.isfinite(xy[:, 0]))[
         :19
     ]  # some groups of those that are solved side by side, and three more
     out = np.full((len(xy), 2, 5), np.nan)
-    fill_quadratic_derivatives(xy, asked, mesh.near, mesh.ring_vectors, out)
+    fill_quadratic_derivatives(xy, asked, mesh.ring_markers, mesh.ring_vectors, out)
     told = [m for m in asked if np.isfinite(out[m, 0, 0])]
     assert len(told) > 16
     for m in told:

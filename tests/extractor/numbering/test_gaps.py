@@ -33,7 +33,7 @@ def test_a_part_beyond_a_gap_is_numbered_no_step_aside(pattern: str, width: floa
     )
     narrow = tuple(Scratch((x, y + width), (x + 2.0, 14.0), 0.1, BLACK_RGB) for x in (-4.0, 1.0))
     for number, surface in enumerate(SURFACES):
-        frame = plain_frame(pattern, int(width * 10) + number).formed(*surface)
+        frame = plain_frame(pattern, int(width * 10) + number).with_surface(*surface)
         figures = read(frame.damaged(scratches=gaps + (narrow if number % 2 else ())))
         assert figures.wrong == 0
         assert figures.kept >= (least - 0.02 * (number % 2)) * figures.sure

@@ -70,7 +70,7 @@ def test_no_cell_is_missed_however_small_it_looks_at_a_reduced_scale(
     pattern: str, pitch_px: float, tilt_deg: float
 ) -> None:
     """Of cells between those that every scale shows and those that the finest shows only, hardly one is lost."""
-    frame = plain_frame(pattern, 1).seen(pitch_px=float(pitch_px), tilt_deg=float(tilt_deg))
+    frame = plain_frame(pattern, 1).with_camera(pitch_px=float(pitch_px), tilt_deg=float(tilt_deg))
     for missing in (0.0, 0.05):
         shot = frame.damaged(missing_share=missing).shoot()
         figures = score_markers(cached_extractor(pattern, 11).extract(shot.image), shot, promised=True)

@@ -19,7 +19,7 @@ HALF_MM = 8.0
 
 def cropped(frame: PatternFrame) -> PatternFrame:
     """So near that no outline is in view: the white cell alone tells."""
-    return frame.seen(pitch_px=46.0)
+    return frame.with_camera(pitch_px=46.0)
 
 
 def read(frame: PatternFrame) -> Markers:
@@ -62,7 +62,7 @@ def test_what_is_no_cell_is_not_white(pattern: str, kind: str) -> None:
         "crossing": {"scratches": tuple(Scratch(*ends, 0.35, white) for ends in across)},
         "glare": {"glare": (Glare((float(nearest[0]), float(nearest[1])), 12.0),)},
     }
-    damaged = frame.having(damage=Damage(missing_cells=gone.missing_cells, **parts[kind]))
+    damaged = frame.with_parts(damage=Damage(missing_cells=gone.missing_cells, **parts[kind]))
     assert (read(damaged).status == 0).all()
 
 

@@ -21,7 +21,7 @@ def test_the_nearest_are_those_of_a_tree(count: int, shape: tuple[float, float])
     grid, wanted = bucket_grid(xy), min(8, count)
     for query in rng.uniform(-80, 80, (8, 2)) * shape:
         index, square = np.empty(8, np.int32), np.empty(8)
-        found = fill_nearest_points(xy, grid, query[0], query[1], index, square)
+        found = fill_nearest_points(grid, query[0], query[1], index, square)
         distance = cKDTree(xy).query(query, [*range(1, wanted + 1)])[0]
         assert found == wanted
         np.testing.assert_allclose(np.sqrt(square[:found]), distance, atol=1e-9)
