@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError
+
+if TYPE_CHECKING:
+    from cmpdesign.scene import Scene
 
 # Options with a key in a scene file.
 SCENE_FILE_KEYS = {
@@ -99,16 +102,13 @@ def render(
         pixels = parse_image_size(size) if "size" in given else None
         render_scene_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
         return
-    from cmpdesign.files.atomic import write_file
-    from cmpdesign.files.images import to_png
     from cmpdesign.reading.read_layout import read_layout
-    from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed, save_truth
-    from cmpdesign.scene import render as render_scene
+    from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
     pixels = parse_image_size(size)
     pattern = read_layout(layout)
     radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
-    view = Scene(
+    pattern_scene = Scene(
         layout=pattern,
         camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
         surface=composed(Press(radius, press)) if press else None,
@@ -116,7 +116,17 @@ def render(
         sensor=Sensor(noise=noise) if noise else None,
         seed=seed,
     )
-    rendered = render_scene(view, size=pixels)
+    _write_rendered(pattern_scene, pixels, output, truth)
+
+
+def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: Path | None) -> None:
+    """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.files.images import to_png
+    from cmpdesign.scene import render as render_scene
+    from cmpdesign.scene import save_truth
+
+    rendered = render_scene(scene, size=pixels)
     if truth is not None:
         save_truth(rendered.truth, truth)
         console().print(f"wrote {printable_path(truth)}")

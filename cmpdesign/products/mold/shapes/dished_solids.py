@@ -9,8 +9,9 @@ import numpy as np
 from cmpdesign.products.mold.shapes.dish import Dish
 from cmpdesign.products.mold.solids.facets import FacetBuilder
 from cmpdesign.products.mold.solids.loops import Loop, Points, polygon_loop
-from cmpdesign.products.mold.solids.slab_shells import ShellBuilder, Slab, slab_volume_mm3
-from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
+from cmpdesign.products.mold.solids.planar_faces import untiled_faces
+from cmpdesign.products.mold.solids.shells import ShellBuilder
+from cmpdesign.products.mold.solids.slab_shells import Slab, slab_volume_mm3
 
 Wires = list[list[int]]
 TURN_OVER = np.array([1.0, -1.0, -1.0])

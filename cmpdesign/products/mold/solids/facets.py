@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.mold.solids.loops import Points
-from cmpdesign.products.mold.solids.slab_shells import (
+from cmpdesign.products.mold.solids.shells import (
     TOLERANCE_MM,
     PlacedFaces,
     ShellBuilder,

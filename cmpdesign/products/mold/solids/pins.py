@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.products.mold.solids.loops import circle_loop
-from cmpdesign.products.mold.solids.slab_shells import ShellBuilder
-from cmpdesign.products.mold.solids.tiled_faces import untiled_faces
+from cmpdesign.products.mold.solids.planar_faces import untiled_faces
+from cmpdesign.products.mold.solids.shells import ShellBuilder
 
 
 def pin_solid(diameter_mm: float, length_mm: float, chamfer_mm: float) -> Any:
