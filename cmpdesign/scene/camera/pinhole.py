@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,26 @@ ORTHOGONAL = 1e-6  # largest deviation of R R^T from the unit matrix
 def _front_rotation() -> Points:
     """(3, 3) rotation of a camera in front of the pattern: x right, y down, z into the pattern."""
     return np.diag([1.0, -1.0, -1.0])
+
+
+class ViewDirection(NamedTuple):
+    """From where a camera looks at a point.
+
+    Attributes:
+        tilt_deg: angle between the pattern's normal and the optical axis, -85 to 85.
+        azimuth_deg: direction of the tilt, counter-clockwise from the layout's x axis.
+        roll_deg: rotation of the pattern in the image, counter-clockwise as seen; at 0 the layout's y points up.
+        target_mm: the point on the optical axis, layout frame.
+        back: the camera is behind the pattern, at negative z.
+        mirror: the image is flipped left to right, as by a mirror before the camera.
+    """
+
+    tilt_deg: float = 0.0
+    azimuth_deg: float = 0.0
+    roll_deg: float = 0.0
+    target_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    back: bool = False
+    mirror: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,59 +162,49 @@ class Pinhole:
         *,
         distance_mm: float,
         field_of_view_deg: float,
-        tilt_deg: float = 0.0,
-        azimuth_deg: float = 0.0,
-        roll_deg: float = 0.0,
-        target_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        back: bool = False,
-        mirror: bool = False,
         distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0),
         area_px: Area | None = None,
         name: str = "",
+        **direction: Any,
     ) -> Pinhole:
         """A camera whose optical axis passes through a point, at the middle of the area.
-
-        This public constructor has more than eight parameters, all but the first by keyword: they are the keys of a
-        [[view]] table.
 
         Args:
             size: the image's (width, height) px.
             distance_mm: distance from the camera's centre to the target.
             field_of_view_deg: angle across the area's width, without distortion.
-            tilt_deg: angle between the pattern's normal and the optical axis, -85 to 85.
-            azimuth_deg: direction of the tilt, counter-clockwise from the layout's x axis.
-            roll_deg: rotation of the pattern in the image, counter-clockwise as seen; at 0 the layout's y points up.
-            target_mm: the point on the optical axis, layout frame.
-            back: the camera is behind the pattern, at negative z.
-            mirror: the image is flipped left to right, as by a mirror before the camera.
             distortion, area_px, name: see ``Pinhole``.
+            direction: the fields of ``ViewDirection``, by keyword: ``tilt_deg``, ``azimuth_deg``, ``roll_deg``,
+                ``target_mm``, ``back``, ``mirror``.
 
         Raises:
             SceneError: a value is out of range.
+            TypeError: an unknown keyword.
         """
+        view = ViewDirection(**direction)
         if not distance_mm > NEAREST_MM:
             raise SceneError(f"distance_mm is {distance_mm:g}; it must be above {NEAREST_MM:g} mm")
         if not 0 < field_of_view_deg < 180:
             raise SceneError(
                 f"field_of_view_deg is {field_of_view_deg:g}; it must lie between 0 and 180 degrees"
             )
-        if not abs(tilt_deg) <= 85:
-            raise SceneError(f"tilt_deg is {tilt_deg:g}; it must lie between -85 and 85 degrees")
+        if not abs(view.tilt_deg) <= 85:
+            raise SceneError(f"tilt_deg is {view.tilt_deg:g}; it must lie between -85 and 85 degrees")
         x, y, width, height = area_px or (0, 0, *size)
         focal_px = float(0.5 * width / np.tan(np.radians(field_of_view_deg) / 2))
-        r = _looking_rotation(tilt_deg, azimuth_deg, roll_deg, back)
-        t = np.array([0.0, 0.0, distance_mm]) - r @ np.asarray(target_mm, dtype=np.float64)
-        if mirror:
+        r = _looking_rotation(view)
+        t = np.array([0.0, 0.0, distance_mm]) - r @ np.asarray(view.target_mm, dtype=np.float64)
+        if view.mirror:
             flip = np.diag([-1.0, 1.0, 1.0])
             r, t = flip @ r, flip @ t
         centre_px = (x + (width - 1) / 2, y + (height - 1) / 2)
         return cls((focal_px, focal_px), centre_px, distortion, r, t, area_px, name)
 
 
-def _looking_rotation(tilt_deg: float, azimuth_deg: float, roll_deg: float, back: bool) -> Points:
+def _looking_rotation(view: ViewDirection) -> Points:
     """(3, 3) rotation of ``Pinhole.looking``."""
-    tilt, azimuth, roll = np.radians([tilt_deg, azimuth_deg, roll_deg])
-    side = -1.0 if back else 1.0
+    tilt, azimuth, roll = np.radians([view.tilt_deg, view.azimuth_deg, view.roll_deg])
+    side = -1.0 if view.back else 1.0
     towards = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), side * np.cos(tilt)])
     forward = -towards
     right = np.cross(forward, [0.0, 1.0, 0.0])

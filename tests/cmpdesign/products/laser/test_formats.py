@@ -94,8 +94,8 @@ def test_dxf(case: int) -> None:
         same_paths(found, drawing, one.name)
         points += found
         layer = document.layers.get(one.name)
-        assert layer.dxf.true_color == drawing.layers[one.name].rgb
-        assert layer.dxf.color == drawing.layers[one.name].aci
+        assert layer.dxf.true_color == drawing.laser_layers[one.name].rgb
+        assert layer.dxf.color == drawing.laser_layers[one.name].aci
     circles = space.query("CIRCLE").entities
     assert len(circles) == 3 and all(circle.dxf.layer == "T1" for circle in circles)
     from ezdxf import bbox

@@ -40,11 +40,11 @@ def triangles(draw: st.DrawFn) -> Points:
 
 def by_shapely(made: Cavities, beam: BeamFootprint) -> shapely.Polygon:
     """The burn of the first cavity, by a general-purpose buffer of the path and its spurs."""
-    path = shapely.Polygon(beam.units(made.path_mm[0]))
-    ends = [(beam.units(p), beam.units(t)) for p, t in zip(made.path_mm[0], made.tip_mm[0], strict=True)]
+    path = shapely.Polygon(beam.to_beam_units(made.path_mm[0]))
+    ends = [(beam.to_beam_units(p), beam.to_beam_units(t)) for p, t in zip(made.path_mm[0], made.tip_mm[0], strict=True)]
     spurs = [shapely.LineString(end) for end in ends if not np.array_equal(*end)]
     burnt = shapely.buffer(shapely.union_all([path, *spurs]), 1.0, quad_segs=128)
-    return shapely.Polygon(beam.millimetres(shapely.get_coordinates(burnt.exterior)))
+    return shapely.Polygon(beam.to_millimetres(shapely.get_coordinates(burnt.exterior)))
 
 
 @settings(max_examples=40, deadline=None)
@@ -181,9 +181,9 @@ def test_hatches_clear_the_pocket_and_stay_inside(angle_deg: float) -> None:
     assert set(lines.owner.tolist()) == {0, 1} and not lines.closed
     for cell in range(2):
         segments = [line for line, owner in zip(lines, lines.owner, strict=True) if owner == cell]
-        wall = shapely.LinearRing(beam.units(made.path_mm[cell]))
-        strokes = [shapely.LineString(beam.units(line)) for line in segments]
-        inside = shapely.Polygon(beam.units(made.path_mm[cell]))
+        wall = shapely.LinearRing(beam.to_beam_units(made.path_mm[cell]))
+        strokes = [shapely.LineString(beam.to_beam_units(line)) for line in segments]
+        inside = shapely.Polygon(beam.to_beam_units(made.path_mm[cell]))
         assert all(inside.buffer(2e-3).contains(stroke) for stroke in strokes)
         burnt = shapely.union_all([shapely.buffer(stroke, 1.0, quad_segs=64) for stroke in [wall, *strokes]])
         assert burnt.area * beam.area_factor == pytest.approx(burnt_areas_mm2(made, beam)[cell], rel=1e-3)
@@ -203,7 +203,7 @@ def test_rings_clear_the_pocket_from_the_inside_out() -> None:
     assert inner.closed and list(inner.owner) == sorted(inner.owner)
     areas = [shapely.Polygon(ring).area for ring, owner in zip(inner, inner.owner, strict=True) if owner == 0]
     assert areas == sorted(areas) and len(areas) > 3
-    strokes = [shapely.LinearRing(beam.units(ring)) for ring in [made.path_mm[0], *inner][: 1 + len(areas)]]
+    strokes = [shapely.LinearRing(beam.to_beam_units(ring)) for ring in [made.path_mm[0], *inner][: 1 + len(areas)]]
     burnt = shapely.union_all([shapely.buffer(stroke, 1.0, quad_segs=64) for stroke in strokes])
     assert not burnt.interiors
     assert burnt.area * beam.area_factor == pytest.approx(burnt_areas_mm2(made, beam)[0], rel=1e-3)
@@ -218,8 +218,8 @@ def test_an_outline_is_cut_from_outside() -> None:
         ]
     )
     (path,) = outset_outline(star, beam)
-    burnt = shapely.buffer(shapely.LinearRing(beam.units(path)), 1.0, quad_segs=64)
-    pad = shapely.Polygon(beam.millimetres(shapely.get_coordinates(burnt.interiors[0])))
+    burnt = shapely.buffer(shapely.LinearRing(beam.to_beam_units(path)), 1.0, quad_segs=64)
+    pad = shapely.Polygon(beam.to_millimetres(shapely.get_coordinates(burnt.interiors[0])))
     # The pad keeps its size but for its inner corners, which a round beam leaves round.
     assert shapely.difference(shapely.Polygon(star), shapely.buffer(pad, 1e-3)).area < 1e-6
     assert pad.area == pytest.approx(shapely.Polygon(star).area, rel=2e-3)

@@ -67,8 +67,8 @@ def test_layers_fill_the_pad_without_gap_or_overlap() -> None:
     outline = stack.layout.outline_mm
     from cmpdesign.products.mold.solids.loops import frustum_volume_mm3, polygon_loop
 
-    edge = polygon_loop(outline).moved(stack.lean * 4.0)
-    assert middle == pytest.approx(frustum_volume_mm3(edge, edge.moved(stack.lean * 0.5), 0.5), rel=1e-9)
+    edge = polygon_loop(outline).offset(stack.lean * 4.0)
+    assert middle == pytest.approx(frustum_volume_mm3(edge, edge.offset(stack.lean * 0.5), 0.5), rel=1e-9)
 
 
 def test_glb_is_in_metres_and_named(made: ProductFiles) -> None:

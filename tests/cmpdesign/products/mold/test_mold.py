@@ -237,7 +237,7 @@ def test_tiles_cover_any_sheet_exactly(shapes: list[Loop], columns: int, framed:
     outer = polygon_loop(np.array([(-3, -3), (14, -3), (14, 38), (-3, 38.0)]))
     holes = [circle_loop(np.array([12.5, 36.0]), 1.0)] if framed else []
     slab = Slab(
-        outer, -1.0, 0.0, [(h, h) for h in holes], (), [Feature(f, f.moved(-0.01), 0.5) for f in features]
+        outer, -1.0, 0.0, [(h, h) for h in holes], (), [Feature(f, f.offset(-0.01), 0.5) for f in features]
     )
     found = measure_solid(make_slab_solid(slab))
     assert found.valid and found.closed
@@ -247,7 +247,7 @@ def test_tiles_cover_any_sheet_exactly(shapes: list[Loop], columns: int, framed:
 def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
     for pattern in ("honeycomb", "round", "elliptical"):
         mold = stack(layers="12", pattern=pattern, rotation_deg="7")
-        roots = [rounded_polygon(cell, 0.01).moved(-0.05) for cell in mold.cells(0)]
+        roots = [rounded_polygon(cell, 0.01).offset(-0.05) for cell in mold.cells(0)]
         sheet = tile_faces(mold.block, mold.holes(), roots, 0.05)
         assert max(len(wires) for wires in sheet.faces) <= 20, pattern
 
