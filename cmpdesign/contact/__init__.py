@@ -1,6 +1,6 @@
 """Contact of a rigid object with the elastic layer that carries the pattern.
 
-elastomer + object + motion -> displacement and traction of the surface
+In: an elastomer, an object, its motion. Out: displacement and traction of the surface.
 """
 
 from __future__ import annotations

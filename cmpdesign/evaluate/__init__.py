@@ -1,4 +1,4 @@
 """The article's experiments on simulated sensors, and the comparison of designs.
 
-sensor file + patterns + contacts -> trials -> journal -> figures -> report.json, report.html
+In: a sensor file, patterns, contacts. Out: trials in a journal, figures, ``report.json`` and ``report.html``.
 """

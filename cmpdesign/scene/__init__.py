@@ -1,6 +1,6 @@
 """Scenes: rendered images of a pattern with exact ground truth, for tests and for the evaluation of designs.
 
-layout + surface + camera + light + optics + sensor + damage -> image + truth
+In: layout, surface, camera, light, optics, sensor, damage. Out: an image and its truth.
 """
 
 from __future__ import annotations

@@ -82,8 +82,8 @@ def test_in_a_crowd_what_is_convex_is_left(seed: int) -> None:
     label[5:8, 70:130] = label[8:50, 70:130:6] = 2
     label[55, 70:75] = 3  # too small
     segmentation = segmentation_of(np.zeros((*label.shape, 3), np.uint8), label)
-    assert set(find_seeds(segmentation, max_domains=3).ink.tolist()) == {1, 2, 3}
-    seeds = find_seeds(segmentation, max_domains=2)
+    assert set(find_seeds(segmentation, 3).ink.tolist()) == {1, 2, 3}
+    seeds = find_seeds(segmentation, 2)
     assert seeds.cluttered and seeds.ink.tolist() == [1]
     stats = cv2.connectedComponentsWithStats((label == 1).astype(np.uint8), connectivity=4)[2]
     assert seeds.area_px[0] == stats[1:, cv2.CC_STAT_AREA].max()  # the tip may touch by a corner only

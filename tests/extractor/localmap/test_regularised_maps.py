@@ -9,40 +9,41 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cmpdesign.files.layout_json import layout_to_json
-from cmpdesign.scene.standard import standard_layout
 from extractor import parse_layout
-from extractor.layout.topology import Topology, topology_of
+from extractor.layout.lattice_tables import lattice_of
 from extractor.localmap.regularised_maps import fill_quadratic_derivatives
+from tests.support.layouts import small_text
 
 Array = NDArray[np.float64]
 
 
-def lone(xy: Array, mesh: Topology, m: int) -> Array:
+def lone(xy: Array, near: NDArray[np.int32], offset: Array, m: int) -> Array:
     """(2, 5) the derivatives at one marker by numpy."""
-    known = [k for k, n in enumerate(mesh.ring_markers[m]) if n >= 0 and np.isfinite(xy[n, 0])]
-    x, y = mesh.ring_vectors[m, known].T
+    known = [k for k, n in enumerate(near[m]) if n >= 0 and np.isfinite(xy[n, 0])]
+    x, y = offset[m, known].T
     terms, weight = np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), (x * x + y * y) ** -2
     held = 1e9 if len(known) < 5 else 0.02 if len(known) < 8 else 0.001
     gram = (weight * terms) @ terms.T + np.diag([0.0, 0.0, held, held, held])
-    return np.asarray(np.linalg.solve(gram, (weight * terms) @ (xy[mesh.ring_markers[m, known]] - xy[m])).T)
+    return np.asarray(np.linalg.solve(gram, (weight * terms) @ (xy[near[m, known]] - xy[m])).T)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3, 0.75])
 def test_each_is_the_weighted_least_squares_quadratic(missing: float) -> None:
-    mesh = topology_of(parse_layout(layout_to_json(standard_layout("honeycomb", 5))))
+    lattice = lattice_of(parse_layout(small_text("honeycomb", 5)))
+    near = lattice.neighbours  # two rings
+    offset = (lattice.marker_mm[near] - lattice.marker_mm[:, None]) / 1.5  # in edges
     rng = np.random.default_rng(int(100 * missing))
-    xy = rng.normal(size=(len(mesh.ring_markers), 2))
+    xy = rng.normal(size=(len(near), 2))
     xy[rng.random(len(xy)) < missing] = np.nan
     asked = np.flatnonzero(np.isfinite(xy[:, 0]))[
         :19
     ]  # some groups of those that are solved side by side, and three more
     out = np.full((len(xy), 2, 5), np.nan)
-    fill_quadratic_derivatives(xy, asked, mesh.ring_markers, mesh.ring_vectors, out)
+    fill_quadratic_derivatives(xy, asked, near, offset, out)
     told = [m for m in asked if np.isfinite(out[m, 0, 0])]
     assert len(told) > 16
     for m in told:
-        np.testing.assert_allclose(out[m], lone(xy, mesh, m), rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(out[m], lone(xy, near, offset, m), rtol=1e-6, atol=1e-9)
     assert np.isnan(np.delete(out, asked, axis=0)).all()
 
 

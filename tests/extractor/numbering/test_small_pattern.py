@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.suites.scoring.reading import cached_extractor, find_wrong_markers
+from benchmarks.damage import parse_case
+from benchmarks.suites.scoring.reading import cached_extractor, find_wrong_markers, read_case
 from benchmarks.suites.scoring.score import score_markers
 from benchmarks.suites.stress.conditions import BY_NAME, matching_cases
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage, plain_frame
@@ -75,3 +76,9 @@ def test_no_cell_is_missed_however_small_it_looks_at_a_reduced_scale(
         shot = frame.damaged(missing_share=missing).shoot()
         figures = score_markers(cached_extractor(pattern, 11).extract(shot.image), shot, promised=True)
         assert figures.wrong == 0 and figures.kept >= (0.99 if missing == 0.0 else 0.985) * figures.sure
+
+
+def test_what_a_reduced_scale_has_missed_is_read_at_a_finer_one() -> None:
+    """Scratches leave pieces of cells that only the finest scale takes for cells: a tenth of the markers."""
+    figures = read_case(parse_case("random scratches/honeycomb/70210"), 1, timing=False)[0].score
+    assert figures.wrong == 0 and figures.kept >= 0.96 * figures.sure

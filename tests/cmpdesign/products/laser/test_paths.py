@@ -41,7 +41,10 @@ def triangles(draw: st.DrawFn) -> Points:
 def by_shapely(made: Cavities, beam: BeamFootprint) -> shapely.Polygon:
     """The burn of the first cavity, by a general-purpose buffer of the path and its spurs."""
     path = shapely.Polygon(beam.to_beam_units(made.path_mm[0]))
-    ends = [(beam.to_beam_units(p), beam.to_beam_units(t)) for p, t in zip(made.path_mm[0], made.tip_mm[0], strict=True)]
+    ends = [
+        (beam.to_beam_units(p), beam.to_beam_units(t))
+        for p, t in zip(made.path_mm[0], made.tip_mm[0], strict=True)
+    ]
     spurs = [shapely.LineString(end) for end in ends if not np.array_equal(*end)]
     burnt = shapely.buffer(shapely.union_all([path, *spurs]), 1.0, quad_segs=128)
     return shapely.Polygon(beam.to_millimetres(shapely.get_coordinates(burnt.exterior)))
@@ -203,7 +206,9 @@ def test_rings_clear_the_pocket_from_the_inside_out() -> None:
     assert inner.closed and list(inner.owner) == sorted(inner.owner)
     areas = [shapely.Polygon(ring).area for ring, owner in zip(inner, inner.owner, strict=True) if owner == 0]
     assert areas == sorted(areas) and len(areas) > 3
-    strokes = [shapely.LinearRing(beam.to_beam_units(ring)) for ring in [made.path_mm[0], *inner][: 1 + len(areas)]]
+    strokes = [
+        shapely.LinearRing(beam.to_beam_units(ring)) for ring in [made.path_mm[0], *inner][: 1 + len(areas)]
+    ]
     burnt = shapely.union_all([shapely.buffer(stroke, 1.0, quad_segs=64) for stroke in strokes])
     assert not burnt.interiors
     assert burnt.area * beam.area_factor == pytest.approx(burnt_areas_mm2(made, beam)[0], rel=1e-3)
