@@ -31,7 +31,8 @@ PACKAGES = ("extractor", "cmpdesign")
 # A room imports only those that stand before it. The last of cmpdesign is kept for programs written against 0.1.
 ROOMS = {
     "extractor": (
-        "errors frozen_record result presets numeric layout image cells localmap numbering refine complete pipeline track space draw"
+        "errors frozen_record result presets numeric layout image cells localmap numbering refine complete"
+        " pipeline track space draw"
     ),
     "cmpdesign": (
         "errors units patterns design layout files reading contact scene products tracking evaluate cli demo writers"
