@@ -21,6 +21,7 @@ import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,8 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     found = list(FENCE.finditer(text))
     kept = []
-    for match, following in zip(found, [*found[1:], None], strict=True):
+    for match, following in pairwise([*found, None]):
+        assert match
         output = None
         if following and following[1] == "text" and not text[match.end() : following.start()].strip():
             output = following[3]
