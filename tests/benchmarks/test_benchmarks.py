@@ -69,7 +69,8 @@ def test_exponents_are_slopes_in_the_logarithm() -> None:
     code = (
         "from benchmarks.extraction import fit_exponent, fit_line, image_size_px\n"
         "x = [1, 2, 4, 8]\n"
-        "print(fit_exponent(x, [3 * v ** 1.5 for v in x]), *fit_line(x, [7 + 0.5 * v for v in x]), *image_size_px(12.0))"
+        "print(fit_exponent(x, [3 * v ** 1.5 for v in x]), *fit_line(x, [7 + 0.5 * v for v in x]))\n"
+        "print(*image_size_px(12.0))"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
