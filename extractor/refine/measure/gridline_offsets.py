@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.numeric.compilation import compiled, vectorized
+from extractor.numeric.compilation import compiled, inlined, inlined_no_refcount, vectorized
 from extractor.refine.measure.gridline_weights import MIN_OFFSET_WEIGHT
 from extractor.refine.measure.matched_filter import HALF, I1, I2, I3, I4, I5, SINE_A, SINE_B
 from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, sagitta
@@ -151,6 +151,7 @@ def measure_offsets(image, model, reading, count):  # type: ignore[no-untyped-de
     """
     lines, contrasts, sigma = reading.lines, reading.contrasts, reading.sigma
     out = np.full((lines.shape[0], count, 2), np.nan)
+    flat, flat_model, width, height = image.reshape(-1), model.reshape(-1), image.shape[1], image.shape[0]
     first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
     levels, drawn, weighted = (
         np.zeros(CHUNK, np.float32),
@@ -162,38 +163,35 @@ def measure_offsets(image, model, reading, count):  # type: ignore[no-untyped-de
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         if lines[e, KNOWN] == 0.0 or strength == 0.0 or reading.weight[e] < MIN_OFFSET_WEIGHT:
             continue
-        _fill_station_sums(image, model, reading, e, buffers)
+        _fill_station_sums(flat, flat_model, width, height, reading, e, buffers)
         for j in range(count):
-            if buffers.sums[j, 1] < MIN_WEIGHT_SUM or not _is_clear(reading, e, j, count):
+            if buffers.sums[j, 1] < MIN_WEIGHT_SUM or not (reading.drawn or _is_clear(reading, e, j, count)):
                 continue
             out[e, j, OFFSET] = sigma * buffers.sums[j, 0] / buffers.sums[j, 1] - reading.dot_gain_offset[e]
             out[e, j, VARIANCE] = reading.noise**2 * sigma**2 / (strength * buffers.sums[j, 1])
     return out
 
 
-@compiled
+@inlined_no_refcount
 def _is_clear(reading, e, station, count):  # type: ignore[no-untyped-def]
-    """Whether the pattern was drawn, or the gridlines at both ends of gridline e keep clear of one of its stations."""
-    if reading.drawn:
-        return True
+    """Whether the gridlines at both ends of gridline e keep clear of one of its stations."""
     from_start, from_end = (station + 0.5) / (count + 1.0), (count - station - 0.5) / (count + 1.0)
     start, end = from_start * reading.clearance[e, SINE_A], from_end * reading.clearance[e, SINE_B]
     return not reading.lines[e, LENGTH] * min(start, end) < CLEAR_SIGMA * reading.sigma
 
 
-@compiled
-def _fill_station_sums(image, model, reading, e, buffers):  # type: ignore[no-untyped-def]
-    """Fill in the sums (m, 2) at the stations of gridline e."""
+@inlined
+def _fill_station_sums(flat, flat_model, width, height, reading, e, buffers):  # type: ignore[no-untyped-def]
+    """Fill in the sums (m, 2) at the stations of gridline e; image and model are flat."""
     contrasts, sigma, sums = reading.contrasts, reading.sigma, buffers.sums
     rows, levels, drawn, weighted = buffers.rows, buffers.image, buffers.model, buffers.weighted
-    flat, flat_model = image.reshape(-1), model.reshape(-1)
     strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
     color = Color(
         np.float32(contrasts[e, 0] / strength),
         np.float32(contrasts[e, 1] / strength),
         np.float32(contrasts[e, 2] / strength),
     )
-    frame = row_frame(reading.lines, e, 0, 0, image.shape[1], image.shape[0])
+    frame = row_frame(reading.lines, e, 0, 0, width, height)
     line, reach, intervals = pixel_geometry(frame, sigma), BAND * sigma, sums.shape[0] + 1.0
     step_height = np.float32(0.0 if reading.drawn else 1.0)
     # the pixels of the first and of the last station reach half an interval beyond these
