@@ -176,6 +176,13 @@ def test_the_readmes_figure_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert figures["RMS error per axis"] <= float(stated[1])
 
 
+def test_every_path_of_the_map_exists() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:extractor|cmpdesign|benchmarks|tests|tools|docs)/[\w/.]*)`", page)
+    assert len(paths) > 25
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
 def test_the_comparison_can_fail() -> None:
     assert differs("a 1.23 px, 5.0 ms\n", "a 1.25 px, 99 ms\n") is None
     assert differs("a\nb\nc\nd\n", "a\n...\nd\n") is None
