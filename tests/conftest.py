@@ -9,6 +9,11 @@ import pytest
 from tests.support.layouts import small_text
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest test starts first, so that no worker waits for it at the end."""
+    items.sort(key=lambda item: item.get_closest_marker("longest") is None)
+
+
 @pytest.fixture
 def layout_file(tmp_path: Path) -> Path:
     path = tmp_path / "layout.json"

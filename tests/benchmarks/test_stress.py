@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.stress.__main__ import main
+from benchmarks.stress.run import main
 from benchmarks.suites.scoring.reading import CaseResult, cached_extractor, read_case
 from benchmarks.suites.scoring.report import PROMISED_SHARE, condition_rows, failure_lines
 from benchmarks.suites.scoring.score import score_markers, smallest_contrast

@@ -118,6 +118,7 @@ def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.longest
 def test_wheel_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     interpreter = elsewhere / "bin" / "python"
     where = python(
