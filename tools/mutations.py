@@ -122,8 +122,12 @@ def users(module: str, root: Path) -> set[str]:
     found, new = set(), {module}
     while new:
         found |= new
-        names = [name for old in new for name in (old, old.rpartition(".")[2])]
-        word = re.compile("|".join(rf"(from|import) \.?{re.escape(name)}\b" for name in names))
+        imports = [
+            rf"from {re.escape(name)} import|from {re.escape(package)} import .*\b{leaf}\b"
+            for name in new
+            for package, _, leaf in [name.rpartition(".")]
+        ]
+        word = re.compile("|".join(imports))
         new = {other for other, text in texts.items() if word.search(text)} - found
     return found
 

@@ -17,7 +17,6 @@ from cmpdesign.patterns.colors import BLACK, WHITE
 from cmpdesign.scene import Busy, Plain, Sensor, render, standard_scene
 
 Pixels = NDArray[np.float32]
-ImageSampler = Callable[[np.random.Generator, Size], Pixels]
 
 
 def noise_image(rng: np.random.Generator, size: Size, sigma_px: float) -> Pixels:

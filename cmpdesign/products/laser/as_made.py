@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from cmpdesign.products.laser.paths.cavities import Cavities, burnt_areas_mm2, b
 from cmpdesign.products.laser.paths.kerf import polygon_areas
 from cmpdesign.products.laser.paths.webs import burn_depth_mm, smallest_web_mm
 
-SheetFace = Literal["front", "back"]
 # Cavities further apart than this many pitches are not compared.
 WEB_REACH_PITCHES = 1.5
 

@@ -14,11 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.cells.cells import Cells
-from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import image_cell_of_layout_cell, linear_maps
 from extractor.numbering.gaps.corner_contact import (
-    corner_neighbours,
     equilateral_edge,
     fill_map_by_similarity,
 )
@@ -53,30 +50,6 @@ class _Consistency(NamedTuple):
     is_consistent: NDArray[np.bool_]
     slope: NDArray[np.float64]
     has_slope: NDArray[np.bool_]
-
-
-def inconsistent_cells(
-    cells: Cells,
-    cell: NDArray[np.int32],
-    lattice: Lattice,
-    mirrored: bool,
-    white_px: NDArray[np.float64] | None,
-) -> NDArray[np.bool_]:
-    """(N,) bool, the numbered cells that do not lie where the pattern continues from the reference block.
-
-    Args:
-        cells: the cells of the image.
-        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
-        lattice: the layout.
-        mirrored: the pattern is seen from its back.
-        white_px: (2,) the center of the white cell; None if the outline gave the origin: then the largest block is the
-            reference.
-    """
-    white = np.full(2, np.nan) if white_px is None else white_px
-    arrays, layout, corner_step = cells.arrays, lattice.layout_cells, 1 if mirrored else 2
-    neighbours = corner_neighbours(arrays, cell, layout, corner_step)
-    consistent = consistent_cells(arrays, cell, white, neighbours, layout, corner_step)
-    return np.asarray((cell >= 0) & ~consistent)
 
 
 @compiled
