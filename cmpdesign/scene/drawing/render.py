@@ -21,6 +21,7 @@ from cmpdesign.scene.parts.optics import make_point_spread
 from cmpdesign.scene.parts.sensor import Sensor, expose_sensor
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
+from extractor.image.response import decode_values
 
 Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
@@ -53,9 +54,7 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     """
     views = _checked_views(scene, size)
     missing = missing_cell_mask(scene)
-    background = _blur_planes(
-        scene.background.planes(size, _stream_rng(scene, BACKGROUND_STREAM)), scene.blur_px
-    )
+    background = _blur_planes(_background_light(scene, size), scene.blur_px)
     parts = [_draw_view(scene, view, missing, background, engine) for view in views]
     planes = _assemble_views(views, parts, size)
     if scene.light:
@@ -93,7 +92,7 @@ def _draw_view(
     """(3, height, width): one view's part of the image."""
     planes = _draw_pattern(scene, view, missing, background[view.window], engine)
     if scene.damage and (scene.damage.blobs or scene.damage.scratches):
-        return _cover_with_dirt(planes, scene.damage, scene.blur_px, view, engine)
+        return _cover_with_dirt(scene, planes, scene.damage, view, engine)
     return planes
 
 
@@ -126,10 +125,11 @@ def _draw_pattern(
     if bleed_mm:
         polygons = bleed_polygons(polygons, bleed_mm, _stream_rng(scene, BLEED_STREAM))
     # Planes: B, G, R over black, the ground, and with bleeding the sum of the inks' coverage.
-    black = _bgr(scene.ink(BLACK))
-    over_black = np.array([_bgr(scene.ink(color)) - black for color in layout.cell_color[drawn]]).reshape(
-        -1, 3
-    )
+    black = _light_bgr(scene, scene.ink(BLACK))
+    inks = {
+        color: _light_bgr(scene, scene.ink(color)) - black for color in np.unique(layout.cell_color[drawn])
+    }
+    over_black = np.array([inks[color] for color in layout.cell_color[drawn]]).reshape(-1, 3)
     values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
     values[0, 3] = 1.0
     values[1:, :3] = over_black
@@ -137,11 +137,11 @@ def _draw_pattern(
         values[1:, 4] = 1.0
     covered = _draw_polygons(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
 
-    inks, ground_share = covered[:3], covered[3]
+    colored, ground_share = covered[:3], covered[3]
     if bleed_mm:
-        inks = inks / np.maximum(covered[4], 1.0)
+        colored = colored / np.maximum(covered[4], 1.0)
     black_plane = black.astype(np.float32)[:, None, None]
-    return np.asarray(inks + background + ground_share * (black_plane - background), dtype=np.float32)
+    return np.asarray(colored + background + ground_share * (black_plane - background), dtype=np.float32)
 
 
 def _draw_polygons(
@@ -170,8 +170,22 @@ def _draw_polygons(
     return planes
 
 
-def _bgr(rgb: tuple[float, float, float]) -> NDArray[np.float64]:
-    return np.asarray(rgb[::-1], dtype=np.float64)
+def _light_bgr(scene: Scene, rgb: tuple[float, float, float]) -> NDArray[np.float64]:
+    """(3,) the light, channels B, G, R, of a color as a picture shows this color."""
+    return decode_values(np.asarray(rgb[::-1], dtype=np.float64), _light_of_values(scene))
+
+
+def _light_of_values(scene: Scene) -> NDArray[np.float64]:
+    return (scene.sensor or Sensor()).light_of_values()
+
+
+def _background_light(scene: Scene, size: tuple[int, int]) -> Planes:
+    """(3, height, width) the background's light; one color is a view of three numbers."""
+    planes = scene.background.planes(size, _stream_rng(scene, BACKGROUND_STREAM))
+    if any(planes.strides[1:]):
+        return decode_values(planes, _light_of_values(scene)).astype(np.float32)
+    light = decode_values(planes[:, :1, :1], _light_of_values(scene)).astype(np.float32)
+    return np.broadcast_to(light, planes.shape)
 
 
 def _blur_planes(planes: Planes, blur_px: float) -> Planes:
@@ -183,13 +197,11 @@ def _blur_planes(planes: Planes, blur_px: float) -> Planes:
     return np.stack([cv2.GaussianBlur(plane, (0, 0), blur_px) for plane in planes])
 
 
-def _cover_with_dirt(
-    planes: Planes, damage: Damage, blur_px: float, view: SceneView, engine: Engine
-) -> Planes:
+def _cover_with_dirt(scene: Scene, planes: Planes, damage: Damage, view: SceneView, engine: Engine) -> Planes:
     """Planes with blobs and scratches over the pattern; where they overlap, their colors are averaged."""
     spots: list[Blob | Scratch] = [*damage.blobs, *damage.scratches]
-    values = np.array([[*spot.rgb[::-1], 1.0] for spot in spots])
-    covered = _draw_polygons(view, [spot.polygon()[None] for spot in spots], values, blur_px, engine)
+    values = np.array([[*_light_bgr(scene, spot.rgb), 1.0] for spot in spots])
+    covered = _draw_polygons(view, [spot.polygon()[None] for spot in spots], values, scene.blur_px, engine)
     overlap = np.maximum(covered[3], 1.0)
     return np.asarray(planes * (1 - covered[3] / overlap) + covered[:3] / overlap, dtype=np.float32)
 

@@ -1,14 +1,15 @@
-"""The sensor: noise, gamma, quantisation and JPEG, in this order."""
+"""The sensor: the camera's response, noise, quantisation and JPEG, in this order."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.scene.errors import STRICT, SceneError
+from extractor.image.response import encode_light, light_of_values
 
 Depth = TypeVar("Depth", np.uint8, np.uint16)
 
@@ -18,8 +19,10 @@ class Sensor:
     """The image sensor.
 
     Attributes:
-        noise: sigma of the white Gaussian noise, in units of an 8-bit step (noise 2 is 2/255).
-        gamma: out = 255 (in / 255) ** gamma, after the noise; 1: linear.
+        noise: sigma of the white Gaussian noise of the encoded picture, in units of an 8-bit step (noise 2 is 2/255).
+        response: how light becomes values: "srgb", "linear", an exponent (light is value ** exponent), or a table of
+            the light of all 256 values. Colors of inks, backgrounds and dirt are the values that they have in a picture
+            without blur and noise.
         bits: 8 or 16.
         jpeg_quality: 1 to 100; None: no compression. 8 bits only.
     """
@@ -27,15 +30,17 @@ class Sensor:
     __pydantic_config__: ClassVar = STRICT
 
     noise: float = 0.0
-    gamma: float = 1.0
+    response: Literal["srgb", "linear"] | float | tuple[float, ...] = "srgb"
     bits: int = 8
     jpeg_quality: int | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.noise <= 255:
             raise SceneError(f"noise is {self.noise:g}; it must lie between 0 and 255 8-bit steps")
-        if not 0.1 <= self.gamma <= 10:
-            raise SceneError(f"gamma is {self.gamma:g}; it must lie between 0.1 and 10")
+        try:
+            self.light_of_values()
+        except ValueError as error:
+            raise SceneError(str(error)) from None
         if self.bits not in (8, 16):
             raise SceneError(f"bits is {self.bits}; it must be 8 or 16")
         if self.jpeg_quality is not None and not (1 <= self.jpeg_quality <= 100 and self.bits == 8):
@@ -43,21 +48,25 @@ class Sensor:
                 f"jpeg_quality is {self.jpeg_quality} at {self.bits} bits; it must be 1 to 100, at 8 bits"
             )
 
+    def light_of_values(self) -> NDArray[np.float64]:
+        """(256,) 0 to 255: the light of each 8-bit value."""
+        return light_of_values(self.response)
+
 
 def expose_sensor(
     sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """The image (H, W, 3) of planes (3, H, W) float32 in 8-bit units, channels B, G, R; uint8 or uint16."""
-    light = planes
+    """The image (H, W, 3) of light (3, H, W) float32, 0 to 255, channels B, G, R; uint8 or uint16."""
+    values = planes
+    if sensor.response != "linear":
+        values = encode_light(planes, sensor.light_of_values()).astype(np.float32)
     if sensor.noise:
-        light = rng.standard_normal(planes.shape, dtype=np.float32)
-        light *= np.float32(sensor.noise)
-        light += planes
-    if sensor.gamma != 1.0:
-        light = 255 * np.power(np.maximum(light, 0) / 255, np.float32(sensor.gamma), dtype=np.float32)
+        noise = rng.standard_normal(planes.shape, dtype=np.float32)
+        noise *= np.float32(sensor.noise)
+        values = noise + values
     if sensor.bits == 16:
-        return _interleave_planes(np.clip(np.rint(light * 257), 0, 65535).astype(np.uint16))
-    eight = _interleave_planes(np.clip(np.rint(light), 0, 255).astype(np.uint8))
+        return _interleave_planes(np.clip(np.rint(values * 257), 0, 65535).astype(np.uint16))
+    eight = _interleave_planes(np.clip(np.rint(values), 0, 255).astype(np.uint8))
     return eight if sensor.jpeg_quality is None else _jpeg_roundtrip(eight, sensor.jpeg_quality)
 
 
