@@ -1,8 +1,8 @@
 """The response of a camera: the light behind each 8-bit value, and the values of light.
 
-Lenses blur light, and cameras encode the blurred light afterwards (sRGB, IEC 61966-2-1, or alike). A response is a table
-of the light of the 256 values; light is in units of 1/255 of the light of the value 255. Between two values a response
-is a straight line, which differs from the sRGB curve by less than 0.002 units.
+Lenses blur light, and cameras encode the blurred light afterwards (sRGB, IEC 61966-2-1, or alike). A response is a
+table of the light of the 256 values; light is in units of 1/255 of the light of the value 255. Between two values a
+response is a straight line, which differs from the sRGB curve by less than 0.002 units.
 """
 
 from __future__ import annotations
