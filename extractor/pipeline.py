@@ -24,6 +24,7 @@ from extractor.image.color import nominal_hues_deg, to_colors
 from extractor.image.ink_segmentation import segment
 from extractor.image.input import convert_to_bgr
 from extractor.image.pyramid import Pyramid
+from extractor.image.response import Response, light_of_values, response_tables
 from extractor.image.target_area import find_target
 from extractor.layout.lattice_tables import lattice_of
 from extractor.layout.reference import Reference
@@ -106,13 +107,15 @@ class Extractor:
     Args:
         layout: a triangular pattern.
         preset: "fast", "balanced" or "accurate".
+        response: how light became values: "srgb", "linear", an exponent (light is value ** exponent), or a table of the
+            light of all 256 values.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
-        ValueError: no such preset.
+        ValueError: no such preset or response.
     """
 
-    def __init__(self, layout: Reference, preset: Preset = "balanced") -> None:
+    def __init__(self, layout: Reference, preset: Preset = "balanced", response: Response = "srgb") -> None:
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
@@ -121,6 +124,8 @@ class Extractor:
         if preset not in PRESETS:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._preset = preset
+        self._response = response
+        self._tables = response_tables(light_of_values(response))
         self._lattice = lattice_of(layout)
         self._topology = topology_of(layout)
         self._domain_limit = max(MAX_DOMAINS_PER_CELL * len(self._lattice.ink), MIN_DOMAIN_LIMIT)
@@ -129,7 +134,7 @@ class Extractor:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is built anew from layout and preset; buffers are not copied."""
-        return type(self), (self.layout, self._preset)
+        return type(self), (self.layout, self._preset, self._response)
 
     def extract(self, image: NDArray[Any]) -> Markers:
         """The markers in one image, found without any knowledge of other frames.
@@ -149,13 +154,17 @@ class Extractor:
         bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
             return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
-        pyramid = Pyramid(bgr)
+        pyramid = self.pyramid(bgr)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Reason):
             return ReadImage(no_markers(self.layout, found, stages), None)
         cells, numbering = found.cells, found.numbering
         places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
+
+    def pyramid(self, bgr: NDArray[np.uint8]) -> Pyramid:
+        """The image (H, W, 3) at several scales, with the response."""
+        return Pyramid(bgr, self._tables)
 
     def finish(
         self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None
@@ -211,7 +220,7 @@ class Extractor:
         if scale > 1 and not has_large_domains(seeds):
             return self._number_by_centers(pyramid, seeds, scale, stages) or Reason.NO_COLOR
         regions = stages.record("grow", grow(segmentation, seeds))
-        triangles = stages.record("triangles", fit_triangles(pyramid.level(1).image, regions, scale))
+        triangles = stages.record("triangles", fit_triangles(pyramid.level(1), regions, scale))
         cells = stages.record("cells", find_cells(seeds, triangles, scale))
         return self._number_found_cells(pyramid, cells, stages)
 
@@ -226,7 +235,7 @@ class Extractor:
         found = self._number_found_cells(pyramid, cells, stages)
         if isinstance(found, Reason):
             return None
-        triangles = fit_predicted_triangles(pyramid.level(1).image, cells, found.numbering, self._lattice)
+        triangles = fit_predicted_triangles(pyramid.level(1), cells, found.numbering, self._lattice)
         if triangles is None:
             return None
         stages.record("triangles", triangles)

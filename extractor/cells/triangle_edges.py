@@ -1,6 +1,6 @@
 """Measures the edges of triangles with sub-pixel accuracy, of many triangles together in branch-free loops.
 
-The ink's profile across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position for any
+The profile of the ink's light across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position for any
 blur, so that the blur need not be known. The edge is the line through two such positions. Profiles run along the
 median, not the normal, so that they avoid the other edges in any triangle.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from extractor.image.response import light_at
 from extractor.numeric.bilinear import SUBPIXEL_STEPS
 from extractor.numeric.bilinear_batch import (
     BATCH_POINTS,
@@ -39,6 +40,7 @@ MIN_CONTRAST = 12.0  # norm over the three 8-bit channels, between the ink and t
 MIN_SINE = 0.05  # two edges that meet at less than 3 degrees have no corner
 MAX_CORNER_SHIFT = 1.0  # in units of the corner's distance from the center
 MIN_PROFILE_LEVEL, MAX_PROFILE_LEVEL = -0.2, 1.2  # to which a profile is limited
+SMALLEST = 1e-9  # of a squared contrast, to divide by
 BATCH_CELLS = BATCH_POINTS // 3  # triangles measured together
 # Columns of the edges' table: the ends; the cell's center and the distance of its first corner from the center; the
 # profiles' reach; the normal, the edge's distance from the center and the vector from the center to its middle; the
@@ -53,18 +55,19 @@ COLUMNS = 32
 
 
 @compiled
-def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-def]
+def update_triangle_corners(view, corners, good):  # type: ignore[no-untyped-def]
     """Move the corners of triangles to the intersections of their measured edges.
 
     The first profiles reach across the cell; for large cells shorter ones follow, down to
     ``FINE_REACH_PX``.
 
     Args:
-        image: (H, W, 3) uint8 BGR.
+        view: ``PyramidLevel``.
         corners: (N, 3, 2) float64 px, clockwise in the image, updated.
         good: (N,) bool, the triangles to measure; set to False for those without valid edges.
     """
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
+    flat, height, width = view.image.reshape(-1), view.image.shape[0], view.image.shape[1]
+    light = view.response.light
     edges, buffers = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
     left, reach = np.flatnonzero(good), np.full(good.shape[0], PROFILE_REACH)
     for _ in range(MAX_PASSES):
@@ -73,10 +76,10 @@ def update_triangle_corners(image, corners, good):  # type: ignore[no-untyped-de
             count = 3 * cells.shape[0]
             _fill_edges(corners, cells, reach, edges)
             _fill_normals(edges, count)
-            _fill_contrast_weights(flat, height, width, edges, count, buffers)
+            _fill_contrast_weights(flat, light, height, width, edges, count, buffers)
             _fill_profile_places(height, width, edges, count)
-            _fill_profile_areas(flat, height, width, False, edges, count, buffers)
-            _fill_profile_areas(flat, height, width, True, edges, count, buffers)
+            _fill_profile_areas(flat, light, height, width, False, edges, count, buffers)
+            _fill_profile_areas(flat, light, height, width, True, edges, count, buffers)
             _fill_edge_lines(edges, count)
             _update_corners(edges, cells, corners, good, reach)
         left = left[reach[left] > 0.0]
@@ -113,7 +116,7 @@ def _fill_normals(edges, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_contrast_weights(flat, height, width, edges, count, buffers):  # type: ignore[no-untyped-def]
+def _fill_contrast_weights(flat, light, height, width, edges, count, buffers):  # type: ignore[no-untyped-def]
     """Write the weights that separate each cell's ink from the color outside each edge, and the edges' validity."""
     patches, cells = buffers.patches, count // 3
     for i in range(cells):
@@ -141,7 +144,11 @@ def _fill_contrast_weights(flat, height, width, edges, count, buffers):  # type:
         contrast = u0 * u0 + u1 * u1 + u2 * u2
         is_valid = (contrast >= MIN_CONTRAST**2) & (edges[DEPTH + i] > MIN_DEPTH_PX)
         edges[VALID + i] *= patches[INSIDE + i] * is_valid
-        contrast = max(contrast, MIN_CONTRAST**2)
+        b0, b1, b2 = light_at(light, b0), light_at(light, b1), light_at(light, b2)
+        u0 = light_at(light, edges[INK + i]) - b0
+        u1 = light_at(light, edges[INK + BATCH_POINTS + i]) - b1
+        u2 = light_at(light, edges[INK + 2 * BATCH_POINTS + i]) - b2
+        contrast = max(u0 * u0 + u1 * u1 + u2 * u2, SMALLEST)
         u0, u1, u2 = u0 / contrast, u1 / contrast, u2 / contrast
         edges[WEIGHT + i], edges[WEIGHT + BATCH_POINTS + i], edges[WEIGHT + 2 * BATCH_POINTS + i] = u0, u1, u2
         edges[BACKGROUND + i] = u0 * b0 + u1 * b1 + u2 * b2
@@ -163,9 +170,10 @@ def _fill_profile_places(height, width, edges, count):  # type: ignore[no-untype
 
 
 @compiled
-def _fill_profile_areas(flat, height, width, second, edges, count, buffers):  # type: ignore[no-untyped-def]
+def _fill_profile_areas(flat, light, height, width, second, edges, count, buffers):  # type: ignore[no-untyped-def]
     """Write the areas under the first or ``second`` profiles, in steps, and keep the ones before in ``AREA_BEFORE``."""
     points, parts = buffers.fixed_points, buffers.channel_sums
+    share = np.float32(1.0 / (SUBPIXEL_STEPS * SUBPIXEL_STEPS))
     for i in range(count):
         is_valid, reach = edges[VALID + i] > 0.0, edges[REACH + i]
         x = reach * edges[MEDIAN_X + i]
@@ -192,8 +200,8 @@ def _fill_profile_areas(flat, height, width, second, edges, count, buffers):  # 
                 edges[WEIGHT + BATCH_POINTS + i],
                 edges[WEIGHT + 2 * BATCH_POINTS + i],
             )
-            f = u0 * parts[BLUE + i] + u1 * parts[GREEN + i] + u2 * parts[RED + i]
-            f = f * (1.0 / (SUBPIXEL_STEPS * SUBPIXEL_STEPS)) - edges[BACKGROUND + i]
+            f = u0 * light_at(light, share * parts[BLUE + i]) + u1 * light_at(light, share * parts[GREEN + i])
+            f += u2 * light_at(light, share * parts[RED + i]) - edges[BACKGROUND + i]
             edges[AREA + i] += weight * min(max(f, MIN_PROFILE_LEVEL), MAX_PROFILE_LEVEL)
         for i in range(count):
             points[X + i] += fixed_point_length(edges[STEP_X + i])
@@ -229,8 +237,8 @@ def _update_corners(edges, cells, corners, good, reach):  # type: ignore[no-unty
         if good[i]:
             for k in range(3):
                 corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
-        is_done = not good[i] or reach[i] * size < 2 * FINE_REACH_PX
-        reach[i] = 0.0 if is_done else max(0.25 * reach[i], 2 * FINE_REACH_PX / size)
+        is_done = not good[i] or (reach[i] != PROFILE_REACH and reach[i] * size < 2 * FINE_REACH_PX)
+        reach[i] = 0.0 if is_done else min(max(0.25 * reach[i], 2 * FINE_REACH_PX / size),0.79)
 
 
 @compiled

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from extractor.cells.region_growing import Regions
 from extractor.cells.seeds import Seeds, domain_moments
 from extractor.cells.triangle_edges import update_triangle_corners
+from extractor.image.pyramid import PyramidLevel
 from extractor.numeric.compilation import compiled
 
 # In coordinates in which its covariance is the identity, every triangle is equilateral with corners at the radius
@@ -112,24 +113,24 @@ def triangles_from_moments(seeds: Seeds, scale: int) -> Triangles:
     return Triangles(corners[good], seeds.ink[good], np.flatnonzero(good).astype(np.int32))
 
 
-def fit_triangles(image: NDArray[np.uint8], regions: Regions, scale: int = 1) -> Triangles:
+def fit_triangles(view: PyramidLevel, regions: Regions, scale: int = 1) -> Triangles:
     """Stage 5: select the regions that are triangles, and measure their edges with sub-pixel accuracy.
 
     Args:
-        image: (H, W, 3) uint8 BGR, at full scale.
+        view: the image at full scale.
         regions: grown at 1/``scale`` of the image's scale.
         scale: full-scale pixels per pixel of the regions.
     """
     return Triangles(
-        *_triangle_arrays(image, regions.moments, regions.seed, regions.domain_px, regions.ink, scale)
+        *_triangle_arrays(view, regions.moments, regions.seed, regions.domain_px, regions.ink, scale)
     )
 
 
 @compiled
-def _triangle_arrays(image, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
+def _triangle_arrays(view, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
     """The fields of ``Triangles``."""
     corners, good = _fit_to_moments(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
-    update_triangle_corners(image, corners, good)
+    update_triangle_corners(view, corners, good)
     region = np.flatnonzero(good)
     return corners[region], ink[region], region.astype(np.int32)

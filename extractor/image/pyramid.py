@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.response import LIGHT_STEPS, ResponseTables
 from extractor.numeric.compilation import compiled, inlined
 
 
@@ -19,11 +20,15 @@ class PolynomialFrame(NamedTuple):
 
 
 class PyramidLevel(NamedTuple):
-    """An image (H, W, 3) uint8 at 1/``scale`` of the full size, and the coordinates of polynomials over this image."""
+    """An image (H, W, 3) uint8 at 1/``scale`` of the full size, and the coordinates of polynomials over this image.
+
+    ``response`` leads from its values to light.
+    """
 
     image: NDArray[np.uint8]
     scale: int
     frame: PolynomialFrame
+    response: ResponseTables
 
     def to_level(self, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (..., 2) of the full image in this level, px."""
@@ -39,10 +44,12 @@ class Pyramid:
 
     Args:
         image: (H, W, 3) uint8.
+        response: leads from values to light. Pixels are averaged as light.
     """
 
-    def __init__(self, image: NDArray[np.uint8]) -> None:
+    def __init__(self, image: NDArray[np.uint8], response: ResponseTables) -> None:
         self._image = image
+        self._response = response
         self._levels: dict[int, PyramidLevel] = {}
 
     @property
@@ -51,40 +58,41 @@ class Pyramid:
         return self._image.shape[1], self._image.shape[0]
 
     def level(self, scale: int) -> PyramidLevel:
-        """The image reduced by averaging ``scale`` x ``scale`` pixels."""
+        """The image reduced by averaging the light of ``scale`` x ``scale`` pixels."""
         if scale not in self._levels:
-            self._levels[scale] = _pyramid_level(self._image, scale)
+            self._levels[scale] = _pyramid_level(self._image, scale, self._response)
         return self._levels[scale]
 
 
-def _pyramid_level(image: NDArray[np.uint8], scale: int) -> PyramidLevel:
-    if scale == 2:
-        image = _halved(image)
-    elif scale > 1:
-        image = _block_means(image, scale)
+def _pyramid_level(image: NDArray[np.uint8], scale: int, response: ResponseTables) -> PyramidLevel:
+    if scale > 1:
+        image = _block_means(image, scale, response.light_steps, response.value_of_steps)
     height, width = image.shape[:2]
-    return PyramidLevel(image, scale, PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height)))
+    frame = PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
+    return PyramidLevel(image, scale, frame, response)
 
 
 @compiled
-def _block_means(image, scale):  # type: ignore[no-untyped-def]
-    """(H // scale, W // scale, 3) uint8: the means of ``scale`` x ``scale`` pixels, halves rounded up."""
+def _block_means(image, scale, light_steps, value_of_steps):  # type: ignore[no-untyped-def]
+    """(H // scale, W // scale, 3) uint8: the values of the mean light of ``scale`` x ``scale`` pixels."""
     height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
     out = np.empty((height, width, 3), np.uint8)
     flat, means = image.reshape(-1), out.reshape(-1)
-    column = np.empty(row, np.uint16)  # holds a sum of up to 256 rows
+    column = np.empty(row, np.uint32)
     total = np.empty(3 * width, np.uint32)
-    half, share = np.float32(0.5), np.float32(1.0 / scale**2)
+    share, half, last = np.float32(1.0 / scale**2), np.float32(0.5), np.uint32(LIGHT_STEPS - 1)
     for y in range(height):
-        column[:] = np.uint16(0)
-        for k in range(scale):
+        line = flat[scale * y * row : (scale * y + 1) * row]
+        for i in range(row):
+            column[i] = light_steps[line[i]]
+        for k in range(1, scale):
             line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
             for i in range(row):
-                column[i] += np.uint16(line[i])
+                column[i] += light_steps[line[i]]
         _fill_block_sums(column, scale, width, total)
         line = means[3 * y * width : 3 * (y + 1) * width]
         for i in range(3 * width):
-            line[i] = np.uint8(np.float32(total[i]) * share + half)
+            line[i] = value_of_steps[min(np.uint32(np.float32(total[i]) * share + half), last)]
     return out
 
 
@@ -96,28 +104,8 @@ def _fill_block_sums(column, scale, width, total):  # type: ignore[no-untyped-de
     for x in range(np.uint64(width)):
         blue, green, red = np.uint32(0), np.uint32(0), np.uint32(0)
         for _ in range(scale):
-            blue += np.uint32(column[i])
-            green += np.uint32(column[i + one])
-            red += np.uint32(column[i + two])
+            blue += column[i]
+            green += column[i + one]
+            red += column[i + two]
             i += three
         total[three * x], total[three * x + one], total[three * x + two] = blue, green, red
-
-
-@compiled
-def _halved(image):  # type: ignore[no-untyped-def]
-    """The means of 2 x 2 pixels, halves rounded up: equal to OpenCV's result, in half of the time."""
-    height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
-    out = np.empty((height, width, 3), np.uint8)
-    flat, means = image.reshape(-1), out.reshape(-1)
-    row_sum = np.empty(6 * width, np.uint16)
-    one, three, six = np.uint16(1), np.uint64(3), np.uint64(6)
-    for y in range(height):
-        above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
-        for i in range(6 * width):
-            row_sum[i] = np.uint16(above[i]) + np.uint16(below[i])
-        line = means[3 * y * width : 3 * (y + 1) * width]
-        for x in range(np.uint64(width)):
-            for channel in range(three):
-                left, right = row_sum[six * x + channel], row_sum[six * x + channel + three]
-                line[three * x + channel] = (left + right + one + one) >> np.uint16(2)
-    return out

@@ -13,11 +13,15 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.numeric.compilation import inlined_no_refcount
+
 VALUES = 256  # of 8 bits
 SRGB_EXPONENT = 2.4  # of the sRGB curve above its straight part,
 SRGB_STRAIGHT = 0.0392857  # which ends at this share of the largest value (0.055 / 1.4)
 MIN_EXPONENT, MAX_EXPONENT = 0.2, 5.0
 ENTRIES = 2048  # of the table that encodes light; equal steps of the square root of light
+STEPS_PER_ROOT = np.float32((ENTRIES - 1) / 255.0**0.5)
+LIGHT_STEPS = 1 << 14  # steps of light from 0 to 255, for means of pixels
 LINEAR_EXPONENT = 1.0
 
 Response = Literal["auto", "srgb", "linear"] | float | Sequence[float] | NDArray[np.floating[Any]]
@@ -30,10 +34,14 @@ class ResponseTables(NamedTuple):
         light: (256,) float32, the light of each value.
         encoded: (2 * ENTRIES,) float32, the value of light and its derivative by light, one after the other, at
             ``ENTRIES`` equal steps of the square root of light from 0 to 255.
+        light_steps: (256,) uint16, the light of each value in ``LIGHT_STEPS`` steps, in the middle of a step.
+        value_of_steps: (LIGHT_STEPS,) uint8, the nearest value of the light of each step.
     """
 
     light: NDArray[np.float32]
     encoded: NDArray[np.float32]
+    light_steps: NDArray[np.uint16]
+    value_of_steps: NDArray[np.uint8]
 
 
 def light_of_values(response: Response) -> NDArray[np.float64]:
@@ -115,4 +123,23 @@ def response_tables(light_of_value: NDArray[np.float64]) -> ResponseTables:
     step = np.clip(np.searchsorted(light_of_value, light, side="right") - 1, 0, VALUES - 2)
     slope = 1.0 / np.diff(light_of_value)[step]
     encoded = np.stack([values, slope], axis=1).astype(np.float32).reshape(-1)
-    return ResponseTables(light_of_value.astype(np.float32), encoded)
+    per_step = 255.0 / (LIGHT_STEPS - 1)
+    steps = np.rint(light_of_value / per_step).astype(np.uint16)
+    nearest = encode_light(per_step * np.arange(LIGHT_STEPS), light_of_value)
+    return ResponseTables(
+        light_of_value.astype(np.float32), encoded, steps, np.floor(nearest + 0.5).astype(np.uint8)
+    )
+
+
+@inlined_no_refcount
+def table_place(light):  # type: ignore[no-untyped-def]
+    """The place of light's value in ``ResponseTables.encoded``; the derivative follows there. Light beyond the table
+    has the first or the last value."""
+    root = np.sqrt(min(max(np.float32(light), np.float32(0.0)), np.float32(255.0)))
+    return np.uint64(2) * np.uint64(np.int32(root * STEPS_PER_ROOT + np.float32(0.5)))
+
+
+@inlined_no_refcount
+def light_at(light, value):  # type: ignore[no-untyped-def]
+    """The light of the whole value next to a value from 0 to 255."""
+    return light[np.uint8(value + np.float32(0.5))]

@@ -8,12 +8,12 @@ So no region is grown and no triangle is fitted in the background.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
 from extractor.cells.seeds import Seeds
 from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.cells.triangle_fit import Triangles
+from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import image_cell_of_layout_cell, linear_maps
 from extractor.numbering.lattice_walk import Numbering
@@ -34,12 +34,12 @@ def is_small_pattern_possible(seeds: Seeds, cells: int) -> bool:
 
 
 def fit_predicted_triangles(
-    image: NDArray[np.uint8], cells: Cells, numbering: Numbering, lattice: Lattice
+    view: PyramidLevel, cells: Cells, numbering: Numbering, lattice: Lattice
 ) -> Triangles | None:
     """The triangles of the numbered cells, measured from the corners that the numbers predict.
 
     Args:
-        image: (H, W, 3) uint8 BGR, at full scale.
+        view: the image at full scale.
         cells: the cells, at full scale.
         numbering: their numbers.
         lattice: the layout.
@@ -53,7 +53,7 @@ def fit_predicted_triangles(
     corners, good = _predicted_corners(
         cells.center_px, numbering.cell, lattice.layout_cells, numbering.mirrored
     )
-    update_triangle_corners(image, corners, good)
+    update_triangle_corners(view, corners, good)
     if np.count_nonzero(good) < MIN_FITTED_SHARE * len(lattice.ink):
         return None
     return Triangles(corners[good], cells.ink[good], np.flatnonzero(good).astype(np.int32))

@@ -153,12 +153,13 @@ class EdgeContrasts(NamedTuple):
     """The change of color across the gridlines; it stays the same where gridlines move by a pixel.
 
     Attributes:
-        contrasts: (E, 3) differences of level.
-        projections, clearance: (E, 4), as ``channel_projections`` gives them.
+        sides: (E, 6) light on both sides, as ``gridline_sides`` gives it.
+        contrasts: (E, 3) gray levels, differences of the values on both sides.
+        clearance: (E, 4), as ``gridline_clearance`` gives it.
     """
 
+    sides: NDArray[np.float64]
     contrasts: NDArray[np.float64]
-    projections: NDArray[np.float64]
     clearance: NDArray[np.float64]
 
 

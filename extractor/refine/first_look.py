@@ -10,11 +10,11 @@ from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate
-from extractor.refine.measure.edge_profiles import channel_projections, profile_blur
+from extractor.refine.measure.edge_profiles import gridline_clearance, profile_blur
 from extractor.refine.measure.gridline_weights import MIN_NOISE
 from extractor.refine.synthesis.blur_bleed import bleed_shares, remove_bleed
+from extractor.refine.synthesis.gridline_sides import gridline_sides, value_contrasts
 from extractor.refine.synthesis.ink_levels import InkCells, cell_means, smoothed_levels
-from extractor.refine.synthesis.residual_kernel import update_known_contrasts
 from extractor.refine.synthesis_steps import MIN_SIGMA_PX
 
 DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured
@@ -35,27 +35,25 @@ def _initial_appearance(view, topology, xy, sigma, no_model):  # type: ignore[no
     """The noise and ``InkLevels``."""
     image, cells, black_cells, color = view.image, topology.cells, topology.black_cells, topology.cell_color
     noise = np.maximum(estimate_noise(image, xy, cells), MIN_NOISE)
-    drawn = cell_means(image, no_model, xy, cells, sigma)
-    black = cell_means(image, no_model, xy, black_cells, sigma)
-    return noise, smoothed_levels(drawn, black, xy, InkCells(cells, black_cells, color), noise, view.frame)
+    drawn = cell_means(image, view.response.light, no_model, xy, cells, sigma)
+    black = cell_means(image, view.response.light, no_model, xy, black_cells, sigma)
+    return noise, smoothed_levels(drawn, black, xy, InkCells(cells, black_cells, color), noise, view)
 
 
 def update_edge_contrasts(
     view: PyramidLevel, topology: Topology, estimate: Estimate, lines: NDArray[np.float64]
 ) -> EdgeContrasts:
     """The contrasts across the gridlines (E, 8). Those beside unknown cells are marked as not known in ``lines``."""
-    contrasts: EdgeContrasts = _update_edge_contrasts(
-        lines, estimate.xy, topology, estimate.levels, view.frame
-    )
+    contrasts: EdgeContrasts = _update_edge_contrasts(lines, estimate.xy, topology, estimate.levels, view)
     return contrasts
 
 
 @compiled
-def _update_edge_contrasts(lines, xy, topology, levels, frame):  # type: ignore[no-untyped-def]
-    cells, edge_cells, cell, black = topology.cells, topology.edge_cells, levels.cell, levels.black
-    contrasts = update_known_contrasts(lines, xy, cells, edge_cells, cell, levels.slope)
-    projections, clearance = channel_projections(lines, contrasts, xy, cells, edge_cells, cell, black, frame)
-    return EdgeContrasts(contrasts, projections, clearance)
+def _update_edge_contrasts(lines, xy, topology, levels, view):  # type: ignore[no-untyped-def]
+    cells, edge_cells = topology.cells, topology.edge_cells
+    sides = gridline_sides(lines, xy, cells, edge_cells, levels, view.frame)
+    contrasts = value_contrasts(sides, view.response.encoded)
+    return EdgeContrasts(sides, contrasts, gridline_clearance(lines, contrasts, xy, cells, edge_cells))
 
 
 def update_blur_and_bleed(
@@ -67,9 +65,8 @@ def update_blur_and_bleed(
 ) -> tuple[Estimate, EdgeContrasts]:
     """The estimate with the blur that some of the gridlines (E, 8) show, and with levels and contrasts without
     bleed."""
-    across = view.image, lines, contrasts.projections, contrasts.clearance
     assumed = DEFAULT_SIGMA_PX / view.scale
-    sigma, share, median_share = _blur_and_bleed(*across, estimate.xy, topology.cells, assumed)
+    sigma, share, median_share = _blur_and_bleed(view, lines, contrasts, estimate.xy, topology.cells, assumed)
     estimate = estimate._replace(sigma=sigma)
     if median_share > MIN_CORRECTED_BLEED:
         levels = remove_bleed(estimate.levels, topology.cell_color, share, median_share)
@@ -79,9 +76,9 @@ def update_blur_and_bleed(
 
 
 @compiled
-def _blur_and_bleed(image, lines, projections, clearance, xy, cells, assumed):  # type: ignore[no-untyped-def]
+def _blur_and_bleed(view, lines, across, xy, cells, assumed):  # type: ignore[no-untyped-def]
     """The blur, px; and the bleed of each cell and its median, as ``bleed_shares`` gives them."""
-    sigma = profile_blur(image, lines, projections, clearance, BLUR_GRIDLINES)
+    sigma = profile_blur(view, lines, across, BLUR_GRIDLINES)
     sigma = max(sigma, MIN_SIGMA_PX) if np.isfinite(sigma) else FALLBACK_SIGMA_PX
     share, median_share = bleed_shares(xy, cells, sigma, assumed)
     return sigma, share, median_share

@@ -30,14 +30,11 @@ from extractor.refine.measure.gridline_bending import (
     measure_roughness,
     update_without_bending,
 )
-from extractor.refine.measure.gridline_offsets import foot_levels
 from extractor.refine.measure.gridline_weights import (
     ShiftGradients,
-    chord_midpoints,
     gridline_misfits,
     misfit_weights,
     normalized_step_lengths,
-    shift_gradients,
 )
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
@@ -61,7 +58,7 @@ from extractor.refine.solve.subproblem import (
     subproblem_around,
 )
 from extractor.refine.synthesis.dot_gain import update_without_dot_gain
-from extractor.refine.synthesis.ink_levels import LevelChange
+from extractor.refine.synthesis.residual_kernel import A, B
 
 
 class MarkerState(NamedTuple):
@@ -84,7 +81,6 @@ class GridlineState(NamedTuple):
     bend_variance: NDArray[np.float64]
     off_diagonal: NDArray[np.float64]
     weight: NDArray[np.float64]
-    foot: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
 
 
@@ -155,7 +151,7 @@ def partial_step(
     assert reading is not None
     where = estimate.measured, estimate.reliable, estimate.hidden, estimate.maps, estimate.roughness
     markers = MarkerState(*where, estimate.normalized_steps, information.diagonal)
-    how = information.off_diagonal, reading.weight, reading.foot, reading.dot_gain_offset
+    how = information.off_diagonal, reading.weight, reading.dot_gain_offset
     gridlines = GridlineState(estimate.bend, estimate.bend_variance, *how)
     image_state = ImageState(estimate.noise, estimate.median_misfit, estimate.dot_gain, wide_blur)
     step: PartialStep = _partial_step(
@@ -163,8 +159,8 @@ def partial_step(
     )
     drawing, of_markers, of_gridlines = step.drawing, step.markers._asdict(), step.gridlines._asdict()
     information = Information(of_markers.pop("diagonal"), of_gridlines.pop("off_diagonal"))
-    fields = {name: of_gridlines.pop(name) for name in ("weight", "foot", "dot_gain_offset")}
-    reading = reading._replace(lines=drawing.lines, contrasts=drawing.contrasts, **fields)
+    fields = {name: of_gridlines.pop(name) for name in ("weight", "dot_gain_offset")}
+    reading = reading._replace(lines=drawing.lines, sides=drawing.sides, added=drawing.added, **fields)
     fields = {**of_markers, **of_gridlines, "information": information, "reading": reading}
     return estimate._replace(xy=drawing.xy, **fields), drawing
 
@@ -187,7 +183,7 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
     held = held_shifts(markers.measured, drawing.xy, redrawn)
     drawing = draw_pattern_part(view, topology, buffers, drawing, redrawn, state)
     part = subproblem_around(free, hidden, roughness, held, edges, topology.spokes)
-    read = _subproblem_reading(drawing, part, topology.edge_cells, gridlines.weight, view.frame, image_state)
+    read = _subproblem_reading(drawing, part, topology.edge_cells, gridlines.weight, image_state)
     shifts, information = _solve_subproblem(part, read, gridlines.off_diagonal)
     markers = _markers_after_step(state, drawing.xy, shifts, information.diagonal, part, markers)
     gridlines = _gridlines_after_step(drawing, shifts, information.off_diagonal, part, read, gridlines)
@@ -195,15 +191,13 @@ def _partial_step(view, topology, buffers, drawing, redrawn, markers, gridlines,
 
 
 @compiled
-def _subproblem_reading(drawing, part, edge_cells, weight, frame, image_state):  # type: ignore[no-untyped-def]
+def _subproblem_reading(drawing, part, edge_cells, weight, image_state):  # type: ignore[no-untyped-def]
     """``SubproblemReading`` from the drawing; ``weight`` (E,) are those of all gridlines before."""
     rule, sigma, variance = PIXEL_MISFIT_RULE, drawing.sigma, image_state.noise**2
     ids, values = part.gridlines, rule.values
     sums, lines = selected_rows(drawing.sums, ids), selected_rows(drawing.lines, ids)
     contrasts, bend = selected_rows(drawing.contrasts, ids), selected_rows(drawing.bend, ids)
-    cells, levels, corrected = selected_rows(edge_cells, ids), drawing.levels, drawing.corrected_levels
-    change = LevelChange(corrected.cell - levels.cell, corrected.black - levels.black)
-    gradients = shift_gradients(sums, contrasts, cells, change, chord_midpoints(lines), frame)
+    cells, gradients = selected_rows(edge_cells, ids), ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
     dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, cells, image_state.dot_gain)
     bend_variance = np.zeros(len(ids))
     if np.any(part.roughness) or np.any(bend):
@@ -264,13 +258,10 @@ def _gridlines_after_step(drawing, shifts, own_off_diagonal, part, read, gridlin
     """``GridlineState`` with the measurements along the gridlines of the subproblem."""
     ids, system = part.gridlines, read.system
     own_bend = bend_after_shift(read.bend, read.bend_response, shifts, system.lines, part.ends)
-    black = selected_rows(drawing.black, ids)
-    own_foot = foot_levels(system.contrasts, black, read.gradients.level_shift)
     return GridlineState(
         replaced_table_rows(gridlines.bend, ids, own_bend),
         replaced_rows(gridlines.bend_variance, ids, read.bend_variance),
         replaced_table_rows(gridlines.off_diagonal, ids, own_off_diagonal),
         replaced_rows(gridlines.weight, ids, system.weight),
-        replaced_rows(gridlines.foot, ids, own_foot),
         replaced_rows(gridlines.dot_gain_offset, ids, read.dot_gain_offset),
     )

@@ -84,23 +84,22 @@ def profile_step(
         The estimate after the round, and (E,) 0 to 1, how well gridlines look like the pattern.
     """
     state = estimate.pattern_state()
-    step = _profile_step(view.image, lines, contrasts, state, topology, stations, judged)
-    foot = contrasts.projections[:, 3].copy()
-    look = contrasts.contrasts, foot, contrasts.clearance, step.weight, step.dot_gain_offset
+    step = _profile_step(view, lines, contrasts, state, topology, stations, judged)
+    look = contrasts.sides, contrasts.sides, contrasts.clearance, step.weight, step.dot_gain_offset
     reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
     others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
     return with_solution(estimate, step.solution, **others), step.profile_weight
 
 
 @compiled
-def _profile_step(image, lines, across, state, topology, stations, judged):  # type: ignore[no-untyped-def]
+def _profile_step(view, lines, across, state, topology, stations, judged):  # type: ignore[no-untyped-def]
     """``ProfileStep`` from the gridlines (E, 8), the ``EdgeContrasts`` across them, and the ``PatternState``."""
     contrasts, clearance = across.contrasts, across.clearance
     edges, spokes, edge_cells = topology.edges, topology.spokes, topology.edge_cells
     sigma, noise, rule = state.sigma, state.noise, SAMPLE_MISFIT_RULE
     bending = bending_gridlines(state.roughness, state.bend, edges)
-    sums = read_profiles(image, lines, across.projections, clearance, sigma, bending, stations)
-    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(sums)))
+    sums = read_profiles(view, lines, across, sigma, bending, stations)
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
     dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
     dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(state.bend, state.roughness, state.weight)

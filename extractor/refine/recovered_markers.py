@@ -89,14 +89,14 @@ def fill_recovered_markers(
         xy, cov: (M, 2) px and (M, 2, 2) px^2, written; NaN where a lost marker is not accepted, or far from its place.
     """
     state, start = estimate.pattern_state(), start_places(places)
-    _fill_recovered_markers(view.image, state, contrasts, start, topology, lost, xy, cov)
+    _fill_recovered_markers(view, state, contrasts, start, topology, lost, xy, cov)
 
 
 @compiled
-def _fill_recovered_markers(image, state, contrasts, places, topology, lost, xy, cov):  # type: ignore[no-untyped-def]
+def _fill_recovered_markers(view, state, contrasts, places, topology, lost, xy, cov):  # type: ignore[no-untyped-def]
     edges, spokes, hidden = topology.edges, topology.spokes, state.hidden
     gridline_ids, count = _lost_and_reference_gridlines(lost, edges)
-    read = _weighed_profiles(image, state, contrasts, topology, gridline_ids, count)
+    read = _weighed_profiles(view, state, contrasts, topology, gridline_ids, count)
     gridline_ids, weight, bend_variance = (
         gridline_ids[:count],
         read.weight[:count],
@@ -137,29 +137,27 @@ def _lost_and_reference_gridlines(lost, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _weighed_profiles(image, state, contrasts, topology, gridline_ids, count):  # type: ignore[no-untyped-def]
+def _weighed_profiles(view, state, contrasts, topology, gridline_ids, count):  # type: ignore[no-untyped-def]
     """``WeighedProfiles`` of the gridlines (n,); those after the first ``count`` show the usual misfit."""
     sigma, rule = state.sigma, SAMPLE_MISFIT_RULE
     ends, bend = selected_rows(topology.edges, gridline_ids), selected_rows(state.bend, gridline_ids)
-    clearance, across = (
-        selected_rows(contrasts.clearance, gridline_ids),
+    across = EdgeContrasts(
+        selected_rows(contrasts.sides, gridline_ids),
         selected_rows(contrasts.contrasts, gridline_ids),
+        selected_rows(contrasts.clearance, gridline_ids),
     )
     lines = gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, gridline_ids))
-    weights, bending = (
-        selected_rows(contrasts.projections, gridline_ids),
-        bending_gridlines(state.roughness, bend, ends),
-    )
-    sums = read_profiles(image, lines, weights, clearance, sigma, bending, STATIONS)
-    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy(), np.zeros(len(gridline_ids)))
+    bending = bending_gridlines(state.roughness, bend, ends)
+    sums = read_profiles(view, lines, across, sigma, bending, STATIONS)
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
     cells = selected_rows(topology.edge_cells, gridline_ids)
-    update_without_dot_gain(sums, gradients, across, cells, state.dot_gain)
+    update_without_dot_gain(sums, gradients, across.contrasts, cells, state.dot_gain)
     prior = BendingPrior(bend, state.roughness, state.weight[gridline_ids])
     bend_variance, _ = update_for_bending(sums, gradients, prior, lines, ends, state.noise, rule)
     misfit = gridline_misfits(sums, gradients, rule.values, rule.min_places)
     median = median_of_misfits(
         misfit[count:] if len(gridline_ids) - count >= MIN_REFERENCE_GRIDLINES else misfit
     )
-    pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
+    pardon = MISFIT_TOLERANCE**2 * across.clearance[:, SQUARED_CONTRAST]
     weight = misfit_weights(sums, misfit, median, pardon, rule.values, rule.default_weight)
     return WeighedProfiles(lines, sums, gradients, weight, bend_variance)

@@ -248,7 +248,7 @@ class Refiner:
         scale, reading = view.scale, estimate.reading
         assert reading is not None
         picture = self._synthesis_solver.buffers(view.image.shape).synthetic_image
-        points = measure_virtual_markers(view.image, picture, reading, self._virtual, scale)
+        points = measure_virtual_markers(view, picture, reading, self._virtual)
         start, spokes = start_places(places), self._topology.spokes
         xy, cov, bend_deviation = _at_full_scale(xy, cov, estimate.bend_variance, spokes, start, scale)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise

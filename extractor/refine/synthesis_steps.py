@@ -12,20 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.pyramid import PolynomialFrame, PyramidLevel
+from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import DrawingBuffers, Synthesis, allocate_drawing_buffers, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_misfit
-from extractor.refine.measure.gridline_offsets import GridlineReading, foot_levels
-from extractor.refine.measure.gridline_weights import (
-    blur_change,
-    chord_midpoints,
-    shift_gradients,
-    weigh_gridlines,
-)
+from extractor.refine.measure.gridline_offsets import GridlineReading
+from extractor.refine.measure.gridline_weights import ShiftGradients, blur_change, weigh_gridlines
 from extractor.refine.partial_step import partial_step
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
@@ -49,8 +44,8 @@ from extractor.refine.solve.convergence import (
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.blur_bleed import adapt_levels_to_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.ink_levels import LevelChange, level_change
-from extractor.refine.synthesis.residual_kernel import update_known_contrasts
+from extractor.refine.synthesis.ink_levels import level_change
+from extractor.refine.synthesis.residual_kernel import A, B
 
 MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 MAX_BLUR_CHANGE = 0.3  # of the blur, in one step
@@ -92,7 +87,6 @@ class SynthesisReading(NamedTuple):
         weight: (E,) 0 to 1.
         median_misfit: squared gray levels.
         bend_variance: (E,) px^2.
-        foot: (E,), as in ``GridlineReading``.
         dot_gain: px.
         dot_gain_offset: (E,) px.
         blur_change: px, by which the blur is larger than drawn.
@@ -103,7 +97,6 @@ class SynthesisReading(NamedTuple):
     weight: NDArray[np.float64]
     median_misfit: float
     bend_variance: NDArray[np.float64]
-    foot: NDArray[np.float64]
     dot_gain: float
     dot_gain_offset: NDArray[np.float64]
     blur_change: float
@@ -239,7 +232,7 @@ class SynthesisSolver:
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from everything."""
         drawing = draw_pattern(view, self._topology, estimate, self.buffers(view.image.shape))
-        return self._update_estimate(view.frame, estimate, drawing), drawing
+        return self._update_estimate(estimate, drawing), drawing
 
     def _partial_step(
         self,
@@ -253,12 +246,12 @@ class SynthesisSolver:
         buffers = self.buffers(view.image.shape)
         return partial_step(view, self._topology, estimate, drawing, redrawn, buffers, wide_blur)
 
-    def _update_estimate(self, frame: PolynomialFrame, estimate: Estimate, drawing: Synthesis) -> Estimate:
+    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
         """The estimate after the step that the sums of the drawing ask for."""
         topology, levels = self._topology, drawing.corrected_levels
-        read = _update_and_solve(drawing, estimate.pattern_state(), topology, frame)
+        read = _update_and_solve(drawing, estimate.pattern_state(), topology)
         how = NO_CLEARANCE, read.weight, read.dot_gain_offset, drawing.sigma, read.noise, True
-        reading = GridlineReading(drawing.lines, drawing.contrasts, read.foot, *how)
+        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
         sigma = _blur_after_step(drawing.sigma, drawing.edge_px, read.blur_change)
         if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
             levels = adapt_levels_to_blur(levels, estimate.xy, topology, drawing.sigma, sigma)
@@ -276,18 +269,11 @@ class SynthesisSolver:
 
 
 @compiled
-def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyped-def]
-    """``SynthesisReading`` of a drawing; gridlines beside unknown cells are marked as not known in its ``lines``."""
+def _update_and_solve(drawing, state, topology):  # type: ignore[no-untyped-def]
+    """``SynthesisReading`` of a drawing."""
     lines, contrasts, sums, sigma = drawing.lines, drawing.contrasts, drawing.sums.copy(), drawing.sigma
-    edges, spokes, cells, edge_cells = (
-        topology.edges,
-        topology.spokes,
-        topology.cells,
-        topology.edge_cells,
-    )
-    levels, corrected, rule = drawing.levels, drawing.corrected_levels, PIXEL_MISFIT_RULE
-    change = LevelChange(corrected.cell - levels.cell, corrected.black - levels.black)
-    gradients = shift_gradients(sums, contrasts, edge_cells, change, chord_midpoints(lines), frame)
+    edges, spokes, edge_cells, rule = topology.edges, topology.spokes, topology.edge_cells, PIXEL_MISFIT_RULE
+    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
     dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
     dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(drawing.bend, state.roughness, state.weight)
@@ -299,11 +285,9 @@ def _update_and_solve(drawing, state, topology, frame):  # type: ignore[no-untyp
     noise = found if np.isfinite(found) else state.noise
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
     solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
-    current = update_known_contrasts(lines, state.xy, cells, edge_cells, corrected.cell, corrected.slope)
-    wider = blur_change(sums, dot_gain_offset, weight, contrasts, current, sigma)
-    foot = foot_levels(contrasts, drawing.black, gradients.level_shift)
+    wider = blur_change(sums, dot_gain_offset, weight, sigma)
     return SynthesisReading(
-        weight, median_misfit, bend_variance, foot, dot_gain, dot_gain_offset, wider, noise, solution
+        weight, median_misfit, bend_variance, dot_gain, dot_gain_offset, wider, noise, solution
     )
 
 

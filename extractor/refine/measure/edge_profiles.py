@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from extractor.numeric.bilinear import weighted_sample
-from extractor.numeric.compilation import compiled
+from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.measure.matched_filter import HEIGHT, MAX_REACH, SINE_A, SINE_B, SQUARED_CONTRAST
 from extractor.refine.synthesis.gridlines import ARRIVE, KNOWN, LEAVE, LENGTH, UX, UY, X, Y, sagitta
-from extractor.refine.synthesis.ink_polynomials import fill_monomials
 
 BLUR_SAMPLES = 8  # on each side of a gridline
 MIN_CONTRAST = 12.0  # gray levels
@@ -29,34 +27,24 @@ CLEARANCE_COLUMNS = 4  # ``HEIGHT``, ``SINE_A``, ``SINE_B``, ``SQUARED_CONTRAST`
 
 
 @compiled
-def channel_projections(lines, contrasts, xy, cells, edge_cells, levels, black, frame):  # type: ignore[no-untyped-def]
-    """The projection of colors that is 1 before and 0 beyond each gridline, along its normal; the gridline's clearance.
+def gridline_clearance(lines, contrasts, xy, cells, edge_cells):  # type: ignore[no-untyped-def]
+    """The space around each gridline.
 
     Args:
-        lines: (E, 8), as ``gridlines`` gives them. contrasts: (E, 3) gray levels.
+        lines: (E, 8), as ``gridlines`` gives them. contrasts: (E, 3) gray levels, of the values on both sides.
         xy: (M, 2) px, the markers. cells: (K, 3) marker ids. edge_cells: (E, 2) cells on both sides, -1 for none.
-        levels: (K, 3) gray levels over black. black: (3, 10) its polynomial. frame: ``PolynomialFrame``.
 
     Returns:
-        (E, 4) factors of the channels, and the projected level beyond the gridline; (E, 4) px, the height of the lower
-        cell beside the gridline; the sines of the smallest angles at its start and end; gray levels^2, the squared
-        contrast. All 0 where the contrast is low.
+        (E, 4) px, the height of the lower cell beside the gridline; the sines of the smallest angles at its start and
+        end; gray levels^2, the squared contrast. All 0 where the contrast is low.
     """
-    projections, clearance = np.zeros((lines.shape[0], 4)), np.zeros((lines.shape[0], CLEARANCE_COLUMNS))
-    terms = np.empty(10)
+    clearance = np.zeros((lines.shape[0], CLEARANCE_COLUMNS))
     for e in range(lines.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         if lines[e, KNOWN] == 0.0 or strength < MIN_CONTRAST**2:
             continue
         ux, uy, length = lines[e, UX], lines[e, UY], lines[e, LENGTH]
         x0, y0 = lines[e, X], lines[e, Y]
-        middle_x, middle_y = x0 + 0.5 * length * ux, y0 + 0.5 * length * uy
-        fill_monomials((middle_x - frame.x) / frame.scale, (middle_y - frame.y) / frame.scale, terms)
-        foot = 0.0
-        for channel in range(3):
-            projections[e, channel] = contrasts[e, channel] / strength
-            for k in range(10):
-                foot += projections[e, channel] * terms[k] * black[channel, k]
         height, at_a, at_b = length, 1.0, 1.0
         for k in range(2):
             i = edge_cells[e, k]
@@ -67,19 +55,15 @@ def channel_projections(lines, contrasts, xy, cells, edge_cells, levels, black, 
                 dx, dy = xy[cells[i, corner], 0] - x0, xy[cells[i, corner], 1] - y0
                 if abs(dy * ux - dx * uy) > abs(off):
                     off, along = dy * ux - dx * uy, dx * ux + dy * uy
-            if off > 0.0:  # the cell beyond the gridline gives the foot of the profile
-                for channel in range(3):
-                    foot += projections[e, channel] * levels[i, channel]
             off = abs(off)
             height = min(height, off)
             if along > 0.0:
                 at_a = min(at_a, off / np.sqrt(off * off + along * along))
             if along < length:
                 at_b = min(at_b, off / np.sqrt(off * off + (length - along) ** 2))
-        projections[e, 3] = foot
         clearance[e, HEIGHT], clearance[e, SQUARED_CONTRAST] = height, strength
         clearance[e, SINE_A], clearance[e, SINE_B] = max(at_a, 0.05), max(at_b, 0.05)
-    return projections, clearance
+    return clearance
 
 
 @compiled
@@ -103,26 +87,47 @@ def _isolated_gridlines(lines, clearance):  # type: ignore[no-untyped-def]
     return all_of_them[:count], False
 
 
+@inlined
+def _light_sample(flat, light, height, width, x, y, u0, u1, u2):  # type: ignore[no-untyped-def]
+    """The light at (x, y), interpolated between four pixels, the channels multiplied by u0, u1 and u2; NaN outside the
+    image (flat, height x width px)."""
+    if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
+        return np.nan
+    ix, iy = min(int(x), width - 2), min(int(y), height - 2)
+    total = 0.0
+    for dy in range(2):
+        for dx in range(2):
+            k = 3 * ((iy + dy) * width + ix + dx)
+            share = (1.0 - abs(x - ix - dx)) * (1.0 - abs(y - iy - dy))
+            total += share * (u0 * light[flat[k]] + u1 * light[flat[k + 1]] + u2 * light[flat[k + 2]])
+    return total
+
+
 @compiled
-def profile_blur(image, lines, projections, clearance, most):  # type: ignore[no-untyped-def]
+def profile_blur(view, lines, across, most):  # type: ignore[no-untyped-def]
     """The median blur across the middles of some gridlines.
 
-    The integral of f (1 - f) over a profile f is sigma / sqrt(pi). Bilinear samples add to the integral, and so does
-    another gridline near the profile: where too few gridlines are isolated, the lower quartile of all is taken.
+    The integral of f (1 - f) over a profile f of the light is sigma / sqrt(pi). Bilinear samples add to the integral,
+    and so does another gridline near the profile: where too few gridlines are isolated, the lower quartile of all is
+    taken.
 
     Args:
-        image: (H, W, 3) uint8. lines: (E, 8). projections, clearance: (E, 4), as ``channel_projections`` gives them.
+        view: ``PyramidLevel``. lines: (E, 8). across: ``EdgeContrasts``.
         most: gridlines to read, about.
 
     Returns:
         px, sigma; NaN where no gridline can be read.
     """
+    image, light, sides, clearance = view.image, view.response.light, across.sides, across.clearance
     which, are_isolated = _isolated_gridlines(lines, clearance)
     every = max(which.shape[0] // most, 1)
     blurs, count = np.empty(which.shape[0] // every + 1), 0
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     for e in which[::every]:
-        u0, u1, u2, foot = projections[e, 0], projections[e, 1], projections[e, 2], projections[e, 3]
+        u0, u1, u2 = sides[e, 0] - sides[e, 3], sides[e, 1] - sides[e, 4], sides[e, 2] - sides[e, 5]
+        strength = u0 * u0 + u1 * u1 + u2 * u2
+        u0, u1, u2 = u0 / strength, u1 / strength, u2 / strength
+        foot = u0 * sides[e, 3] + u1 * sides[e, 4] + u2 * sides[e, 5]
         nx, ny, length = -lines[e, UY], lines[e, UX], lines[e, LENGTH]
         step = MAX_REACH * clearance[e, HEIGHT] / BLUR_SAMPLES
         total = 0.0
@@ -133,7 +138,7 @@ def profile_blur(image, lines, projections, clearance, most):  # type: ignore[no
             y = lines[e, Y] + t * length * lines[e, UY] + off * ny
             for m in range(-BLUR_SAMPLES, BLUR_SAMPLES + 1):
                 at_x, at_y = x + m * step * nx, y + m * step * ny
-                f = weighted_sample(flat, height, width, at_x, at_y, u0, u1, u2) - foot
+                f = _light_sample(flat, light, height, width, at_x, at_y, u0, u1, u2) - foot
                 total += f * (1.0 - f) * step / 3.0
         if np.isfinite(total):
             apparent = total * np.sqrt(np.pi)

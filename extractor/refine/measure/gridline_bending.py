@@ -35,8 +35,6 @@ from extractor.refine.synthesis.residual_kernel import (
     MISFIT,
     READ_AA,
     READ_BB,
-    SHARE_C,
-    SHARE_D,
     C,
     D,
 )
@@ -238,8 +236,7 @@ def estimate_bend_variance(sums, gradients, bend, roughness, weight, lines, edge
         information = sums[e, CC] - by_a * ac - by_b * bc
         if not information > 1e-3 * sums[e, CC]:
             continue
-        pull = sums[e, C] - gradients.level_shift[e] * sums[e, SHARE_C]
-        b = bend[e, 0] + (pull - by_a * gradients.start[e] - by_b * gradients.end[e]) / information
+        b = bend[e, 0] + (sums[e, C] - by_a * gradients.start[e] - by_b * gradients.end[e]) / information
         for side in range(2):
             m = edges[e, side]
             total[m] += weight[e] * b * b
@@ -276,8 +273,7 @@ def update_without_bending(sums, gradients, bend, bend_variance, variance):  # t
         sums[e, READ_AA], sums[e, READ_BB] = sums[e, AA], sums[e, BB]
         if sums[e, AA] == 0.0:
             continue
-        c = sums[e, C] - gradients.level_shift[e] * sums[e, SHARE_C]
-        d = sums[e, D] - gradients.level_shift[e] * sums[e, SHARE_D]
+        c, d = sums[e, C], sums[e, D]
         k[0, 0], k[0, 1], k[1, 0], k[1, 1] = sums[e, AC], sums[e, AD], sums[e, BC], sums[e, BD]
         x, y = -bend[e, 0], -bend[e, 1]
         if bend_variance[e] > 0.0:

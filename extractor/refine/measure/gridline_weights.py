@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.numeric.compilation import compiled
-from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY, X, Y
-from extractor.refine.synthesis.ink_polynomials import fill_monomials
+from extractor.refine.synthesis.gridlines import KNOWN, UX, UY
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
@@ -20,10 +19,6 @@ from extractor.refine.synthesis.residual_kernel import (
     PIXELS,
     READ_AA,
     READ_BB,
-    SHARE_A,
-    SHARE_B,
-    A,
-    B,
 )
 
 SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
@@ -36,9 +31,6 @@ RIM_DEVIATION_PX = 0.05
 MIN_CLEAN_SHARE = 0.68  # of the gridlines with weight 1, from which on the noise is that of all gridlines
 MIN_OFFSET_WEIGHT = 0.4  # of a gridline, for its offsets to be measured
 MIN_MARKER_WEIGHT = 0.3  # mean weight of the gridlines at a marker, for the marker to count
-# An error of contrast looks like an error of blur: the integral of z g (N - 1/2) over that of (z g)^2 up to BAND, g the
-# normal density and N its integral.
-CONTRAST_TO_BLUR = 1.79
 
 
 class GridlineWeights(NamedTuple):
@@ -60,58 +52,10 @@ class ShiftGradients(NamedTuple):
 
     Attributes:
         start, end: (E,) gray levels^2 / px, by a shift of the start and of the end along the normal (-uy, ux).
-        level_shift: (E,) gray levels^2, the change of the levels of both sides together times the contrast; 0 where
-            levels stay as they are.
     """
 
     start: NDArray[np.float64]
     end: NDArray[np.float64]
-    level_shift: NDArray[np.float64]
-
-
-@compiled
-def chord_midpoints(lines):  # type: ignore[no-untyped-def]
-    """(E, 2) px, the middles of the gridlines' chords; ``lines`` (E, 8)."""
-    out = np.empty((lines.shape[0], 2))
-    for e in range(lines.shape[0]):
-        half = 0.5 * lines[e, LENGTH]
-        out[e, 0], out[e, 1] = lines[e, X] + half * lines[e, UX], lines[e, Y] + half * lines[e, UY]
-    return out
-
-
-@compiled
-def shift_gradients(sums, contrasts, edge_cells, change, middle, frame):  # type: ignore[no-untyped-def]
-    """The gradients by shifts of the gridlines' ends: of the residual less the part that new levels explain.
-
-    Args:
-        sums: (E, 24), as ``accumulate_residual_sums`` gives them.
-        contrasts: (E, 3) gray levels.
-        edge_cells: (E, 2) the drawn cells on both sides, -1 for none.
-        change: ``LevelChange`` since the pattern was drawn.
-        middle: (E, 2) px, the middles of the chords.
-        frame: ``PolynomialFrame`` of the black polynomial.
-
-    Returns:
-        ``ShiftGradients``.
-    """
-    count = sums.shape[0]
-    start, end, level_shift = np.zeros(count), np.zeros(count), np.zeros(count)
-    terms = np.empty(change.black.shape[1])
-    for e in range(count):
-        if sums[e, AA] == 0.0:
-            continue
-        fill_monomials((middle[e, 0] - frame.x) / frame.scale, (middle[e, 1] - frame.y) / frame.scale, terms)
-        for channel in range(3):
-            both_sides = 0.0
-            for k in range(terms.shape[0]):
-                both_sides += 2.0 * terms[k] * change.black[channel, k]
-            for side in range(2):
-                if edge_cells[e, side] >= 0:
-                    both_sides += change.cell[edge_cells[e, side], channel]
-            level_shift[e] += contrasts[e, channel] * both_sides
-        start[e] = sums[e, A] - level_shift[e] * sums[e, SHARE_A]
-        end[e] = sums[e, B] - level_shift[e] * sums[e, SHARE_B]
-    return ShiftGradients(start, end, level_shift)
 
 
 @compiled
@@ -244,28 +188,22 @@ def median_edge(xy, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def blur_change(sums, dot_gain_offset, gridline_weight, before, now, sigma):  # type: ignore[no-untyped-def]
+def blur_change(sums, dot_gain_offset, gridline_weight, sigma):  # type: ignore[no-untyped-def]
     """The change of the blur, px, that the gridlines' pixels ask for.
 
     A gridline off its drawn place looks more blurred, by half of the offset squared over the blur.
 
     Args:
-        sums: (E, 24). dot_gain_offset: (E,) px. gridline_weight: (E,) 0 to 1.
-        before, now: (E, 3) gray levels, the contrasts as drawn and as corrected.
+        sums: (E, 20). dot_gain_offset: (E,) px. gridline_weight: (E,) 0 to 1.
         sigma: px, the blur as drawn.
     """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
         if gridline_weight[e] == 0.0:
             continue
-        strength, change = 1e-9, 0.0
-        for channel in range(3):
-            strength += before[e, channel] ** 2
-            change += before[e, channel] * (now[e, channel] - before[e, channel])
         weight = gridline_weight[e] * sums[e, BLUR_CURVATURE]
         curvature += weight
-        pull += gridline_weight[e] * sums[e, BLUR] + CONTRAST_TO_BLUR * sigma * weight * change / strength
-        pull -= weight * 0.5 * dot_gain_offset[e] ** 2 / sigma
+        pull += gridline_weight[e] * sums[e, BLUR] - weight * 0.5 * dot_gain_offset[e] ** 2 / sigma
     return pull / curvature if curvature > 0.0 else 0.0
 
 

@@ -15,10 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.response import table_place
 from extractor.numeric.compilation import compiled, inlined
+from extractor.refine.synthesis.gridline_sides import BEFORE, BEYOND
 from extractor.refine.synthesis.gridlines import KNOWN, LENGTH
 from extractor.refine.synthesis.pixel_rows import row_frame
-from extractor.refine.synthesis.pixel_weights import C0, C1, C2, C3, C4, C5
+from extractor.refine.synthesis.pixel_weights import C0, C1, C2, C3, C4, C5, half_share
 from extractor.refine.synthesis.residual_kernel import (
     AA,
     AB,
@@ -42,38 +44,29 @@ from extractor.refine.synthesis.residual_kernel import (
 REACH_SIGMA = 1.3  # in units of the blur, the reach of a row
 CLEAR_SIGMA = 2.6  # in units of the blur, the least distance of the other gridline of a corner
 MAX_REACH = 0.33  # of the cell's height, the reach of a row at most
-CLIP = np.float32(0.3)  # of the contrast, the most by which a pixel may lie beyond both colors
 POLYNOMIAL_RANGE = np.float32(2.6)  # in units of the blur, the range of the polynomials
-ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
-I1, I2, I3, I4, I5 = (np.float32(c / (2 * k + 3)) for k, c in enumerate((C1, C2, C3, C4, C5)))
+ZERO, ONE, SMALLEST = np.float32(0.0), np.float32(1.0), np.float32(1e-9)
 LANES = 8  # rows in one vector of the processor
 MAX_ROWS = 240  # rows side by side; a power of 2 would put all columns on one cache line
 COLUMN = MAX_ROWS + LANES
 DOUBLE_SUMS = 5  # sums in float64, those that move the markers: AA, AB, BB, A, B
 # columns of a row: px along and across the chord at its first pixel, and from one pixel to the next; the number of its
-# last pixel, -1 for none; of its gridline length, 1 / length, slopes, channel factors, level beyond the gridline
+# last pixel, -1 for none; of its gridline length, 1 / length, slopes; of three channels the light before the gridline
+# less that beyond, and the light beyond
 ALONG, ACROSS, ALONG_STEP, ACROSS_STEP, LAST = (k * COLUMN for k in range(5))
-SIZE, SHORT, AT_START, AT_END, RED, GREEN, BLUE, FOOT, COLUMNS = (k * COLUMN for k in range(5, 14))
+SIZE, SHORT, AT_START, AT_END, CONTRAST = (k * COLUMN for k in range(5, 10))
+FOOT, COLUMNS = 12 * COLUMN, 15 * COLUMN
 FIRST, STEP, END = (k * COLUMN for k in range(3))  # places in the flat image: first pixel, step, last pixel
 HEIGHT, SINE_A, SINE_B, SQUARED_CONTRAST = range(4)  # columns of a gridline's clearance
-
-
-class ChannelProjection(NamedTuple):
-    """Factors of the channels and the level beyond the gridline: the profile is 1 before the gridline and 0 beyond."""
-
-    red: float
-    green: float
-    blue: float
-    foot: float
 
 
 class FilterBuffers(NamedTuple):
     """Memory for rows side by side.
 
     Attributes:
-        place: three columns of the rows, places in the flat image. rows: fourteen columns of the rows.
-        values: (n,) float32, the profiles at one pixel of every row.
-        double_sums: (5, n) float64, flat. sums: (24, n) float32, flat.
+        place: three columns of the rows, places in the flat image. rows: fifteen columns of the rows.
+        values: three columns, float32, the channels of one pixel of every row.
+        double_sums: (5, n) float64, flat. sums: (20, n) float32, flat.
         owner: (n,) the gridlines. begin: (n + 1,) their first rows.
     """
 
@@ -90,22 +83,20 @@ class GridlineRows(NamedTuple):
     """The rows of one gridline, from ``begin`` to ``end``.
 
     Attributes:
-        strength: gray levels^2, the squared contrast.
         most: px, the largest offset that is accepted.
     """
 
     begin: int
     end: int
-    strength: float
     most: float
 
 
 @inlined
-def _fill_rows(first, every, count, frame, half, projection, place, rows):  # type: ignore[no-untyped-def]
+def _fill_rows(first, every, count, frame, half, side, place, rows):  # type: ignore[no-untyped-def]
     """Fill in the rows p = first, first + every ... of a gridline.
 
-    A row has the pixels up to ``half`` px off the gridline, none where these leave the image. ``place`` and ``rows``
-    begin at the gridline's first row.
+    A row has the pixels up to ``half`` px off the gridline, none where these leave the image. ``side`` (6,) is the
+    light on both sides. ``place`` and ``rows`` begin at the gridline's first row.
     """
     p0, q0, up, uq, length = frame.p, frame.q, frame.up, frame.uq, frame.length
     leave, arrive, sense = frame.leave, frame.arrive, frame.sense
@@ -126,29 +117,30 @@ def _fill_rows(first, every, count, frame, half, projection, place, rows):  # ty
         rows[LAST + i] = last
         rows[SIZE + i], rows[SHORT + i] = length, 1.0 / length
         rows[AT_START + i], rows[AT_END + i] = leave, arrive
-        rows[RED + i], rows[GREEN + i] = projection.red, projection.green
-        rows[BLUE + i], rows[FOOT + i] = projection.blue, projection.foot
+        for channel in range(3):
+            rows[CONTRAST + channel * COLUMN + i] = side[BEFORE + channel] - side[BEYOND + channel]
+            rows[FOOT + channel * COLUMN + i] = side[BEYOND + channel]
         at = np.int64(0) if empty else p * frame.step_p + np.int64(start) * frame.step_q
         place[FIRST + i], place[STEP + i] = at, frame.step_q
         place[END + i] = at + np.int64(max(last, 0.0)) * frame.step_q
 
 
 @compiled
-def _fill_profile_values(flat, place, rows, step, count, values):  # type: ignore[no-untyped-def]
-    """Fill in the profile at one pixel of every row: 1 before the gridline and 0 beyond."""
-    one, two = np.uint64(1), np.uint64(2)
+def _fill_pixel_values(flat, place, step, count, values):  # type: ignore[no-untyped-def]
+    """Fill in the channels of one pixel of every row."""
     for i in range(count):
         k = np.uint64(min(place[FIRST + i] + step * place[STEP + i], place[END + i]))
-        red, green, blue = np.float32(flat[k]), np.float32(flat[k + one]), np.float32(flat[k + two])
-        values[i] = rows[RED + i] * red + rows[GREEN + i] * green + rows[BLUE + i] * blue - rows[FOOT + i]
+        values[i], values[COLUMN + i] = flat[k], flat[k + np.uint64(1)]
+        values[2 * COLUMN + i] = flat[k + np.uint64(2)]
 
 
 @compiled
-def _accumulate_row_sums(rows, step, count, inverse, values, double_sums, sums):  # type: ignore[no-untyped-def]
-    """Add one pixel of every row to the row's sums, in units of the contrast and of the blur; ``inverse`` is 1 / blur.
+def _accumulate_row_sums(rows, step, count, inverse, values, encoded, double_sums, sums):  # type: ignore[no-untyped-def]
+    """Add one pixel of every row to the row's sums, in units of the blur; ``inverse`` is 1 / blur.
 
     In float64 the order of summing hardly changes the sums that move the markers.
     """
+    one = np.uint64(1)
     for i in range(count):
         keep = ONE if step <= rows[LAST + i] else ZERO
         t = (rows[ALONG + i] + step * rows[ALONG_STEP + i]) * rows[SHORT + i]
@@ -158,27 +150,34 @@ def _accumulate_row_sums(rows, step, count, inverse, values, double_sums, sums):
         z = min(max(z, -POLYNOMIAL_RANGE), POLYNOMIAL_RANGE)
         zz = z * z
         g = keep * (C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))))
-        half = HALF - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
-        residual = keep * (min(max(values[i], -CLIP), ONE + CLIP) - half)
+        half = half_share(z)
+        pull, own = ZERO, ZERO
+        for channel in range(3):
+            contrast = rows[CONTRAST + channel * COLUMN + i]
+            at = table_place(rows[FOOT + channel * COLUMN + i] + contrast * half)
+            derivative = contrast * encoded[at + one]
+            pull += derivative * (values[channel * COLUMN + i] - encoded[at])
+            own += derivative * derivative
+        sums[PIXELS * COLUMN + i] += keep
+        sums[MISFIT * COLUMN + i] += keep * pull * pull / max(own, SMALLEST)
         a, b = g * s, g * t
         c = a * t
         d = c * (s - t)
-        sums[PIXELS * COLUMN + i] += keep
-        sums[MISFIT * COLUMN + i] += residual * residual
-        double_sums[A * COLUMN + i] += a * residual
-        double_sums[B * COLUMN + i] += b * residual
-        sums[C * COLUMN + i] += c * residual
-        sums[D * COLUMN + i] += d * residual
-        double_sums[AA * COLUMN + i] += a * a
-        double_sums[AB * COLUMN + i] += a * b
-        double_sums[BB * COLUMN + i] += b * b
-        sums[AC * COLUMN + i] += a * c
-        sums[AD * COLUMN + i] += a * d
-        sums[BC * COLUMN + i] += b * c
-        sums[BD * COLUMN + i] += b * d
-        sums[CC * COLUMN + i] += c * c
-        sums[CD * COLUMN + i] += c * d
-        sums[DD * COLUMN + i] += d * d
+        double_sums[A * COLUMN + i] += a * pull
+        double_sums[B * COLUMN + i] += b * pull
+        sums[C * COLUMN + i] += c * pull
+        sums[D * COLUMN + i] += d * pull
+        by_a, by_b, by_c, by_d = own * a, own * b, own * c, own * d
+        double_sums[AA * COLUMN + i] += a * by_a
+        double_sums[AB * COLUMN + i] += a * by_b
+        double_sums[BB * COLUMN + i] += b * by_b
+        sums[AC * COLUMN + i] += a * by_c
+        sums[AD * COLUMN + i] += a * by_d
+        sums[BC * COLUMN + i] += b * by_c
+        sums[BD * COLUMN + i] += b * by_d
+        sums[CC * COLUMN + i] += c * by_c
+        sums[CD * COLUMN + i] += c * by_d
+        sums[DD * COLUMN + i] += d * by_d
 
 
 @inlined
@@ -196,10 +195,10 @@ def _fill_gridline_sums(double_sums, sums, own, sigma, out, e):  # type: ignore[
         pixels += sums[PIXELS, i]
     if not abs(a + b) * sigma < own.most * (aa + 2.0 * ab + bb):
         return False
-    unit, per_unit = own.strength / sigma, own.strength / (sigma * sigma)
+    unit, per_unit = 1.0 / sigma, 1.0 / (sigma * sigma)
     out[e, AA], out[e, AB], out[e, BB] = per_unit * aa, per_unit * ab, per_unit * bb
     out[e, A], out[e, B] = unit * a, unit * b
-    out[e, MISFIT], out[e, PIXELS] = own.strength * squares, pixels
+    out[e, MISFIT], out[e, PIXELS] = squares, pixels
     return True
 
 
@@ -218,7 +217,7 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
         dd += sums[DD, i]
         c += sums[C, i]
         d += sums[D, i]
-    unit, per_unit = own.strength / sigma, own.strength / (sigma * sigma)
+    unit, per_unit = 1.0 / sigma, 1.0 / (sigma * sigma)
     out[e, AC], out[e, AD], out[e, BC], out[e, BD] = (
         per_unit * ac,
         per_unit * ad,
@@ -230,8 +229,8 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _fill_filtered_sums(flat, buffers, held, lines, clearance, sigma, is_bending, out):  # type: ignore[no-untyped-def]
-    """Fill in the sums (E, 24) of the gridlines in the buffers, ``held`` of them."""
+def _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
+    """Fill in the sums (E, 20) of the gridlines in the buffers, ``held`` of them."""
     owner, begin, rows, values = buffers.owner, buffers.begin, buffers.rows, buffers.values
     place, double_sums, sums = buffers.place, buffers.double_sums, buffers.sums
     count, wide = (begin[held] + LANES - 1) // LANES * LANES, 0
@@ -239,13 +238,12 @@ def _fill_filtered_sums(flat, buffers, held, lines, clearance, sigma, is_bending
         wide = max(wide, int(rows[LAST + i]) + 1)
     double_sums[:], sums[:], inverse = 0.0, ZERO, np.float32(1.0 / sigma)
     for j in range(wide):
-        _fill_profile_values(flat, place, rows, j, count, values)
-        _accumulate_row_sums(rows, np.float32(j), count, inverse, values, double_sums, sums)
+        _fill_pixel_values(flat, place, j, count, values)
+        _accumulate_row_sums(rows, np.float32(j), count, inverse, values, encoded, double_sums, sums)
     doubles, others = double_sums.reshape(DOUBLE_SUMS, COLUMN), sums.reshape(SUMS, COLUMN)
     for i in range(held):
         e = np.uint64(owner[i])
-        most, strength = max(1.0, 0.15 * lines[e, LENGTH]), clearance[e, SQUARED_CONTRAST]
-        own = GridlineRows(begin[i], begin[i + 1], strength, most)
+        own = GridlineRows(begin[i], begin[i + 1], max(1.0, 0.15 * lines[e, LENGTH]))
         if _fill_gridline_sums(doubles, others, own, sigma, out, e) and is_bending[e]:
             _fill_bending_sums(others, own, sigma, out, e)
 
@@ -256,7 +254,7 @@ def _filter_buffers():  # type: ignore[no-untyped-def]
     return FilterBuffers(
         np.zeros(3 * COLUMN, np.int64),
         np.zeros(COLUMNS, np.float32),
-        np.empty(COLUMN, np.float32),
+        np.zeros(3 * COLUMN, np.float32),
         np.empty(DOUBLE_SUMS * COLUMN),
         np.empty(SUMS * COLUMN, np.float32),
         np.empty(MAX_ROWS, np.int64),
@@ -265,26 +263,28 @@ def _filter_buffers():  # type: ignore[no-untyped-def]
 
 
 @compiled
-def read_profiles(image, lines, projections, clearance, sigma, is_bending, most):  # type: ignore[no-untyped-def]
+def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore[no-untyped-def]
     """Sums over rows of pixels across each gridline.
 
     Args:
-        image: (H, W, 3) uint8.
+        view: ``PyramidLevel``.
         lines: (E, 8), as ``gridlines`` gives them.
-        projections, clearance: (E, 4) each, as ``channel_projections`` gives them.
+        across: ``EdgeContrasts``.
         sigma: px, the blur.
         is_bending: (E,) bool, gridlines whose bending is read, too.
         most: rows across one gridline, at most.
 
     Returns:
-        (E, 24) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
+        (E, 20) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
     """
-    out, flat, buffers, held = np.zeros((lines.shape[0], SUMS)), image.reshape(-1), _filter_buffers(), 0
+    sides, clearance, encoded = across.sides, across.clearance, view.response.encoded
+    height, width = view.image.shape[0], view.image.shape[1]
+    out, flat, buffers, held = np.zeros((lines.shape[0], SUMS)), view.image.reshape(-1), _filter_buffers(), 0
     begin, place, rows = buffers.begin, buffers.place, buffers.rows
     for e in range(lines.shape[0]):
         if lines[e, KNOWN] == 0.0 or clearance[e, SQUARED_CONTRAST] == 0.0:
             continue
-        frame = row_frame(lines, e, 0, 0, image.shape[1], image.shape[0])
+        frame = row_frame(lines, e, (0, 0, width, height), width)
         # the sharper a corner, the longer the gridline runs close to its neighbour
         start = min(max(CLEAR_SIGMA * sigma / (frame.length * clearance[e, SINE_A]), 0.1), 0.4)
         end = 1.0 - min(max(CLEAR_SIGMA * sigma / (frame.length * clearance[e, SINE_B]), 0.1), 0.4)
@@ -298,15 +298,12 @@ def read_profiles(image, lines, projections, clearance, sigma, is_bending, most)
         if count <= 0:
             continue
         if begin[held] + count > MAX_ROWS:
-            _fill_filtered_sums(flat, buffers, held, lines, clearance, sigma, is_bending, out)
+            _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out)
             held = 0
         half = min(REACH_SIGMA * sigma, MAX_REACH * clearance[e, HEIGHT]) / abs(frame.up)
-        projection = ChannelProjection(
-            projections[e, 0], projections[e, 1], projections[e, 2], projections[e, 3]
-        )
         own_place, own_rows = place[begin[held] :], rows[begin[held] :]
-        _fill_rows(first, every, count, frame, half, projection, own_place, own_rows)
+        _fill_rows(first, every, count, frame, half, sides[e], own_place, own_rows)
         buffers.owner[held], begin[held + 1] = e, begin[held] + count
         held += 1
-    _fill_filtered_sums(flat, buffers, held, lines, clearance, sigma, is_bending, out)
+    _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out)
     return out

@@ -51,12 +51,12 @@ class UnconvergedMarkers(NamedTuple):
 
     Attributes:
         redrawn: (M,) bool, the markers to draw again.
-        touched: moving markers and their neighbours together; 0 where no more than ``max_moving_share`` of all move.
+        moving: number of moving markers; 0 where no more than ``max_moving_share`` of all move.
         by_dirt: dirt moves them.
     """
 
     redrawn: NDArray[np.bool_]
-    touched: int
+    moving: int
     by_dirt: bool
 
 
@@ -110,15 +110,15 @@ def unconverged_markers(measured, drawn, normalized_steps, rule, weight, spokes,
     add_neighbours(moving, edges, redrawn)
     touched = int(np.count_nonzero(redrawn))
     if touched <= max_partial or (found > max_partial and not dirty):
-        return UnconvergedMarkers(redrawn, touched, dirty)
+        return UnconvergedMarkers(redrawn, found, dirty)
     if dirty and touched > 2 * max_partial:
         if rule.explained:
             return UnconvergedMarkers(np.zeros(count, np.bool_), 0, dirty)
-        return UnconvergedMarkers(redrawn, touched, dirty)
+        return UnconvergedMarkers(redrawn, found, dirty)
     if dirty:
         rest = max(count - int(rule.max_partial_share_in_dirt * count), 1)
-        return UnconvergedMarkers(square > np.partition(square, rest - 1)[rest - 1], touched, dirty)
-    return UnconvergedMarkers(moving if touched > 2 * max_partial else redrawn, touched, dirty)
+        return UnconvergedMarkers(square > np.partition(square, rest - 1)[rest - 1], found, dirty)
+    return UnconvergedMarkers(moving if touched > 2 * max_partial else redrawn, found, dirty)
 
 
 @inlined_no_refcount

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.response import table_place
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.ink_polynomials import TERMS, fill_monomials, robust_polynomial
 
@@ -27,11 +28,11 @@ FIT_ROUNDS = 2  # of the robust fit
 
 
 class InkLevels(NamedTuple):
-    """The levels of the inks in an image.
+    """The levels of the inks in an image, as light (0 to 255).
 
     Attributes:
-        cell: (K, 3) gray levels of the drawn cells over black, at their centroids.
-        slope: (K, 3, 2) gray levels per px along x and y.
+        cell: (K, 3) levels of the drawn cells over black, at their centroids.
+        slope: (K, 3, 2) levels per px along x and y.
         black: (3, 10) the polynomial of the black.
         is_outlier: (K,) bool, cells that do not look like the other cells of their ink.
     """
@@ -61,23 +62,13 @@ class InkPolynomials(NamedTuple):
 
     Attributes:
         coefficients: (5, 3, 10) by ink and channel.
-        variance: (5,) gray levels^2, of the cells about the polynomials beyond noise.
+        variance: (5,) light^2, of the cells about the polynomials beyond noise.
+        noise: (5,) light, root mean square of the channels, of a pixel.
     """
 
     coefficients: NDArray[np.float64]
     variance: NDArray[np.float64]
-
-
-class LevelChange(NamedTuple):
-    """A change of the inks' levels.
-
-    Attributes:
-        cell: (K, 3) gray levels, of the drawn cells over black.
-        black: (3, 10) of the black polynomial.
-    """
-
-    cell: NDArray[np.float64]
-    black: NDArray[np.float64]
+    noise: NDArray[np.float64]
 
 
 @compiled
@@ -102,16 +93,17 @@ def disc_radius(inscribed, sigma):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
-    """The mean of image - model over a disc about each cell's centroid.
+def cell_means(image, light, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
+    """The mean light of image - model over a disc about each cell's centroid.
 
     Args:
-        image: (H, W, 3) uint8. model: (H, W, 3) float32, or empty for 0.
+        image: (H, W, 3) uint8. light: (256,) of its values.
+        model: (H, W, 3) float32, light, or empty for 0.
         xy: (M, 2) px, the markers. cells: (K, 3) marker ids.
         sigma: px, the blur; 0 where the pattern is drawn.
 
     Returns:
-        (K, 4): the means, gray levels, and the number of pixels, 0 outside the image.
+        (K, 4): the means, 0 to 255, and the number of pixels, 0 outside the image.
     """
     no_model = model.shape[0] == 0
     observed, drawn = image.reshape(-1), model.reshape(-1)
@@ -130,9 +122,9 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
             first, last = max(int(np.ceil(cx - half)), 0), min(int(cx + half), width - 1)
             at = np.uint64((y * width + first) * 3)
             for _ in range(first, last + 1):
-                s0 += observed[at]
-                s1 += observed[at + one]
-                s2 += observed[at + two]
+                s0 += light[observed[at]]
+                s1 += light[observed[at + one]]
+                s2 += light[observed[at + two]]
                 if not no_model:
                     s0 -= drawn[at]
                     s1 -= drawn[at + one]
@@ -145,17 +137,17 @@ def cell_means(image, model, xy, cells, sigma):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill_levels(own, centroids, color, noise, inks, scale, levels):  # type: ignore[no-untyped-def]
+def _fill_levels(own, centroids, color, inks, scale, levels):  # type: ignore[no-untyped-def]
     """Fill in the cells' levels over black and their slopes.
 
     Args:
         own: (K, 4), as ``cell_means`` gives them. centroids: (K, 2) in the frame of the polynomials.
-        color: (K,) inks. noise: gray levels.
+        color: (K,) inks.
         inks: ``InkPolynomials``.
         scale: px, of the frame.
         levels: ``InkLevels`` with the outliers; ``cell`` and ``slope`` are filled.
     """
-    terms, coefficients, variance = np.empty(TERMS), inks.coefficients, inks.variance
+    terms, coefficients, variance, noise = np.empty(TERMS), inks.coefficients, inks.variance, inks.noise
     cell, slope, is_outlier = levels.cell, levels.slope, levels.is_outlier
     for i in range(own.shape[0]):
         x, y = centroids[i, 0], centroids[i, 1]
@@ -167,7 +159,7 @@ def _fill_levels(own, centroids, color, noise, inks, scale, levels):  # type: ig
         known = own[i, 3] > 0.0
         own_share = 0.0
         if known:
-            own_share = 1.0 if is_outlier[i] else variance[c] / (variance[c] + noise * noise / own[i, 3])
+            own_share = 1.0 if is_outlier[i] else variance[c] / (variance[c] + noise[c] ** 2 / own[i, 3])
         for channel in range(3):
             f, b = coefficients[c, channel], coefficients[BLACK, channel]
             level, black = 0.0, 0.0
@@ -208,18 +200,27 @@ def _ink_samples(values, centroids, color, ink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cell_centroids(xy, cells, frame):  # type: ignore[no-untyped-def]
-    """(K, 2) the centroids of cells in the frame of the polynomials, NaN where a corner is unknown."""
+def cell_centroids(xy, cells):  # type: ignore[no-untyped-def]
+    """(K, 2) px, the centroids of cells, NaN where a corner is unknown."""
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
         a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
-        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - frame.x) / frame.scale
-        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - frame.y) / frame.scale
+        for axis in range(2):
+            out[i, axis] = (xy[a, axis] + xy[b, axis] + xy[c, axis]) / 3
     return out
 
 
 @compiled
-def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no-untyped-def]
+def _centroids_in_frame(xy, cells, frame):  # type: ignore[no-untyped-def]
+    """(K, 2) the centroids in the frame of the polynomials."""
+    out = cell_centroids(xy, cells)
+    for i in range(out.shape[0]):
+        out[i, 0], out[i, 1] = (out[i, 0] - frame.x) / frame.scale, (out[i, 1] - frame.y) / frame.scale
+    return out
+
+
+@compiled
+def smoothed_levels(drawn, black, xy, pattern, noise, view):  # type: ignore[no-untyped-def]
     """The inks' levels, smoothed over the cells of each ink.
 
     Args:
@@ -227,16 +228,17 @@ def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no
         black: (B, 4) the same for the black cells.
         xy: (M, 2) px, the markers, NaN where unknown.
         pattern: ``InkCells``.
-        noise: gray levels.
-        frame: ``PolynomialFrame``.
+        noise: gray levels, of the image's values.
+        view: ``PyramidLevel``.
 
     Returns:
         ``InkLevels``.
     """
-    coefficients, variance = np.zeros((INKS, 3, TERMS)), np.zeros(INKS)
+    frame, encoded = view.frame, view.response.encoded
+    coefficients, variance, light_noise = np.zeros((INKS, 3, TERMS)), np.zeros(INKS), np.ones(INKS)
     is_outlier, color = np.zeros(drawn.shape[0], np.bool_), pattern.color
-    centroids = _cell_centroids(xy, pattern.cells, frame)
-    black_centroids = _cell_centroids(xy, pattern.black_cells, frame)
+    centroids = _centroids_in_frame(xy, pattern.cells, frame)
+    black_centroids = _centroids_in_frame(xy, pattern.black_cells, frame)
     for ink in range(INKS):
         if ink == BLACK:
             terms, own, number = _ink_samples(black, black_centroids, color, ink)
@@ -250,7 +252,10 @@ def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no
             if n >= CELLS_FOR_TERMS[k][0]:
                 count = CELLS_FOR_TERMS[k][1]
                 break
-        polynomial, own_variance, own_outlier = robust_polynomial(terms, own, noise, count, FIT_ROUNDS)
+        light_noise[ink] = _light_noise(own, encoded, noise)
+        polynomial, own_variance, own_outlier = robust_polynomial(
+            terms, own, light_noise[ink], count, FIT_ROUNDS
+        )
         coefficients[ink], variance[ink] = polynomial, own_variance
         if ink == WHITE:  # one cell only, which keeps its own level
             variance[ink] = 1e9
@@ -259,9 +264,19 @@ def smoothed_levels(drawn, black, xy, pattern, noise, frame):  # type: ignore[no
                 is_outlier[number[i]] = own_outlier[i]
     cell, slope = np.zeros((drawn.shape[0], 3)), np.zeros((drawn.shape[0], 3, 2))
     levels = InkLevels(cell, slope, coefficients[BLACK], is_outlier)
-    inks = InkPolynomials(coefficients, variance)
-    _fill_levels(drawn, centroids, color, noise, inks, frame.scale, levels)
+    inks = InkPolynomials(coefficients, variance, light_noise)
+    _fill_levels(drawn, centroids, color, inks, frame.scale, levels)
     return levels
+
+
+@compiled
+def _light_noise(own, encoded, noise):  # type: ignore[no-untyped-def]
+    """The noise of a pixel's light, root mean square of the channels, at the median levels of cells (4, n); ``noise``
+    is that of the values."""
+    total = 0.0
+    for channel in range(3):
+        total += (noise / encoded[table_place(np.median(own[channel])) + 1]) ** 2
+    return np.sqrt(total / 3.0)
 
 
 @compiled
@@ -277,7 +292,7 @@ def level_change(before, now):  # type: ignore[no-untyped-def]
 
 @compiled
 def black_levels_at(black, xy, frame):  # type: ignore[no-untyped-def]
-    """(K, 3) gray levels: the polynomial (3, 10) of the black at the points (K, 2) px."""
+    """(K, 3) light: the polynomial (3, 10) of the black at the points (K, 2) px."""
     out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
     for i in range(xy.shape[0]):
         fill_monomials((xy[i, 0] - frame.x) / frame.scale, (xy[i, 1] - frame.y) / frame.scale, terms)
@@ -285,3 +300,23 @@ def black_levels_at(black, xy, frame):  # type: ignore[no-untyped-def]
             for k in range(TERMS):
                 out[i, channel] += terms[k] * black[channel, k]
     return out
+
+
+@compiled
+def fill_black(model, black, box, frame):  # type: ignore[no-untyped-def]
+    """Fill the box (x from, y from, x to, y to; px) of a float32 image with the polynomial (3, 10) of the black."""
+    step, coefficients = 1.0 / frame.scale, np.empty((3, 4), np.float32)
+    for y in range(box[1], box[3]):
+        v = (y - frame.y) * step
+        for channel in range(3):
+            b = black[channel]
+            coefficients[channel, 0] = b[0] + v * (b[2] + v * (b[5] + v * b[9]))
+            coefficients[channel, 1] = b[1] + v * (b[4] + v * b[8])
+            coefficients[channel, 2] = b[3] + v * b[7]
+            coefficients[channel, 3] = b[6]
+        row = model[y]
+        for x in range(box[0], box[2]):
+            u = np.float32((x - frame.x) * step)
+            for channel in range(3):
+                k = coefficients[channel]
+                row[x, channel] = k[0] + u * (k[1] + u * (k[2] + u * k[3]))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.response import table_place
 from extractor.numeric.compilation import inlined_no_refcount, vectorized_no_refcount
 from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, X, Y
 
@@ -81,21 +82,49 @@ class PixelGeometry(NamedTuple):
     arrive: np.float32
 
 
-class Color(NamedTuple):
-    """Three channels, float32."""
+class SideLight(NamedTuple):
+    """The light along a gridline, three channels each, float32.
 
-    red: np.float32
-    green: np.float32
-    blue: np.float32
+    Attributes:
+        contrast0, contrast1, contrast2: of the drawn light, before the gridline less beyond.
+        step0, step1, step2: of the light that is added to the drawing, likewise.
+        beyond0, beyond1, beyond2: of the light that is added, beyond the gridline.
+    """
+
+    contrast0: np.float32
+    contrast1: np.float32
+    contrast2: np.float32
+    step0: np.float32
+    step1: np.float32
+    step2: np.float32
+    beyond0: np.float32
+    beyond1: np.float32
+    beyond2: np.float32
+
+
+class Residuals(NamedTuple):
+    """The residuals of pixels: the image's values less the values of the drawn light.
+
+    Attributes:
+        projection: (n,) float32, the residuals of the channels times their derivatives by the share of the light before
+            the gridline, summed.
+        information: (n,) float32, these derivatives squared, summed.
+        square: (n,) float32, the residuals squared, summed.
+    """
+
+    projection: NDArray[np.float32]
+    information: NDArray[np.float32]
+    square: NDArray[np.float32]
 
 
 @inlined_no_refcount
-def row_frame(lines, e, x0, y0, width, height):  # type: ignore[no-untyped-def]
-    """The ``RowFrame`` of gridline e in an image of ``width`` x ``height`` px that begins at (x0, y0)."""
-    x, y, ux, uy = lines[e, X] - x0, lines[e, Y] - y0, lines[e, UX], lines[e, UY]
+def row_frame(lines, e, area, width):  # type: ignore[no-untyped-def]
+    """The ``RowFrame`` of gridline e in an area (x from, y from, x to, y to; px) of an image ``width`` px wide."""
+    x, y, ux, uy = lines[e, X] - area[0], lines[e, Y] - area[1], lines[e, UX], lines[e, UY]
     along_x = abs(ux) > abs(uy)
     p, q, up, uq = (x, y, ux, uy) if along_x else (y, x, uy, ux)
-    p_count, q_count = (width, height) if along_x else (height, width)
+    columns, rows = area[2] - area[0], area[3] - area[1]
+    p_count, q_count = (columns, rows) if along_x else (rows, columns)
     step_p, step_q = (3, 3 * width) if along_x else (3 * width, 3)
     length, leave, arrive = lines[e, LENGTH], lines[e, LEAVE], lines[e, ARRIVE]
     sense = 1.0 if along_x else -1.0
@@ -172,36 +201,54 @@ def fill_rows(block, first, frame, half, rows):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def fill_projections(flat, block, color, background, out):  # type: ignore[no-untyped-def]
-    """Fill in the pixels' levels along a color, less a background.
-
-    Args:
-        flat: (H * W * 3,) the image.
-        block: ``RowBlock``.
-        color: ``Color`` to multiply the channels by.
-        background: float32, in the unit of the product.
-        out: (n,) float32, filled: pixel j of row i at j * padded rows + i.
-    """
-    c0, c1, c2, at = color.red, color.green, color.blue, block.first
-    one, two = np.uint64(1), np.uint64(2)
-    for j in range(block.row_length):
-        own = out[j * padded_count(block.row_count) :]
-        for i in range(block.row_count):
-            k = np.uint64(at[i] + j * block.step)
-            level = c0 * np.float32(flat[k]) + c1 * np.float32(flat[k + one]) + c2 * np.float32(flat[k + two])
-            own[i] = level - background
+def side_light(sides, added, e):  # type: ignore[no-untyped-def]
+    """The ``SideLight`` of gridline e; ``sides`` and ``added`` (E, 6) are the drawn light and that added on both
+    sides."""
+    f = np.float32
+    return SideLight(
+        f(sides[e, 0] - sides[e, 3]),
+        f(sides[e, 1] - sides[e, 4]),
+        f(sides[e, 2] - sides[e, 5]),
+        f(added[e, 0] - added[e, 3]),
+        f(added[e, 1] - added[e, 4]),
+        f(added[e, 2] - added[e, 5]),
+        f(added[e, 3]),
+        f(added[e, 4]),
+        f(added[e, 5]),
+    )
 
 
 @inlined_no_refcount
-def fill_projections_and_squares(flat, block, color, background, out, squares):  # type: ignore[no-untyped-def]
-    """The same where the background is a ``Color``; ``squares`` (n,) are the squared distances from that color."""
-    c0, c1, c2, at = color.red, color.green, color.blue, block.first
-    b0, b1, b2 = background.red, background.green, background.blue
-    one, two = np.uint64(1), np.uint64(2)
+def fill_residuals(image, model, encoded, block, light, shares, out):  # type: ignore[no-untyped-def]
+    """Fill in the ``Residuals`` of the pixels of a block: pixel j of row i at j * padded rows + i.
+
+    Args:
+        image: (n,) uint8, flat. model: (n,) float32, flat, the drawn light; empty for none.
+        encoded: as in ``ResponseTables``.
+        block: ``RowBlock``.
+        light: ``SideLight``.
+        shares: (n,) the share of the light before the gridline in each pixel.
+        out: ``Residuals``, filled.
+    """
+    at, lanes, is_drawn = block.first, padded_count(block.row_count), model.shape[0] > 0
+    one, two, zero = np.uint64(1), np.uint64(2), np.float32(0.0)
     for j in range(block.row_length):
-        own, square = out[j * padded_count(block.row_count) :], squares[j * padded_count(block.row_count) :]
+        share, projection = shares[j * lanes :], out.projection[j * lanes :]
+        information, square = out.information[j * lanes :], out.square[j * lanes :]
         for i in range(block.row_count):
-            k = np.uint64(at[i] + j * block.step)
-            r0, r1, r2 = flat[k] - b0, flat[k + one] - b1, flat[k + two] - b2
-            own[i] = c0 * r0 + c1 * r1 + c2 * r2
+            k, h = np.uint64(at[i] + j * block.step), share[i]
+            m0, m1, m2 = zero, zero, zero
+            if is_drawn:
+                m0, m1, m2 = model[k], model[k + one], model[k + two]
+            p0 = table_place(m0 + light.beyond0 + h * light.step0)
+            p1 = table_place(m1 + light.beyond1 + h * light.step1)
+            p2 = table_place(m2 + light.beyond2 + h * light.step2)
+            r0 = np.float32(image[k]) - encoded[p0]
+            r1 = np.float32(image[k + one]) - encoded[p1]
+            r2 = np.float32(image[k + two]) - encoded[p2]
+            d0 = light.contrast0 * encoded[p0 + one]
+            d1 = light.contrast1 * encoded[p1 + one]
+            d2 = light.contrast2 * encoded[p2 + one]
+            projection[i] = d0 * r0 + d1 * r1 + d2 * r2
+            information[i] = d0 * d0 + d1 * d1 + d2 * d2
             square[i] = r0 * r0 + r1 * r1 + r2 * r2

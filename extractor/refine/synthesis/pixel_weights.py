@@ -8,7 +8,9 @@ from extractor.numeric.compilation import inlined_no_refcount
 from extractor.refine.synthesis.pixel_rows import ACROSS, ALONG, CHUNK, FROM, TO, padded_count
 
 BAND = 2.2  # in units of the blur, the distance from a gridline within which pixels count
-IN_BAND, TO_A, TO_B, TO_BLUR, TO_C, TO_D = (k * CHUNK for k in range(6))  # columns of a pixel's weights
+IN_BAND, TO_A, TO_B, TO_BLUR, TO_C, TO_D, BEFORE_SHARE = (
+    k * CHUNK for k in range(7)
+)  # columns of a pixel's weights
 
 
 def _density_terms() -> tuple[np.float32, ...]:
@@ -19,6 +21,7 @@ def _density_terms() -> tuple[np.float32, ...]:
 
 
 C0, C1, C2, C3, C4, C5 = _density_terms()
+I1, I2, I3, I4, I5 = (np.float32(c / (2 * k + 3)) for k, c in enumerate((C1, C2, C3, C4, C5)))
 # The normal distribution as a quintic from -1 to 1; 1 / END units of the blur reach to 1. Its derivative is
 # P1 (1 - z^2)^2; END_BELL is the density at 0.
 P1, P3, P5 = np.float32(15 / 16), np.float32(-5 / 8), np.float32(3 / 16)
@@ -57,6 +60,14 @@ def _pixel_weights(along, across, line, end_width):  # type: ignore[no-untyped-d
 
 
 @inlined_no_refcount
+def half_share(z):  # type: ignore[no-untyped-def]
+    """The share of the light before a gridline, at the distance z beyond the gridline in units of the blur; good within
+    the band."""
+    zz = z * z
+    return np.float32(0.5) - z * (C0 + zz * (I1 + zz * (I2 + zz * (I3 + zz * (I4 + zz * I5)))))
+
+
+@inlined_no_refcount
 def fill_weights(rows, block, line, reach, end_width, weights):  # type: ignore[no-untyped-def]
     """Fill in the weights of all pixels of the rows across a gridline, 0 beyond ``reach`` px.
 
@@ -79,3 +90,4 @@ def fill_weights(rows, block, line, reach, end_width, weights):  # type: ignore[
             out[IN_BAND + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
             out[TO_BLUR + i] = z * (ga + gb)
             out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
+            out[BEFORE_SHARE + i] = half_share(z)
