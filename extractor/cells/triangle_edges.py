@@ -1,8 +1,8 @@
 """Measures the edges of triangles with sub-pixel accuracy, of many triangles together in branch-free loops.
 
-The profile of the ink's light across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position for any
-blur, so that the blur need not be known. The edge is the line through two such positions. Profiles run along the
-median, not the normal, so that they avoid the other edges in any triangle.
+The profile of the ink's light across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position
+for any blur, so that the blur need not be known. The edge is the line through two such positions. Profiles run along
+the median, not the normal, so that they avoid the other edges in any triangle.
 """
 
 from __future__ import annotations
@@ -238,7 +238,7 @@ def _update_corners(edges, cells, corners, good, reach):  # type: ignore[no-unty
             for k in range(3):
                 corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
         is_done = not good[i] or (reach[i] != PROFILE_REACH and reach[i] * size < 2 * FINE_REACH_PX)
-        reach[i] = 0.0 if is_done else min(max(0.25 * reach[i], 2 * FINE_REACH_PX / size),0.79)
+        reach[i] = 0.0 if is_done else min(max(0.25 * reach[i], 2 * FINE_REACH_PX / size), 0.79)
 
 
 @compiled

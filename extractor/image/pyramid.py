@@ -20,9 +20,13 @@ class PolynomialFrame(NamedTuple):
 
 
 class PyramidLevel(NamedTuple):
-    """An image (H, W, 3) uint8 at 1/``scale`` of the full size, and the coordinates of polynomials over this image.
+    """An image at 1/``scale`` of the full size.
 
-    ``response`` leads from its values to light.
+    Attributes:
+        image: (H, W, 3) uint8, the values of the mean light of ``scale`` x ``scale`` pixels.
+        scale: full-scale pixels per pixel.
+        frame: the coordinates of polynomials over this image.
+        response: from values to light.
     """
 
     image: NDArray[np.uint8]

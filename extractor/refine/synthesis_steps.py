@@ -206,11 +206,9 @@ class SynthesisSolver:
     ) -> tuple[NDArray[np.bool_], int, bool]:
         """``UnconvergedMarkers`` after a step."""
         assert estimate.reading is not None
-        unlimited = wide_blur or schedule.converged_blur_share == 0.0
         rule = ConvergenceRule(
             converged_blur_share=schedule.converged_blur_share,
             sigma=drawing.sigma,
-            max_blur_share=np.inf if unlimited else SMALL_BLUR,
             converged_deviations=schedule.converged_deviations,
             max_moving_share=schedule.max_moving_share,
             max_partial_share=1.0 if wide_blur else schedule.max_partial_share,

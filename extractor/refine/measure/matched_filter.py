@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from extractor.image.response import table_place
 from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.synthesis.gridline_sides import BEFORE, BEYOND
-from extractor.refine.synthesis.gridlines import KNOWN, LENGTH
-from extractor.refine.synthesis.pixel_rows import row_frame
+from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY
+from extractor.refine.synthesis.pixel_rows import pixel_shape, row_frame
 from extractor.refine.synthesis.pixel_weights import C0, C1, C2, C3, C4, C5, half_share
 from extractor.refine.synthesis.residual_kernel import (
     AA,
@@ -45,17 +45,17 @@ REACH_SIGMA = 1.3  # in units of the blur, the reach of a row
 CLEAR_SIGMA = 2.6  # in units of the blur, the least distance of the other gridline of a corner
 MAX_REACH = 0.33  # of the cell's height, the reach of a row at most
 POLYNOMIAL_RANGE = np.float32(2.6)  # in units of the blur, the range of the polynomials
-ZERO, ONE, SMALLEST = np.float32(0.0), np.float32(1.0), np.float32(1e-9)
+ZERO, ONE, THREE, SMALLEST = np.float32(0.0), np.float32(1.0), np.float32(3.0), np.float32(1e-9)
 LANES = 8  # rows in one vector of the processor
 MAX_ROWS = 240  # rows side by side; a power of 2 would put all columns on one cache line
 COLUMN = MAX_ROWS + LANES
 DOUBLE_SUMS = 5  # sums in float64, those that move the markers: AA, AB, BB, A, B
 # columns of a row: px along and across the chord at its first pixel, and from one pixel to the next; the number of its
 # last pixel, -1 for none; of its gridline length, 1 / length, slopes; of three channels the light before the gridline
-# less that beyond, and the light beyond
+# less that beyond, and the light beyond; the pixel shape
 ALONG, ACROSS, ALONG_STEP, ACROSS_STEP, LAST = (k * COLUMN for k in range(5))
 SIZE, SHORT, AT_START, AT_END, CONTRAST = (k * COLUMN for k in range(5, 10))
-FOOT, COLUMNS = 12 * COLUMN, 15 * COLUMN
+FOOT, SHAPE, COLUMNS = 12 * COLUMN, 15 * COLUMN, 16 * COLUMN
 FIRST, STEP, END = (k * COLUMN for k in range(3))  # places in the flat image: first pixel, step, last pixel
 HEIGHT, SINE_A, SINE_B, SQUARED_CONTRAST = range(4)  # columns of a gridline's clearance
 
@@ -64,7 +64,7 @@ class FilterBuffers(NamedTuple):
     """Memory for rows side by side.
 
     Attributes:
-        place: three columns of the rows, places in the flat image. rows: fifteen columns of the rows.
+        place: three columns of the rows, places in the flat image. rows: sixteen columns of the rows.
         values: three columns, float32, the channels of one pixel of every row.
         double_sums: (5, n) float64, flat. sums: (20, n) float32, flat.
         owner: (n,) the gridlines. begin: (n + 1,) their first rows.
@@ -92,11 +92,11 @@ class GridlineRows(NamedTuple):
 
 
 @inlined
-def _fill_rows(first, every, count, frame, half, side, place, rows):  # type: ignore[no-untyped-def]
+def _fill_rows(first, every, count, frame, half, side, shape, place, rows):  # type: ignore[no-untyped-def]
     """Fill in the rows p = first, first + every ... of a gridline.
 
     A row has the pixels up to ``half`` px off the gridline, none where these leave the image. ``side`` (6,) is the
-    light on both sides. ``place`` and ``rows`` begin at the gridline's first row.
+    light on both sides, ``shape`` the ``pixel_shape``. ``place`` and ``rows`` begin at the gridline's first row.
     """
     p0, q0, up, uq, length = frame.p, frame.q, frame.up, frame.uq, frame.length
     leave, arrive, sense = frame.leave, frame.arrive, frame.sense
@@ -117,6 +117,7 @@ def _fill_rows(first, every, count, frame, half, side, place, rows):  # type: ig
         rows[LAST + i] = last
         rows[SIZE + i], rows[SHORT + i] = length, 1.0 / length
         rows[AT_START + i], rows[AT_END + i] = leave, arrive
+        rows[SHAPE + i] = shape
         for channel in range(3):
             rows[CONTRAST + channel * COLUMN + i] = side[BEFORE + channel] - side[BEYOND + channel]
             rows[FOOT + channel * COLUMN + i] = side[BEYOND + channel]
@@ -150,11 +151,12 @@ def _accumulate_row_sums(rows, step, count, inverse, values, encoded, double_sum
         z = min(max(z, -POLYNOMIAL_RANGE), POLYNOMIAL_RANGE)
         zz = z * z
         g = keep * (C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))))
-        half = half_share(z)
+        half = half_share(z) + rows[SHAPE + i] * (z * (zz - THREE) * g)
         pull, own = ZERO, ZERO
         for channel in range(3):
             contrast = rows[CONTRAST + channel * COLUMN + i]
-            at = table_place(rows[FOOT + channel * COLUMN + i] + contrast * half)
+            light = rows[FOOT + channel * COLUMN + i] + contrast * half
+            at = table_place(light)
             derivative = contrast * encoded[at + one]
             pull += derivative * (values[channel * COLUMN + i] - encoded[at])
             own += derivative * derivative
@@ -229,7 +231,7 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
+def _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
     """Fill in the sums (E, 20) of the gridlines in the buffers, ``held`` of them."""
     owner, begin, rows, values = buffers.owner, buffers.begin, buffers.rows, buffers.values
     place, double_sums, sums = buffers.place, buffers.double_sums, buffers.sums
@@ -237,6 +239,7 @@ def _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, 
     for i in range(count):
         wide = max(wide, int(rows[LAST + i]) + 1)
     double_sums[:], sums[:], inverse = 0.0, ZERO, np.float32(1.0 / sigma)
+    flat, encoded = view.image.reshape(-1), view.response.encoded
     for j in range(wide):
         _fill_pixel_values(flat, place, j, count, values)
         _accumulate_row_sums(rows, np.float32(j), count, inverse, values, encoded, double_sums, sums)
@@ -277,9 +280,9 @@ def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore
     Returns:
         (E, 20) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
     """
-    sides, clearance, encoded = across.sides, across.clearance, view.response.encoded
+    sides, clearance = across.sides, across.clearance
     height, width = view.image.shape[0], view.image.shape[1]
-    out, flat, buffers, held = np.zeros((lines.shape[0], SUMS)), view.image.reshape(-1), _filter_buffers(), 0
+    out, buffers, held = np.zeros((lines.shape[0], SUMS)), _filter_buffers(), 0
     begin, place, rows = buffers.begin, buffers.place, buffers.rows
     for e in range(lines.shape[0]):
         if lines[e, KNOWN] == 0.0 or clearance[e, SQUARED_CONTRAST] == 0.0:
@@ -298,12 +301,13 @@ def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore
         if count <= 0:
             continue
         if begin[held] + count > MAX_ROWS:
-            _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out)
+            _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out)
             held = 0
         half = min(REACH_SIGMA * sigma, MAX_REACH * clearance[e, HEIGHT]) / abs(frame.up)
         own_place, own_rows = place[begin[held] :], rows[begin[held] :]
-        _fill_rows(first, every, count, frame, half, sides[e], own_place, own_rows)
+        shape = pixel_shape(lines[e, UX], lines[e, UY], sigma)
+        _fill_rows(first, every, count, frame, half, sides[e], shape, own_place, own_rows)
         buffers.owner[held], begin[held + 1] = e, begin[held] + count
         held += 1
-    _fill_filtered_sums(flat, encoded, buffers, held, lines, sigma, is_bending, out)
+    _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out)
     return out

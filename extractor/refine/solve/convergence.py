@@ -27,8 +27,6 @@ class ConvergenceRule(NamedTuple):
     Attributes:
         converged_blur_share: the least step of a moving marker, as a share of the blur.
         sigma: the blur, px.
-        max_blur_share: blur over the shortest gridline, above which a marker does not count as moving: small shifts are
-            then measured hardly better from another place.
         converged_deviations: the least step of a moving marker, in standard deviations.
         max_moving_share: share of all markers that may still move at the end.
         max_partial_share: share of all markers; twice as many with their neighbours may be drawn again.
@@ -38,7 +36,6 @@ class ConvergenceRule(NamedTuple):
 
     converged_blur_share: float
     sigma: float
-    max_blur_share: float
     converged_deviations: float
     max_moving_share: float
     max_partial_share: float
@@ -100,7 +97,7 @@ def unconverged_markers(measured, drawn, normalized_steps, rule, weight, spokes,
         edge = _shortest_gridline(m, drawn, spokes, edges)
         least = rule.converged_blur_share * min(rule.sigma, (MAX_LINEAR_BLUR * edge) ** 2 / rule.sigma)
         dx, dy = measured[m, 0] - drawn[m, 0], measured[m, 1] - drawn[m, 1]
-        if dx * dx + dy * dy > least * least and not rule.sigma > rule.max_blur_share * edge:
+        if dx * dx + dy * dy > least * least:
             square[m] = dx * dx + dy * dy
             found += 1
     if found <= rule.max_moving_share * count:

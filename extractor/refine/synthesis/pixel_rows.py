@@ -87,6 +87,7 @@ class SideLight(NamedTuple):
 
     Attributes:
         contrast0, contrast1, contrast2: of the drawn light, before the gridline less beyond.
+        shape: factor of ``shape_terms``, for the contrast that a square pixel shows unlike a Gaussian one.
         step0, step1, step2: of the light that is added to the drawing, likewise.
         beyond0, beyond1, beyond2: of the light that is added, beyond the gridline.
     """
@@ -94,6 +95,7 @@ class SideLight(NamedTuple):
     contrast0: np.float32
     contrast1: np.float32
     contrast2: np.float32
+    shape: np.float32
     step0: np.float32
     step1: np.float32
     step2: np.float32
@@ -201,14 +203,20 @@ def fill_rows(block, first, frame, half, rows):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def side_light(sides, added, e):  # type: ignore[no-untyped-def]
-    """The ``SideLight`` of gridline e; ``sides`` and ``added`` (E, 6) are the drawn light and that added on both
-    sides."""
+def side_light(sides, added, lines, sigma, e):  # type: ignore[no-untyped-def]
+    """The ``SideLight`` of gridline e.
+
+    Args:
+        sides, added: (E, 6), the drawn light and that added on both sides.
+        lines: (E, 8), as ``gridlines`` gives them.
+        sigma: px, the blur.
+    """
     f = np.float32
     return SideLight(
         f(sides[e, 0] - sides[e, 3]),
         f(sides[e, 1] - sides[e, 4]),
         f(sides[e, 2] - sides[e, 5]),
+        f(pixel_shape(lines[e, UX], lines[e, UY], sigma)),
         f(added[e, 0] - added[e, 3]),
         f(added[e, 1] - added[e, 4]),
         f(added[e, 2] - added[e, 5]),
@@ -219,7 +227,14 @@ def side_light(sides, added, e):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def fill_residuals(image, model, encoded, block, light, shares, out):  # type: ignore[no-untyped-def]
+def pixel_shape(ux, uy, sigma):  # type: ignore[no-untyped-def]
+    """The fourth cumulant of a square pixel across a gridline of direction (ux, uy), over 24 and over that of the blur:
+    the first term by which a Gaussian of the same variance differs (Gram-Charlier series)."""
+    return -(ux**4 + uy**4) / 120.0 / (24.0 * sigma**4)
+
+
+@inlined_no_refcount
+def fill_residuals(image, model, encoded, block, light, shares, shape_terms, out):  # type: ignore[no-untyped-def]
     """Fill in the ``Residuals`` of the pixels of a block: pixel j of row i at j * padded rows + i.
 
     Args:
@@ -228,27 +243,27 @@ def fill_residuals(image, model, encoded, block, light, shares, out):  # type: i
         block: ``RowBlock``.
         light: ``SideLight``.
         shares: (n,) the share of the light before the gridline in each pixel.
+        shape_terms: (n,) (z^3 - 3 z) times the normal density, z the distance beyond the gridline in units of the blur.
         out: ``Residuals``, filled.
     """
     at, lanes, is_drawn = block.first, padded_count(block.row_count), model.shape[0] > 0
     one, two, zero = np.uint64(1), np.uint64(2), np.float32(0.0)
+    c0, c1, c2 = light.contrast0, light.contrast1, light.contrast2
     for j in range(block.row_length):
         share, projection = shares[j * lanes :], out.projection[j * lanes :]
+        term = shape_terms[j * lanes :]
         information, square = out.information[j * lanes :], out.square[j * lanes :]
         for i in range(block.row_count):
-            k, h = np.uint64(at[i] + j * block.step), share[i]
+            k, h, q = np.uint64(at[i] + j * block.step), share[i], light.shape * term[i]
             m0, m1, m2 = zero, zero, zero
             if is_drawn:
                 m0, m1, m2 = model[k], model[k + one], model[k + two]
-            p0 = table_place(m0 + light.beyond0 + h * light.step0)
-            p1 = table_place(m1 + light.beyond1 + h * light.step1)
-            p2 = table_place(m2 + light.beyond2 + h * light.step2)
-            r0 = np.float32(image[k]) - encoded[p0]
-            r1 = np.float32(image[k + one]) - encoded[p1]
+            p0 = table_place(m0 + light.beyond0 + h * light.step0 + q * c0)
+            p1 = table_place(m1 + light.beyond1 + h * light.step1 + q * c1)
+            p2 = table_place(m2 + light.beyond2 + h * light.step2 + q * c2)
+            r0, r1 = np.float32(image[k]) - encoded[p0], np.float32(image[k + one]) - encoded[p1]
             r2 = np.float32(image[k + two]) - encoded[p2]
-            d0 = light.contrast0 * encoded[p0 + one]
-            d1 = light.contrast1 * encoded[p1 + one]
-            d2 = light.contrast2 * encoded[p2 + one]
+            d0, d1, d2 = c0 * encoded[p0 + one], c1 * encoded[p1 + one], c2 * encoded[p2 + one]
             projection[i] = d0 * r0 + d1 * r1 + d2 * r2
             information[i] = d0 * d0 + d1 * d1 + d2 * d2
             square[i] = r0 * r0 + r1 * r1 + r2 * r2

@@ -8,8 +8,8 @@ from extractor.numeric.compilation import inlined_no_refcount
 from extractor.refine.synthesis.pixel_rows import ACROSS, ALONG, CHUNK, FROM, TO, padded_count
 
 BAND = 2.2  # in units of the blur, the distance from a gridline within which pixels count
-IN_BAND, TO_A, TO_B, TO_BLUR, TO_C, TO_D, BEFORE_SHARE = (
-    k * CHUNK for k in range(7)
+IN_BAND, TO_A, TO_B, TO_BLUR, TO_C, TO_D, BEFORE_SHARE, SHAPE_TERM = (
+    k * CHUNK for k in range(8)
 )  # columns of a pixel's weights
 
 
@@ -74,7 +74,7 @@ def fill_weights(rows, block, line, reach, end_width, weights):  # type: ignore[
     The weights are polynomials close to the derivative of the drawing: the normal density of the distance, and the
     blurred ends of 1 - t and t. Any weights give an unbiased gradient. Loops without branches and tables are fast.
     """
-    zero, one, lanes = np.float32(0.0), np.float32(1.0), padded_count(block.row_count)
+    zero, one, three, lanes = np.float32(0.0), np.float32(1.0), np.float32(3.0), padded_count(block.row_count)
     for j in range(block.row_length):
         out, step = weights[j * lanes :], np.float32(j)
         for i in range(lanes):
@@ -90,4 +90,4 @@ def fill_weights(rows, block, line, reach, end_width, weights):  # type: ignore[
             out[IN_BAND + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
             out[TO_BLUR + i] = z * (ga + gb)
             out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
-            out[BEFORE_SHARE + i] = half_share(z)
+            out[BEFORE_SHARE + i], out[SHAPE_TERM + i] = half_share(z), z * (z * z - three) * (ga + gb)

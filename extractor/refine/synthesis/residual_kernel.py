@@ -30,6 +30,7 @@ from extractor.refine.synthesis.pixel_weights import (
     BEFORE_SHARE,
     END_BELL,
     IN_BAND,
+    SHAPE_TERM,
     TO_A,
     TO_B,
     TO_BLUR,
@@ -65,7 +66,7 @@ class RowBuffers(NamedTuple):
     """Memory for the pixels of one gridline.
 
     Attributes:
-        first: (n,) int64, the first pixels of the rows. rows: their columns. weights: seven columns of the pixels.
+        first: (n,) int64, the first pixels of the rows. rows: their columns. weights: eight columns of the pixels.
         residuals: of the pixels.
     """
 
@@ -159,21 +160,22 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
     residuals = Residuals(
         np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
     )
-    buffers = RowBuffers(first, rows, np.empty(7 * CHUNK, np.float32), residuals)
+    buffers = RowBuffers(first, rows, np.empty(8 * CHUNK, np.float32), residuals)
     width = view.image.shape[1]
     start = 3 * (box[1] * width + box[0])
     image, light = view.image.reshape(-1)[start:], model.reshape(-1)[start:]
-    _accumulate_gridline_sums(image, light, width, view.response.encoded, drawn, sigma, box, buffers, sums)
+    _accumulate_gridline_sums(view, image, light, drawn, sigma, box, buffers, sums)
     return sums
 
 
 @inlined_no_refcount
-def _accumulate_gridline_sums(image, model, width, encoded, drawn, sigma, box, buffers, out):  # type: ignore[no-untyped-def]
+def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, out):  # type: ignore[no-untyped-def]
     """Add the pixels of the box to the sums (E, 20) of all gridlines; image and model are flat and begin there."""
     lines, sides, added, reach = drawn.lines, drawn.sides, drawn.added, BAND * sigma
+    width, encoded = view.image.shape[1], view.response.encoded
     rows, weights, residuals = buffers.rows, buffers.weights, buffers.residuals
     for e in range(lines.shape[0]):
-        light = side_light(sides, added, e)
+        light = side_light(sides, added, lines, sigma, e)
         strength = light.contrast0**2 + light.contrast1**2 + light.contrast2**2
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
@@ -190,7 +192,9 @@ def _accumulate_gridline_sums(image, model, width, encoded, drawn, sigma, box, b
             count = padded_count(block.row_count) * wide
             fill_rows(block, first, frame, half, rows)
             fill_weights(rows, block, line, np.float32(reach), end_width, weights)
-            fill_residuals(image, model, encoded, block, light, weights[BEFORE_SHARE:], residuals)
+            fill_residuals(
+                image, model, encoded, block, light, weights[BEFORE_SHARE:], weights[SHAPE_TERM:], residuals
+            )
             _accumulate_sums(residuals, weights, count, sums)
             if drawn.is_bending[e]:
                 _accumulate_bending_sums(residuals, weights, count, sums)
