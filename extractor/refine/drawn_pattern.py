@@ -18,6 +18,7 @@ from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import median_edge, pattern_box
 from extractor.refine.solve.convergence import groups_with_any
+from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.gridline_sides import gridline_sides, value_contrasts
 from extractor.refine.synthesis.gridlines import gridlines
 from extractor.refine.synthesis.ink_levels import (
@@ -40,6 +41,7 @@ from extractor.refine.synthesis.pattern_drawing import (
 from extractor.refine.synthesis.residual_kernel import DrawnGridlines, accumulate_residual_sums
 
 MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
+BLUR_STEP = 0.02  # of the blur, for derivatives of the levels
 
 
 class DrawingBuffers(NamedTuple):
@@ -61,7 +63,8 @@ class Synthesis(NamedTuple):
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
         sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
         added: (E, 6), the light by which the corrected levels differ from those drawn, on both sides.
-        sums: (E, 20), as ``accumulate_residual_sums`` gives them.
+        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
+        sums: (E, 22), as ``accumulate_residual_sums`` gives them.
         levels: of the inks, as drawn.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.
         box: (4,) the part of the image that is drawn: x from, y from, x to, y to.
@@ -75,6 +78,7 @@ class Synthesis(NamedTuple):
     sides: NDArray[np.float64]
     contrasts: NDArray[np.float64]
     added: NDArray[np.float64]
+    bleed: NDArray[np.float64]
     sums: NDArray[np.float64]
     levels: InkLevels
     corrected_levels: InkLevels
@@ -114,10 +118,15 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
     corrected = _corrected_levels(view, picture, topology, xy, levels, state.noise)
     added = gridline_sides(lines, xy, cells, topology.edge_cells, corrected, view.frame) - sides
-    drawn = DrawnGridlines(lines, sides, added, bending_gridlines(state.roughness, bend, edges))
+    wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma, (1.0 + BLUR_STEP) * sigma)
+    bleed = gridline_sides(lines, xy, cells, topology.edge_cells, wider, view.frame) - sides
+    bleed /= BLUR_STEP * sigma
+    drawn = DrawnGridlines(lines, sides, added, bleed, bending_gridlines(state.roughness, bend, edges))
     sums = accumulate_residual_sums(view, picture, drawn, sigma, box)
     contrasts, edge_px = value_contrasts(sides, view.response.encoded), median_edge(xy, edges)
-    return Synthesis(xy, lines, bend, sides, contrasts, added, sums, levels, corrected, box, sigma, edge_px)
+    return Synthesis(
+        xy, lines, bend, sides, contrasts, added, bleed, sums, levels, corrected, box, sigma, edge_px
+    )
 
 
 @compiled
@@ -161,7 +170,8 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
     update_erasing_cells(redrawn_cells, old_geometry, appearance, box, picture, strokes)
     geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
     draw_cells(redrawn_cells, 1.0, geometry, appearance, box, picture, strokes)
-    drawn = DrawnGridlines(own, sides, added, bending_gridlines(state.roughness, bend, ends))
+    bleed = drawing.bleed[edge_ids]
+    drawn = DrawnGridlines(own, sides, added, bleed, bending_gridlines(state.roughness, bend, ends))
     sums = accumulate_residual_sums(view, picture, drawn, sigma, box)
     return Synthesis(
         xy,
@@ -170,6 +180,7 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
         replaced_rows(drawing.sides, edge_ids, sides),
         replaced_rows(drawing.contrasts, edge_ids, value_contrasts(sides, view.response.encoded)),
         replaced_rows(drawing.added, edge_ids, added),
+        drawing.bleed,
         replaced_rows(drawing.sums, edge_ids, sums),
         drawing.levels,
         drawing.corrected_levels,

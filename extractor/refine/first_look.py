@@ -11,11 +11,10 @@ from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate
 from extractor.refine.measure.edge_profiles import gridline_clearance, profile_blur
-from extractor.refine.measure.gridline_weights import MIN_NOISE
+from extractor.refine.measure.gridline_weights import MIN_NOISE, MIN_SIGMA_PX
 from extractor.refine.synthesis.blur_bleed import bleed_shares, remove_bleed
 from extractor.refine.synthesis.gridline_sides import gridline_sides, value_contrasts
 from extractor.refine.synthesis.ink_levels import InkCells, cell_means, smoothed_levels
-from extractor.refine.synthesis_steps import MIN_SIGMA_PX
 
 DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured
 FALLBACK_SIGMA_PX = 0.9  # where no gridline shows the blur

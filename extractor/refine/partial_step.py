@@ -35,6 +35,7 @@ from extractor.refine.measure.gridline_weights import (
     gridline_misfits,
     misfit_weights,
     normalized_step_lengths,
+    update_for_blur,
 )
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
@@ -88,12 +89,14 @@ class ImageState(NamedTuple):
     """The part of an ``Estimate`` that a partial step keeps; fields as there.
 
     Attributes:
+        blur_change: px, by which the blur is larger than drawn.
         wide_blur: no gridline may bend, as the blur is wide.
     """
 
     noise: float
     median_misfit: float
     dot_gain: float
+    blur_change: float
     wide_blur: bool
 
 
@@ -153,7 +156,9 @@ def partial_step(
     markers = MarkerState(*where, estimate.normalized_steps, information.diagonal)
     how = information.off_diagonal, reading.weight, reading.dot_gain_offset
     gridlines = GridlineState(estimate.bend, estimate.bend_variance, *how)
-    image_state = ImageState(estimate.noise, estimate.median_misfit, estimate.dot_gain, wide_blur)
+    image_state = ImageState(
+        estimate.noise, estimate.median_misfit, estimate.dot_gain, estimate.sigma - drawing.sigma, wide_blur
+    )
     step: PartialStep = _partial_step(
         view, topology, buffers, drawing, redrawn, markers, gridlines, image_state
     )
@@ -198,6 +203,7 @@ def _subproblem_reading(drawing, part, edge_cells, weight, image_state):  # type
     sums, lines = selected_rows(drawing.sums, ids), selected_rows(drawing.lines, ids)
     contrasts, bend = selected_rows(drawing.contrasts, ids), selected_rows(drawing.bend, ids)
     cells, gradients = selected_rows(edge_cells, ids), ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
+    update_for_blur(sums, gradients, image_state.blur_change)
     dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, cells, image_state.dot_gain)
     bend_variance = np.zeros(len(ids))
     if np.any(part.roughness) or np.any(bend):

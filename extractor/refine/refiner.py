@@ -35,7 +35,13 @@ from extractor.refine.estimate import (
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
 from extractor.refine.measure.gridline_bending import mean_at_markers
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
-from extractor.refine.measure.gridline_weights import MIN_NOISE, SHORTEST_RARITY, median_edge, short_edges
+from extractor.refine.measure.gridline_weights import (
+    MIN_NOISE,
+    MIN_SIGMA_PX,
+    SHORTEST_RARITY,
+    median_edge,
+    short_edges,
+)
 from extractor.refine.outliers import correct_outliers, find_outliers
 from extractor.refine.profile_rounds import profile_step
 from extractor.refine.recovered_markers import fill_recovered_markers
@@ -47,7 +53,7 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
-from extractor.refine.synthesis_steps import MIN_SIGMA_PX, SMALL_BLUR, WIDE_BLUR, SynthesisSolver
+from extractor.refine.synthesis_steps import SMALL_BLUR, WIDE_BLUR, SynthesisSolver
 
 SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first
 SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale

@@ -20,7 +20,13 @@ from extractor.refine.drawn_pattern import DrawingBuffers, Synthesis, allocate_d
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_misfit
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import ShiftGradients, blur_change, weigh_gridlines
+from extractor.refine.measure.gridline_weights import (
+    ShiftGradients,
+    blur_after_step,
+    blur_change,
+    update_for_blur,
+    weigh_gridlines,
+)
 from extractor.refine.partial_step import partial_step
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
@@ -42,13 +48,11 @@ from extractor.refine.solve.convergence import (
     unconverged_markers,
 )
 from extractor.refine.solve.fisher_information import GridlineSystem
-from extractor.refine.synthesis.blur_bleed import adapt_levels_to_blur
+from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
 from extractor.refine.synthesis.ink_levels import level_change
 from extractor.refine.synthesis.residual_kernel import A, B
 
-MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
-MAX_BLUR_CHANGE = 0.3  # of the blur, in one step
 BLUR_TOLERANCE = 0.03  # relative error of the blur of a drawing that is kept
 LEVEL_TOLERANCE = (
     0.006  # likewise, of the levels. Both may be larger where the markers' deviation explains it:
@@ -63,9 +67,6 @@ MIN_BEND = 0.02  # of an edge, and where gridlines bend by more,
 MAX_BENT_SHARE = 0.25  # of them, each step bends others. Then
 HARD_EFFORT = 1.5  # times the effort is allowed
 WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending
-# Wide blur and low levels look alike: a step measures less of a change of blur than there is, by the factor
-# 1 - BLUR_LEVEL_COUPLING * (blur / edge - UNCOUPLED_BLUR) (rendered patterns), at least 1 - MAX_COUPLING.
-BLUR_LEVEL_COUPLING, UNCOUPLED_BLUR, MAX_COUPLING = 7.2, 0.065, 0.8
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
 # (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
@@ -89,7 +90,7 @@ class SynthesisReading(NamedTuple):
         bend_variance: (E,) px^2.
         dot_gain: px.
         dot_gain_offset: (E,) px.
-        blur_change: px, by which the blur is larger than drawn.
+        sigma: px, the blur after the step.
         noise: gray levels, one channel.
         solution: the markers after the step.
     """
@@ -99,7 +100,7 @@ class SynthesisReading(NamedTuple):
     bend_variance: NDArray[np.float64]
     dot_gain: float
     dot_gain_offset: NDArray[np.float64]
-    blur_change: float
+    sigma: float
     noise: float
     solution: StepSolution
 
@@ -249,10 +250,11 @@ class SynthesisSolver:
         topology, levels = self._topology, drawing.corrected_levels
         read = _update_and_solve(drawing, estimate.pattern_state(), topology)
         how = NO_CLEARANCE, read.weight, read.dot_gain_offset, drawing.sigma, read.noise, True
-        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
-        sigma = _blur_after_step(drawing.sigma, drawing.edge_px, read.blur_change)
-        if max(sigma, drawing.sigma) > UNCOUPLED_BLUR * drawing.edge_px:
-            levels = adapt_levels_to_blur(levels, estimate.xy, topology, drawing.sigma, sigma)
+        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, drawing.bleed, *how)
+        sigma = read.sigma
+        levels = levels_at_blur(
+            levels, estimate.xy, topology.cells, topology.cell_color, drawing.sigma, sigma
+        )
         return with_solution(
             estimate,
             read.solution,
@@ -272,6 +274,8 @@ def _update_and_solve(drawing, state, topology):  # type: ignore[no-untyped-def]
     lines, contrasts, sums, sigma = drawing.lines, drawing.contrasts, drawing.sums.copy(), drawing.sigma
     edges, spokes, edge_cells, rule = topology.edges, topology.spokes, topology.edge_cells, PIXEL_MISFIT_RULE
     gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
+    blur_px = blur_after_step(sigma, blur_change(sums, state.weight))
+    update_for_blur(sums, gradients, blur_px - sigma)
     dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
     dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
     prior = BendingPrior(drawing.bend, state.roughness, state.weight)
@@ -283,9 +287,8 @@ def _update_and_solve(drawing, state, topology):  # type: ignore[no-untyped-def]
     noise = found if np.isfinite(found) else state.noise
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
     solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
-    wider = blur_change(sums, dot_gain_offset, weight, sigma)
     return SynthesisReading(
-        weight, median_misfit, bend_variance, dot_gain, dot_gain_offset, wider, noise, solution
+        weight, median_misfit, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution
     )
 
 
@@ -293,12 +296,6 @@ def _without_bending(estimate: Estimate) -> Estimate:
     """The estimate with gridlines that may not bend."""
     roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
     return estimate._replace(roughness=roughness, bend=bend)
-
-
-def _blur_after_step(sigma: float, edge_px: float, change: float) -> float:
-    """The blur, px, where gridlines show a ``change``, px, of the drawn blur ``sigma``, px."""
-    change /= 1.0 - min(max(BLUR_LEVEL_COUPLING * (sigma / edge_px - UNCOUPLED_BLUR), 0.0), MAX_COUPLING)
-    return max(sigma + min(max(change, -MAX_BLUR_CHANGE * sigma), MAX_BLUR_CHANGE * sigma), MIN_SIGMA_PX)
 
 
 def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:

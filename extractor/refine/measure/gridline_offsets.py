@@ -20,6 +20,7 @@ from extractor.refine.synthesis.pixel_rows import (
     TO,
     Residuals,
     RowBlock,
+    allocate_residuals,
     fill_residuals,
     fill_rows,
     padded_count,
@@ -46,6 +47,7 @@ class GridlineReading(NamedTuple):
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides: the sides themselves where nothing was drawn.
+        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
         clearance: (E, 4), as ``gridline_clearance`` gives it; used where nothing was drawn.
         weight: (E,) 0 to 1.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
@@ -57,6 +59,7 @@ class GridlineReading(NamedTuple):
     lines: NDArray[np.float64]
     sides: NDArray[np.float64]
     added: NDArray[np.float64]
+    bleed: NDArray[np.float64]
     clearance: NDArray[np.float64]
     weight: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
@@ -140,9 +143,7 @@ def measure_offsets(view, model, reading, count):  # type: ignore[no-untyped-def
     contrasts = value_contrasts(reading.sides, view.response.encoded)
     out = np.full((lines.shape[0], count, 2), np.nan)
     first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
-    residuals = Residuals(
-        np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
-    )
+    residuals = allocate_residuals()
     buffers = OffsetBuffers(first, rows, residuals, np.empty(4 * CHUNK, np.float32), np.zeros((count, 2)))
     flat_model = model.reshape(-1)
     for e in range(lines.shape[0]):
@@ -173,7 +174,7 @@ def _fill_station_sums(view, model, reading, e, buffers):  # type: ignore[no-unt
     """Fill in the sums (m, 2) at the stations of gridline e; the model is flat."""
     sigma, sums, rows, weighted = reading.sigma, buffers.sums, buffers.rows, buffers.weighted
     image, height, width = view.image.reshape(-1), view.image.shape[0], view.image.shape[1]
-    light = side_light(reading.sides, reading.added, reading.lines, sigma, e)
+    light = side_light(reading, sigma, e)
     frame = row_frame(reading.lines, e, (0, 0, width, height), width)
     line, reach, intervals = pixel_geometry(frame, sigma), BAND * sigma, sums.shape[0] + 1.0
     # the pixels of the first and of the last station reach half an interval beyond these

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from extractor.numeric.compilation import compiled
 from extractor.refine.synthesis.gridlines import KNOWN, UX, UY
 from extractor.refine.synthesis.residual_kernel import (
+    A_BLUR,
     AA,
     AB,
+    B_BLUR,
     BB,
     BLUR,
     BLUR_CURVATURE,
@@ -19,6 +21,8 @@ from extractor.refine.synthesis.residual_kernel import (
     PIXELS,
     READ_AA,
     READ_BB,
+    A,
+    B,
 )
 
 SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
@@ -31,6 +35,8 @@ RIM_DEVIATION_PX = 0.05
 MIN_CLEAN_SHARE = 0.68  # of the gridlines with weight 1, from which on the noise is that of all gridlines
 MIN_OFFSET_WEIGHT = 0.4  # of a gridline, for its offsets to be measured
 MIN_MARKER_WEIGHT = 0.3  # mean weight of the gridlines at a marker, for the marker to count
+MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
+MAX_BLUR_CHANGE = 0.3  # of the blur, in one step
 
 
 class GridlineWeights(NamedTuple):
@@ -63,7 +69,7 @@ def gridline_misfits(sums, gradients, values, min_places):  # type: ignore[no-un
     """The misfit of the gridlines: the mean squared residual once their ends are moved.
 
     Args:
-        sums: (E, 24). gradients: ``ShiftGradients``.
+        sums: (E, 22). gradients: ``ShiftGradients``.
         values: of each place, 3 for a pixel and 1 for a sample along the contrast.
         min_places: a gridline with no more places has no misfit.
 
@@ -87,7 +93,7 @@ def misfit_weights(sums, misfit, median_misfit, tolerance, values, default_weigh
     """The weights of gridlines by their misfit.
 
     Args:
-        sums: (E, 24). misfit: (E,) gray levels^2, NaN for none.
+        sums: (E, 22). misfit: (E,) gray levels^2, NaN for none.
         median_misfit: gray levels^2, of gridlines that look like the pattern.
         tolerance: (E,) gray levels^2, a misfit that does not lower the weight.
         values: of each place.
@@ -188,30 +194,43 @@ def median_edge(xy, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def blur_change(sums, dot_gain_offset, gridline_weight, sigma):  # type: ignore[no-untyped-def]
-    """The change of the blur, px, that the gridlines' pixels ask for.
+def blur_change(sums, gridline_weight):  # type: ignore[no-untyped-def]
+    """The change of the blur, px, that the gridlines' pixels ask for, once the ends of each gridline are moved.
 
-    A gridline off its drawn place looks more blurred, by half of the offset squared over the blur.
-
-    Args:
-        sums: (E, 20). dot_gain_offset: (E,) px. gridline_weight: (E,) 0 to 1.
-        sigma: px, the blur as drawn.
+    ``sums`` (E, 22); ``gridline_weight`` (E,) 0 to 1.
     """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
-        if gridline_weight[e] == 0.0:
+        if gridline_weight[e] == 0.0 or sums[e, AA] == 0.0:
             continue
-        weight = gridline_weight[e] * sums[e, BLUR_CURVATURE]
-        curvature += weight
-        pull += gridline_weight[e] * sums[e, BLUR] - weight * 0.5 * dot_gain_offset[e] ** 2 / sigma
+        aa, ab, bb, az, bz = sums[e, AA], sums[e, AB], sums[e, BB], sums[e, A_BLUR], sums[e, B_BLUR]
+        determinant = max(aa * bb - ab * ab, 1e-9 * (aa + bb) ** 2 + 1e-12)
+        by_a, by_b = (bb * az - ab * bz) / determinant, (aa * bz - ab * az) / determinant
+        curvature += gridline_weight[e] * (sums[e, BLUR_CURVATURE] - by_a * az - by_b * bz)
+        pull += gridline_weight[e] * (sums[e, BLUR] - by_a * sums[e, A] - by_b * sums[e, B])
     return pull / curvature if curvature > 0.0 else 0.0
+
+
+@compiled
+def blur_after_step(sigma, change):  # type: ignore[no-untyped-def]
+    """The blur, px, where gridlines show a ``change``, px, of the drawn blur ``sigma``, px."""
+    return max(sigma + min(max(change, -MAX_BLUR_CHANGE * sigma), MAX_BLUR_CHANGE * sigma), MIN_SIGMA_PX)
+
+
+@compiled
+def update_for_blur(sums, gradients, change):  # type: ignore[no-untyped-def]
+    """Take a change of the blur, px, out of the sums (E, 22) and the ``ShiftGradients``, in place."""
+    for e in range(sums.shape[0]):
+        gradients.start[e] -= change * sums[e, A_BLUR]
+        gradients.end[e] -= change * sums[e, B_BLUR]
+        sums[e, MISFIT] -= change * (2.0 * sums[e, BLUR] - change * sums[e, BLUR_CURVATURE])
 
 
 @compiled
 def least_information(sums, weight, lines, edges, variance, count):  # type: ignore[no-untyped-def]
     """(M,) 1/px^2, the information about each of ``count`` markers in its worst direction, with bending taken as known.
 
-    ``sums`` (E, 24), ``weight`` (E,), ``lines`` (E, 8), ``edges`` (E, 2); ``variance`` of the noise, gray levels^2.
+    ``sums`` (E, 22), ``weight`` (E,), ``lines`` (E, 8), ``edges`` (E, 2); ``variance`` of the noise, gray levels^2.
     """
     xx, cross, yy = np.zeros(count), np.zeros(count), np.zeros(count)
     for e in range(edges.shape[0]):

@@ -66,7 +66,7 @@ class FilterBuffers(NamedTuple):
     Attributes:
         place: three columns of the rows, places in the flat image. rows: sixteen columns of the rows.
         values: three columns, float32, the channels of one pixel of every row.
-        double_sums: (5, n) float64, flat. sums: (20, n) float32, flat.
+        double_sums: (5, n) float64, flat. sums: (22, n) float32, flat.
         owner: (n,) the gridlines. begin: (n + 1,) their first rows.
     """
 
@@ -232,7 +232,7 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
 
 @compiled
 def _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
-    """Fill in the sums (E, 20) of the gridlines in the buffers, ``held`` of them."""
+    """Fill in the sums (E, 22) of the gridlines in the buffers, ``held`` of them."""
     owner, begin, rows, values = buffers.owner, buffers.begin, buffers.rows, buffers.values
     place, double_sums, sums = buffers.place, buffers.double_sums, buffers.sums
     count, wide = (begin[held] + LANES - 1) // LANES * LANES, 0
@@ -278,7 +278,7 @@ def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore
         most: rows across one gridline, at most.
 
     Returns:
-        (E, 20) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
+        (E, 22) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
     """
     sides, clearance = across.sides, across.clearance
     height, width = view.image.shape[0], view.image.shape[1]

@@ -11,13 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.synthesis.ink_levels import BLACK, InkLevels, cell_radii, disc_radius
 
 MAX_BLEED = 0.1  # share of a neighbour in a cell's mean, the most that is corrected
-MIN_BLEED = 0.002  # share of a neighbour, below which bleed is neglected
-MIN_BLEED_CHANGE = 0.0003  # change of the share, below which the change is neglected
 
 
 @compiled
@@ -97,29 +94,18 @@ def _remove_bleed(levels, color, share, median_share):  # type: ignore[no-untype
     return InkLevels(cell, slope, black, levels.is_outlier)
 
 
-def adapt_levels_to_blur(
-    levels: InkLevels, xy: NDArray[np.float64], mesh: Topology, drawn_sigma: float, sigma: float
-) -> InkLevels:
-    """The levels that the cells' middles show with the blur ``sigma`` instead of ``drawn_sigma``, px.
-
-    The same object where the change is negligible. ``xy`` (M, 2) px are the markers.
-    """
-    shares = _bleed_change(xy, mesh.cells, drawn_sigma, sigma)
-    if shares is None:
-        return levels
-    return remove_bleed(levels, mesh.cell_color, *shares)
-
-
 @compiled
-def _bleed_change(xy, cells, drawn_sigma, sigma):  # type: ignore[no-untyped-def]
-    """The change of the cells' shares (K,) and of the median share; None where the change is negligible."""
+def levels_at_blur(levels, xy, cells, color, drawn_sigma, sigma):  # type: ignore[no-untyped-def]
+    """``InkLevels`` that the cells' middles show with the blur ``sigma`` instead of ``drawn_sigma``, px.
+
+    ``levels``: ``InkLevels`` where ``drawn_sigma`` is drawn. ``xy``: (M, 2) px, the markers. ``cells``, ``color``: as in
+    ``Topology``.
+    """
     inscribed = _inscribed_radii(xy, cells)
     size = np.nanmedian(inscribed)
     before, after = _bleed_share(size, 0.0, drawn_sigma), _bleed_share(size, 0.0, sigma)
-    if max(before, after) < MIN_BLEED or abs(after - before) < MIN_BLEED_CHANGE:
-        return None
     remainder, change = 1.0 - 6.0 * min(before, MAX_BLEED), np.empty(cells.shape[0])
     for i in range(cells.shape[0]):
         own_before = _bleed_share(inscribed[i], 0.0, drawn_sigma)
         change[i] = (_bleed_share(inscribed[i], 0.0, sigma) - own_before) / remainder
-    return change, (after - before) / remainder
+    return _remove_bleed(levels, color, change, (after - before) / remainder)

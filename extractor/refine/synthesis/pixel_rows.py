@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.image.response import table_place
-from extractor.numeric.compilation import inlined_no_refcount, vectorized_no_refcount
+from extractor.numeric.compilation import compiled, inlined_no_refcount, vectorized_no_refcount
 from extractor.refine.synthesis.gridlines import ARRIVE, LEAVE, LENGTH, UX, UY, X, Y
 
 CHUNK = 2128  # pixels of one gridline at once, at most; a power of 2 would put all columns on one cache line
@@ -90,6 +90,8 @@ class SideLight(NamedTuple):
         shape: factor of ``shape_terms``, for the contrast that a square pixel shows unlike a Gaussian one.
         step0, step1, step2: of the light that is added to the drawing, likewise.
         beyond0, beyond1, beyond2: of the light that is added, beyond the gridline.
+        bleed_step0, bleed_step1, bleed_step2, bleed0, bleed1, bleed2: the same two of the light that a change of the
+            blur by its own width adds.
     """
 
     contrast0: np.float32
@@ -102,6 +104,12 @@ class SideLight(NamedTuple):
     beyond0: np.float32
     beyond1: np.float32
     beyond2: np.float32
+    bleed_step0: np.float32
+    bleed_step1: np.float32
+    bleed_step2: np.float32
+    bleed0: np.float32
+    bleed1: np.float32
+    bleed2: np.float32
 
 
 class Residuals(NamedTuple):
@@ -112,11 +120,30 @@ class Residuals(NamedTuple):
             the gridline, summed.
         information: (n,) float32, these derivatives squared, summed.
         square: (n,) float32, the residuals squared, summed.
+        bleed_projection: (n,) float32, the residuals times the derivatives by the bleed, summed.
+        bleed_cross: (n,) float32, the derivatives by the share and by the bleed, multiplied, summed.
+        bleed_square: (n,) float32, the derivatives by the bleed squared, summed.
     """
 
     projection: NDArray[np.float32]
     information: NDArray[np.float32]
     square: NDArray[np.float32]
+    bleed_projection: NDArray[np.float32]
+    bleed_cross: NDArray[np.float32]
+    bleed_square: NDArray[np.float32]
+
+
+@compiled
+def allocate_residuals():  # type: ignore[no-untyped-def]
+    """``Residuals`` of ``CHUNK`` pixels, zeros."""
+    return Residuals(
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+    )
 
 
 @inlined_no_refcount
@@ -203,15 +230,9 @@ def fill_rows(block, first, frame, half, rows):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def side_light(sides, added, lines, sigma, e):  # type: ignore[no-untyped-def]
-    """The ``SideLight`` of gridline e.
-
-    Args:
-        sides, added: (E, 6), the drawn light and that added on both sides.
-        lines: (E, 8), as ``gridlines`` gives them.
-        sigma: px, the blur.
-    """
-    f = np.float32
+def side_light(drawn, sigma, e):  # type: ignore[no-untyped-def]
+    """The ``SideLight`` of gridline e; ``drawn`` has the columns of ``DrawnGridlines``, ``sigma`` is the blur, px."""
+    f, lines, sides, added, bleed = np.float32, drawn.lines, drawn.sides, drawn.added, drawn.bleed
     return SideLight(
         f(sides[e, 0] - sides[e, 3]),
         f(sides[e, 1] - sides[e, 4]),
@@ -223,6 +244,12 @@ def side_light(sides, added, lines, sigma, e):  # type: ignore[no-untyped-def]
         f(added[e, 3]),
         f(added[e, 4]),
         f(added[e, 5]),
+        f(sigma * (bleed[e, 0] - bleed[e, 3])),
+        f(sigma * (bleed[e, 1] - bleed[e, 4])),
+        f(sigma * (bleed[e, 2] - bleed[e, 5])),
+        f(sigma * bleed[e, 3]),
+        f(sigma * bleed[e, 4]),
+        f(sigma * bleed[e, 5]),
     )
 
 
@@ -253,6 +280,8 @@ def fill_residuals(image, model, encoded, block, light, shares, shape_terms, out
         share, projection = shares[j * lanes :], out.projection[j * lanes :]
         term = shape_terms[j * lanes :]
         information, square = out.information[j * lanes :], out.square[j * lanes :]
+        bleed_projection, bleed_cross = out.bleed_projection[j * lanes :], out.bleed_cross[j * lanes :]
+        bleed_square = out.bleed_square[j * lanes :]
         for i in range(block.row_count):
             k, h, q = np.uint64(at[i] + j * block.step), share[i], light.shape * term[i]
             m0, m1, m2 = zero, zero, zero
@@ -263,7 +292,13 @@ def fill_residuals(image, model, encoded, block, light, shares, shape_terms, out
             p2 = table_place(m2 + light.beyond2 + h * light.step2 + q * c2)
             r0, r1 = np.float32(image[k]) - encoded[p0], np.float32(image[k + one]) - encoded[p1]
             r2 = np.float32(image[k + two]) - encoded[p2]
-            d0, d1, d2 = c0 * encoded[p0 + one], c1 * encoded[p1 + one], c2 * encoded[p2 + one]
+            w0, w1, w2 = encoded[p0 + one], encoded[p1 + one], encoded[p2 + one]
+            b0, b1 = w0 * (light.bleed0 + h * light.bleed_step0), w1 * (light.bleed1 + h * light.bleed_step1)
+            b2 = w2 * (light.bleed2 + h * light.bleed_step2)
+            d0, d1, d2 = c0 * w0, c1 * w1, c2 * w2
+            bleed_projection[i] = b0 * r0 + b1 * r1 + b2 * r2
+            bleed_cross[i] = b0 * d0 + b1 * d1 + b2 * d2
+            bleed_square[i] = b0 * b0 + b1 * b1 + b2 * b2
             projection[i] = d0 * r0 + d1 * r1 + d2 * r2
             information[i] = d0 * d0 + d1 * d1 + d2 * d2
             square[i] = r0 * r0 + r1 * r1 + r2 * r2

@@ -17,6 +17,7 @@ from extractor.refine.synthesis.pixel_rows import (
     CHUNK,
     Residuals,
     RowBlock,
+    allocate_residuals,
     fill_residuals,
     fill_rows,
     padded_count,
@@ -40,10 +41,10 @@ from extractor.refine.synthesis.pixel_weights import (
 )
 
 # columns of the sums over a gridline's pixels
-AA, AB, BB, A, B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE = range(9)
-AC, AD, BC, BD, CC, CD, DD, C, D = range(9, 18)
-READ_AA, READ_BB = 18, 19  # AA and BB as read, where bending is eliminated from them
-SUMS = 20
+AA, AB, BB, A, B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE, A_BLUR, B_BLUR = range(11)
+AC, AD, BC, BD, CC, CD, DD, C, D = range(11, 20)
+READ_AA, READ_BB = 20, 21  # AA and BB as read, where bending is eliminated from them
+SUMS = 22
 
 
 class DrawnGridlines(NamedTuple):
@@ -53,12 +54,14 @@ class DrawnGridlines(NamedTuple):
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides, by which the levels have changed since.
+        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
         is_bending: (E,) bool, gridlines with two more unknowns for their bending.
     """
 
     lines: NDArray[np.float64]
     sides: NDArray[np.float64]
     added: NDArray[np.float64]
+    bleed: NDArray[np.float64]
     is_bending: NDArray[np.bool_]
 
 
@@ -78,26 +81,36 @@ class RowBuffers(NamedTuple):
 
 @vectorized_no_refcount
 def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untyped-def]
-    """Add ``count`` pixels to a gridline's sums (20,)."""
+    """Add ``count`` pixels to a gridline's sums (22,)."""
     projection, information, square = residuals.projection, residuals.information, residuals.square
+    bleed_projection, bleed_cross, bleed_square = (
+        residuals.bleed_projection,
+        residuals.bleed_cross,
+        residuals.bleed_square,
+    )
     zero = np.float32(0.0)
     blur, curvature, misfit, pixels = zero, zero, zero, zero
     # in float64 the order of summing hardly changes the sums that move the markers
     double = np.float64(0.0)
     aa, ab, bb, sa, sb = double, double, double, double, double
+    az, bz = zero, zero
     for k in range(count):
         ga, gb, gz = weights[TO_A + k], weights[TO_B + k], weights[TO_BLUR + k]
         own, pull = information[k], projection[k]
-        by_a = own * ga
+        by_a, by_b = own * ga, own * gb
         aa += by_a * ga
         ab += by_a * gb
-        bb += own * gb * gb
+        bb += by_b * gb
+        blur_cross = own * gz + bleed_cross[k]
+        az += ga * blur_cross
+        bz += gb * blur_cross
         sa += ga * pull
         sb += gb * pull
-        blur += gz * pull
-        curvature += own * gz * gz
-        misfit += weights[IN_BAND + k] * square[k]
-        pixels += weights[IN_BAND + k]
+        in_band = weights[IN_BAND + k]
+        blur += gz * pull + in_band * bleed_projection[k]
+        curvature += gz * (blur_cross + bleed_cross[k]) + in_band * bleed_square[k]
+        misfit += in_band * square[k]
+        pixels += in_band
     sums[AA] += aa
     sums[AB] += ab
     sums[BB] += bb
@@ -105,6 +118,8 @@ def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untype
     sums[B] += sb
     sums[BLUR] += blur
     sums[BLUR_CURVATURE] += curvature
+    sums[A_BLUR] += az
+    sums[B_BLUR] += bz
     sums[MISFIT] += misfit
     sums[PIXELS] += pixels
 
@@ -150,16 +165,15 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
         box: (4,) px, x from, y from, x to, y to: the drawn part of the image.
 
     Returns:
-        (E, 20), the columns are named above. AA, AB, BB: squared derivatives of the drawing's values by the gridline's
+        (E, 22), the columns are named above. AA, AB, BB: squared derivatives of the drawing's values by the gridline's
         offset at both ends; A, B: derivative times residual (image less drawing, both as values); MISFIT: squared
-        residual of PIXELS; BLUR: residual times the derivative by sigma. C and D are the same for the bending of
+        residual of PIXELS; BLUR: residual times the derivative by sigma; BLUR_CURVATURE,
+        A_BLUR, B_BLUR: that derivative squared, and times those by the offsets. C and D are the same for the bending of
         gridlines that bend, 0 elsewhere.
     """
     sums = np.zeros((drawn.lines.shape[0], SUMS))
     first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
-    residuals = Residuals(
-        np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32), np.zeros(CHUNK, np.float32)
-    )
+    residuals = allocate_residuals()
     buffers = RowBuffers(first, rows, np.empty(8 * CHUNK, np.float32), residuals)
     width = view.image.shape[1]
     start = 3 * (box[1] * width + box[0])
@@ -170,12 +184,12 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
 
 @inlined_no_refcount
 def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, out):  # type: ignore[no-untyped-def]
-    """Add the pixels of the box to the sums (E, 20) of all gridlines; image and model are flat and begin there."""
-    lines, sides, added, reach = drawn.lines, drawn.sides, drawn.added, BAND * sigma
+    """Add the pixels of the box to the sums (E, 22) of all gridlines; image and model are flat and begin there."""
+    lines, reach = drawn.lines, BAND * sigma
     width, encoded = view.image.shape[1], view.response.encoded
     rows, weights, residuals = buffers.rows, buffers.weights, buffers.residuals
     for e in range(lines.shape[0]):
-        light = side_light(sides, added, lines, sigma, e)
+        light = side_light(drawn, sigma, e)
         strength = light.contrast0**2 + light.contrast1**2 + light.contrast2**2
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
@@ -203,8 +217,8 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
 
 @inlined_no_refcount
 def _update_units(sums, inverse):  # type: ignore[no-untyped-def]
-    """Multiply a gridline's sums (20,) by the powers of 1 / blur that they lack."""
-    for k in (AA, AB, BB, BLUR_CURVATURE, AC, AD, BC, BD, CC, CD, DD):
+    """Multiply a gridline's sums (22,) by the powers of 1 / blur that they lack."""
+    for k in (AA, AB, BB, BLUR_CURVATURE, A_BLUR, B_BLUR, AC, AD, BC, BD, CC, CD, DD):
         sums[k] *= inverse * inverse
     for k in (A, B, BLUR, C, D):
         sums[k] *= inverse
