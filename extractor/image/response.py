@@ -136,7 +136,7 @@ def table_place(light):  # type: ignore[no-untyped-def]
     """The place of light's value in ``ResponseTables.encoded``; the derivative follows there. Light beyond the table
     has the first or the last value."""
     root = np.sqrt(min(max(np.float32(light), np.float32(0.0)), np.float32(255.0)))
-    return np.uint64(2) * np.uint64(np.int32(root * STEPS_PER_ROOT + np.float32(0.5)))
+    return np.int32(2) * np.int32(root * STEPS_PER_ROOT + np.float32(0.5))
 
 
 @inlined_no_refcount

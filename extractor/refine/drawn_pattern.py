@@ -1,4 +1,4 @@
-"""The pattern drawn as light, and the residual along its gridlines: of everything, or again around some markers.
+"""The pattern drawn as light over black, and the residual along its gridlines: of all, or again around some markers.
 
 One compiled function leads from the markers to the sums along the gridlines: between small functions, every array would
 pass through Python. Large arrays are kept from image to image: fresh memory costs more than writing to it.
@@ -19,15 +19,12 @@ from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import median_edge, pattern_box
 from extractor.refine.solve.convergence import groups_with_any
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
-from extractor.refine.synthesis.gridline_sides import gridline_sides, value_contrasts
+from extractor.refine.synthesis.gridline_sides import add_black, gridline_sides, value_contrasts
 from extractor.refine.synthesis.gridlines import gridlines
 from extractor.refine.synthesis.ink_levels import (
     InkCells,
     InkLevels,
-    black_levels_at,
-    cell_centroids,
     cell_means,
-    fill_black,
     smoothed_levels,
 )
 from extractor.refine.synthesis.pattern_drawing import (
@@ -38,7 +35,7 @@ from extractor.refine.synthesis.pattern_drawing import (
     draw_cells,
     update_erasing_cells,
 )
-from extractor.refine.synthesis.residual_kernel import DrawnGridlines, accumulate_residual_sums
+from extractor.refine.synthesis.residual_kernel import DrawnGridlines, accumulate_residual_sums, fill_zeros
 
 MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
 BLUR_STEP = 0.02  # of the blur, for derivatives of the levels
@@ -48,7 +45,7 @@ class DrawingBuffers(NamedTuple):
     """Memory to draw in for one image size and layout.
 
     Attributes:
-        synthetic_image: (H, W, 3) the light of the pattern, as it was last drawn.
+        synthetic_image: (H, W, 3) the light of the pattern over black, as it was last drawn.
         coverage_runs: the coverages of that drawing.
     """
 
@@ -62,7 +59,7 @@ class Synthesis(NamedTuple):
     Attributes:
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
         sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
-        added: (E, 6), the light by which the corrected levels differ from those drawn, on both sides.
+        added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
         bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
         sums: (E, 22), as ``accumulate_residual_sums`` gives them.
         levels: of the inks, as drawn.
@@ -112,12 +109,13 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     cell, slope = levels.cell, levels.slope
     lines = gridlines(xy, state.maps, bend, edges, topology.edge_vectors)
     sides = gridline_sides(lines, xy, cells, topology.edge_cells, levels, view.frame)
-    fill_black(picture, levels.black, box, view.frame)
+    fill_zeros(picture, box)
     strokes.used[:] = 0
     every, geometry = np.ones(len(cells), np.bool_), CellGeometry(xy, cells, cell_edges, edges, lines)
     draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
     corrected = _corrected_levels(view, picture, topology, xy, levels, state.noise)
     added = gridline_sides(lines, xy, cells, topology.edge_cells, corrected, view.frame) - sides
+    add_black(added, lines, levels.black, view.frame)
     wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma, (1.0 + BLUR_STEP) * sigma)
     bleed = gridline_sides(lines, xy, cells, topology.edge_cells, wider, view.frame) - sides
     bleed /= BLUR_STEP * sigma
@@ -134,9 +132,8 @@ def _corrected_levels(view, picture, topology, xy, levels, noise):  # type: igno
     """``InkLevels`` corrected by the residual in the middle of the cells."""
     cells, black_cells, color = topology.cells, topology.black_cells, topology.cell_color
     own = cell_means(view.image, view.response.light, picture, xy, cells, 0.0)
-    own[:, :3] += levels.cell + black_levels_at(levels.black, cell_centroids(xy, cells), view.frame)
+    own[:, :3] += levels.cell
     black = cell_means(view.image, view.response.light, picture, xy, black_cells, 0.0)
-    black[:, :3] += black_levels_at(levels.black, cell_centroids(xy, black_cells), view.frame)
     return smoothed_levels(own, black, xy, InkCells(cells, black_cells, color), noise, view)
 
 
@@ -165,6 +162,7 @@ def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type
     edge_cells = topology.edge_cells[edge_ids]
     sides = gridline_sides(own, xy, cells, edge_cells, drawing.levels, view.frame)
     added = gridline_sides(own, xy, cells, edge_cells, drawing.corrected_levels, view.frame) - sides
+    add_black(added, own, drawing.levels.black, view.frame)
     lines, appearance = replaced_rows(drawing.lines, edge_ids, own), CellAppearance(cell, slope, sigma)
     old_geometry = CellGeometry(drawing.xy, cells, cell_edges, edges, drawing.lines)
     update_erasing_cells(redrawn_cells, old_geometry, appearance, box, picture, strokes)

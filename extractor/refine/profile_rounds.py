@@ -85,14 +85,7 @@ def profile_step(
     """
     state = estimate.pattern_state()
     step = _profile_step(view, lines, contrasts, state, topology, stations, judged)
-    look = (
-        contrasts.sides,
-        contrasts.sides,
-        np.zeros_like(contrasts.sides),
-        contrasts.clearance,
-        step.weight,
-        step.dot_gain_offset,
-    )
+    look = contrasts.sides, contrasts.sides, contrasts.clearance, step.weight, step.dot_gain_offset
     reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
     others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
     return with_solution(estimate, step.solution, **others), step.profile_weight

@@ -250,7 +250,7 @@ class SynthesisSolver:
         topology, levels = self._topology, drawing.corrected_levels
         read = _update_and_solve(drawing, estimate.pattern_state(), topology)
         how = NO_CLEARANCE, read.weight, read.dot_gain_offset, drawing.sigma, read.noise, True
-        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, drawing.bleed, *how)
+        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
         sigma = read.sigma
         levels = levels_at_blur(
             levels, estimate.xy, topology.cells, topology.cell_color, drawing.sigma, sigma

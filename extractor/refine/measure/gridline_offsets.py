@@ -37,7 +37,7 @@ MIN_WEIGHT_SUM = (
 )
 OFFSET, VARIANCE = range(2)
 NO_MODEL = np.empty((0, 0, 3), np.float32)
-STATION, WEIGHT, BEFORE_SHARE, SHAPE_TERM = (k * CHUNK for k in range(4))  # columns of a pixel
+STATION, WEIGHT, BEFORE_SHARE = (k * CHUNK for k in range(3))  # columns of a pixel
 
 
 class GridlineReading(NamedTuple):
@@ -46,8 +46,7 @@ class GridlineReading(NamedTuple):
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
-        added: (E, 6), the light to add to the drawing on both sides: the sides themselves where nothing was drawn.
-        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
+        added: (E, 6), the light to add to the drawing on both sides; the sides themselves where nothing was drawn.
         clearance: (E, 4), as ``gridline_clearance`` gives it; used where nothing was drawn.
         weight: (E,) 0 to 1.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
@@ -59,7 +58,6 @@ class GridlineReading(NamedTuple):
     lines: NDArray[np.float64]
     sides: NDArray[np.float64]
     added: NDArray[np.float64]
-    bleed: NDArray[np.float64]
     clearance: NDArray[np.float64]
     weight: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
@@ -74,7 +72,7 @@ class OffsetBuffers(NamedTuple):
     Attributes:
         first: (n,) int64, the first pixels of the rows. rows: their columns.
         residuals: of the pixels.
-        weighted: four columns of the pixels.
+        weighted: three columns of the pixels.
         sums: (m, 2) the weighted residuals and the information at each station.
     """
 
@@ -92,9 +90,8 @@ def _fill_stations(rows, block, line, intervals, out):  # type: ignore[no-untype
     Args:
         rows: columns of the rows. block: ``RowBlock``. line: ``PixelGeometry``.
         intervals: between the stations of a gridline and its ends.
-        out: four columns, filled.
+        out: three columns, filled.
     """
-    three = np.float32(3.0)
     zero, half, one, band = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(BAND * BAND)
     leave, arrive, lanes = line.leave, line.arrive, padded_count(block.row_count)
     for j in range(block.row_length):
@@ -109,7 +106,6 @@ def _fill_stations(rows, block, line, intervals, out):  # type: ignore[no-untype
             g = C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5))))
             own[STATION + i] = np.floor(t * intervals - half)
             own[WEIGHT + i] = g if within else zero
-            own[SHAPE_TERM + i] = z * (zz - three) * own[WEIGHT + i]
             own[BEFORE_SHARE + i] = half_share(z) if within else zero  # the polynomial holds within the band
 
 
@@ -144,7 +140,7 @@ def measure_offsets(view, model, reading, count):  # type: ignore[no-untyped-def
     out = np.full((lines.shape[0], count, 2), np.nan)
     first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
     residuals = allocate_residuals()
-    buffers = OffsetBuffers(first, rows, residuals, np.empty(4 * CHUNK, np.float32), np.zeros((count, 2)))
+    buffers = OffsetBuffers(first, rows, residuals, np.empty(3 * CHUNK, np.float32), np.zeros((count, 2)))
     flat_model = model.reshape(-1)
     for e in range(lines.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
@@ -174,7 +170,7 @@ def _fill_station_sums(view, model, reading, e, buffers):  # type: ignore[no-unt
     """Fill in the sums (m, 2) at the stations of gridline e; the model is flat."""
     sigma, sums, rows, weighted = reading.sigma, buffers.sums, buffers.rows, buffers.weighted
     image, height, width = view.image.reshape(-1), view.image.shape[0], view.image.shape[1]
-    light = side_light(reading, sigma, e)
+    light = side_light(reading.sides, reading.added, e)
     frame = row_frame(reading.lines, e, (0, 0, width, height), width)
     line, reach, intervals = pixel_geometry(frame, sigma), BAND * sigma, sums.shape[0] + 1.0
     # the pixels of the first and of the last station reach half an interval beyond these
@@ -190,8 +186,8 @@ def _fill_station_sums(view, model, reading, e, buffers):  # type: ignore[no-unt
         pixels = padded_count(block.row_count) * wide
         fill_rows(block, first, frame, half, rows)
         _fill_stations(rows, block, line, np.float32(intervals), weighted)
-        shares, terms, encoded = weighted[BEFORE_SHARE:], weighted[SHAPE_TERM:], view.response.encoded
-        fill_residuals(image, model, encoded, block, light, shares, terms, buffers.residuals)
+        shares, encoded = weighted[BEFORE_SHARE:], view.response.encoded
+        fill_residuals(image, model, encoded, block, light, shares, buffers.residuals)
         for j in range(sums.shape[0]):
             residual, information = _sums_at_station(weighted, buffers.residuals, pixels, np.float32(j))
             sums[j, 0] += residual

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from extractor.image.response import table_place
 from extractor.numeric.compilation import compiled, inlined
 from extractor.refine.synthesis.gridline_sides import BEFORE, BEYOND
-from extractor.refine.synthesis.gridlines import KNOWN, LENGTH, UX, UY
-from extractor.refine.synthesis.pixel_rows import pixel_shape, row_frame
+from extractor.refine.synthesis.gridlines import KNOWN, LENGTH
+from extractor.refine.synthesis.pixel_rows import row_frame
 from extractor.refine.synthesis.pixel_weights import C0, C1, C2, C3, C4, C5, half_share
 from extractor.refine.synthesis.residual_kernel import (
     AA,
@@ -45,34 +45,54 @@ REACH_SIGMA = 1.3  # in units of the blur, the reach of a row
 CLEAR_SIGMA = 2.6  # in units of the blur, the least distance of the other gridline of a corner
 MAX_REACH = 0.33  # of the cell's height, the reach of a row at most
 POLYNOMIAL_RANGE = np.float32(2.6)  # in units of the blur, the range of the polynomials
-ZERO, ONE, THREE, SMALLEST = np.float32(0.0), np.float32(1.0), np.float32(3.0), np.float32(1e-9)
+ZERO, ONE, SMALLEST = np.float32(0.0), np.float32(1.0), np.float32(1e-9)
 LANES = 8  # rows in one vector of the processor
 MAX_ROWS = 240  # rows side by side; a power of 2 would put all columns on one cache line
 COLUMN = MAX_ROWS + LANES
 DOUBLE_SUMS = 5  # sums in float64, those that move the markers: AA, AB, BB, A, B
 # columns of a row: px along and across the chord at its first pixel, and from one pixel to the next; the number of its
 # last pixel, -1 for none; of its gridline length, 1 / length, slopes; of three channels the light before the gridline
-# less that beyond, and the light beyond; the pixel shape
+# less that beyond, and the light beyond
 ALONG, ACROSS, ALONG_STEP, ACROSS_STEP, LAST = (k * COLUMN for k in range(5))
 SIZE, SHORT, AT_START, AT_END, CONTRAST = (k * COLUMN for k in range(5, 10))
-FOOT, SHAPE, COLUMNS = 12 * COLUMN, 15 * COLUMN, 16 * COLUMN
+FOOT, COLUMNS = 12 * COLUMN, 15 * COLUMN
 FIRST, STEP, END = (k * COLUMN for k in range(3))  # places in the flat image: first pixel, step, last pixel
 HEIGHT, SINE_A, SINE_B, SQUARED_CONTRAST = range(4)  # columns of a gridline's clearance
+
+
+class RowPixels(NamedTuple):
+    """One pixel of every row, columns of ``COLUMN``.
+
+    Attributes:
+        along: the place along the gridline, 0 to 1. density: the normal density at the pixel.
+        residual, slope: three columns, the residual of the value, and the derivative of the value by the light.
+        pull, information: the residual times the derivative by the share of the light before the gridline, and that
+            derivative squared.
+        place: three columns, int32, of the drawn light in the table of values.
+    """
+
+    along: NDArray[np.float32]
+    density: NDArray[np.float32]
+    residual: NDArray[np.float32]
+    slope: NDArray[np.float32]
+    pull: NDArray[np.float32]
+    information: NDArray[np.float32]
+    place: NDArray[np.int32]
 
 
 class FilterBuffers(NamedTuple):
     """Memory for rows side by side.
 
     Attributes:
-        place: three columns of the rows, places in the flat image. rows: sixteen columns of the rows.
-        values: three columns, float32, the channels of one pixel of every row.
+        place: three columns of the rows, places in the flat image. rows: fifteen columns of the rows.
+        pixels: one pixel of every row.
         double_sums: (5, n) float64, flat. sums: (22, n) float32, flat.
         owner: (n,) the gridlines. begin: (n + 1,) their first rows.
     """
 
     place: NDArray[np.int64]
     rows: NDArray[np.float32]
-    values: NDArray[np.float32]
+    pixels: RowPixels
     double_sums: NDArray[np.float64]
     sums: NDArray[np.float32]
     owner: NDArray[np.int64]
@@ -92,11 +112,11 @@ class GridlineRows(NamedTuple):
 
 
 @inlined
-def _fill_rows(first, every, count, frame, half, side, shape, place, rows):  # type: ignore[no-untyped-def]
+def _fill_rows(first, every, count, frame, half, side, place, rows):  # type: ignore[no-untyped-def]
     """Fill in the rows p = first, first + every ... of a gridline.
 
     A row has the pixels up to ``half`` px off the gridline, none where these leave the image. ``side`` (6,) is the
-    light on both sides, ``shape`` the ``pixel_shape``. ``place`` and ``rows`` begin at the gridline's first row.
+    light on both sides. ``place`` and ``rows`` begin at the gridline's first row.
     """
     p0, q0, up, uq, length = frame.p, frame.q, frame.up, frame.uq, frame.length
     leave, arrive, sense = frame.leave, frame.arrive, frame.sense
@@ -117,7 +137,6 @@ def _fill_rows(first, every, count, frame, half, side, shape, place, rows):  # t
         rows[LAST + i] = last
         rows[SIZE + i], rows[SHORT + i] = length, 1.0 / length
         rows[AT_START + i], rows[AT_END + i] = leave, arrive
-        rows[SHAPE + i] = shape
         for channel in range(3):
             rows[CONTRAST + channel * COLUMN + i] = side[BEFORE + channel] - side[BEYOND + channel]
             rows[FOOT + channel * COLUMN + i] = side[BEYOND + channel]
@@ -127,21 +146,10 @@ def _fill_rows(first, every, count, frame, half, side, shape, place, rows):  # t
 
 
 @compiled
-def _fill_pixel_values(flat, place, step, count, values):  # type: ignore[no-untyped-def]
-    """Fill in the channels of one pixel of every row."""
-    for i in range(count):
-        k = np.uint64(min(place[FIRST + i] + step * place[STEP + i], place[END + i]))
-        values[i], values[COLUMN + i] = flat[k], flat[k + np.uint64(1)]
-        values[2 * COLUMN + i] = flat[k + np.uint64(2)]
-
-
-@compiled
-def _accumulate_row_sums(rows, step, count, inverse, values, encoded, double_sums, sums):  # type: ignore[no-untyped-def]
-    """Add one pixel of every row to the row's sums, in units of the blur; ``inverse`` is 1 / blur.
-
-    In float64 the order of summing hardly changes the sums that move the markers.
-    """
-    one = np.uint64(1)
+def _fill_densities(rows, step, count, inverse, pixels):  # type: ignore[no-untyped-def]
+    """Fill in the place along the gridline, the density and the places in the table of values for one pixel of every
+    row; ``inverse`` is 1 / blur."""
+    density, along, place = pixels.density, pixels.along, pixels.place
     for i in range(count):
         keep = ONE if step <= rows[LAST + i] else ZERO
         t = (rows[ALONG + i] + step * rows[ALONG_STEP + i]) * rows[SHORT + i]
@@ -150,16 +158,44 @@ def _accumulate_row_sums(rows, step, count, inverse, values, encoded, double_sum
         z = (rows[ACROSS + i] + step * rows[ACROSS_STEP + i] - off) * inverse
         z = min(max(z, -POLYNOMIAL_RANGE), POLYNOMIAL_RANGE)
         zz = z * z
-        g = keep * (C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))))
-        half = half_share(z) + rows[SHAPE + i] * (z * (zz - THREE) * g)
-        pull, own = ZERO, ZERO
+        along[i] = t
+        density[i] = keep * (C0 + zz * (C1 + zz * (C2 + zz * (C3 + zz * (C4 + zz * C5)))))
+        half = half_share(z)
+        place[i] = table_place(rows[FOOT + i] + rows[CONTRAST + i] * half)
+        place[COLUMN + i] = table_place(rows[FOOT + COLUMN + i] + rows[CONTRAST + COLUMN + i] * half)
+        place[2 * COLUMN + i] = table_place(
+            rows[FOOT + 2 * COLUMN + i] + rows[CONTRAST + 2 * COLUMN + i] * half
+        )
+
+
+@compiled
+def _fill_residuals(flat, rows, step, count, encoded, buffers):  # type: ignore[no-untyped-def]
+    """Fill in the residual along the contrast and the information of one pixel of every row."""
+    place, pixels, one = buffers.place, buffers.pixels, np.uint64(1)
+    residual, slope = pixels.residual, pixels.slope
+    for i in range(count):
+        k = np.uint64(min(place[FIRST + i] + step * place[STEP + i], place[END + i]))
         for channel in range(3):
-            contrast = rows[CONTRAST + channel * COLUMN + i]
-            light = rows[FOOT + channel * COLUMN + i] + contrast * half
-            at = table_place(light)
-            derivative = contrast * encoded[at + one]
-            pull += derivative * (values[channel * COLUMN + i] - encoded[at])
-            own += derivative * derivative
+            at, to = np.uint64(pixels.place[channel * COLUMN + i]), channel * COLUMN + i
+            residual[to] = np.float32(flat[k + np.uint64(channel)]) - encoded[at]
+            slope[to] = encoded[at + one]
+    for i in range(count):
+        d0, d1 = rows[CONTRAST + i] * slope[i], rows[CONTRAST + COLUMN + i] * slope[COLUMN + i]
+        d2 = rows[CONTRAST + 2 * COLUMN + i] * slope[2 * COLUMN + i]
+        pixels.pull[i] = d0 * residual[i] + d1 * residual[COLUMN + i] + d2 * residual[2 * COLUMN + i]
+        pixels.information[i] = d0 * d0 + d1 * d1 + d2 * d2
+
+
+@compiled
+def _accumulate_row_sums(rows, step, count, pixels, double_sums, sums):  # type: ignore[no-untyped-def]
+    """Add one pixel of every row to the row's sums, in units of the blur.
+
+    In float64 the order of summing hardly changes the sums that move the markers.
+    """
+    for i in range(count):
+        keep = ONE if step <= rows[LAST + i] else ZERO
+        t, g, pull, own = pixels.along[i], pixels.density[i], pixels.pull[i], pixels.information[i]
+        s = ONE - t
         sums[PIXELS * COLUMN + i] += keep
         sums[MISFIT * COLUMN + i] += keep * pull * pull / max(own, SMALLEST)
         a, b = g * s, g * t
@@ -233,16 +269,17 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
 @compiled
 def _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
     """Fill in the sums (E, 22) of the gridlines in the buffers, ``held`` of them."""
-    owner, begin, rows, values = buffers.owner, buffers.begin, buffers.rows, buffers.values
-    place, double_sums, sums = buffers.place, buffers.double_sums, buffers.sums
+    owner, begin, rows = buffers.owner, buffers.begin, buffers.rows
+    double_sums, sums = buffers.double_sums, buffers.sums
     count, wide = (begin[held] + LANES - 1) // LANES * LANES, 0
     for i in range(count):
         wide = max(wide, int(rows[LAST + i]) + 1)
     double_sums[:], sums[:], inverse = 0.0, ZERO, np.float32(1.0 / sigma)
     flat, encoded = view.image.reshape(-1), view.response.encoded
     for j in range(wide):
-        _fill_pixel_values(flat, place, j, count, values)
-        _accumulate_row_sums(rows, np.float32(j), count, inverse, values, encoded, double_sums, sums)
+        _fill_densities(rows, np.float32(j), count, inverse, buffers.pixels)
+        _fill_residuals(flat, rows, j, count, encoded, buffers)
+        _accumulate_row_sums(rows, np.float32(j), count, buffers.pixels, double_sums, sums)
     doubles, others = double_sums.reshape(DOUBLE_SUMS, COLUMN), sums.reshape(SUMS, COLUMN)
     for i in range(held):
         e = np.uint64(owner[i])
@@ -257,7 +294,15 @@ def _filter_buffers():  # type: ignore[no-untyped-def]
     return FilterBuffers(
         np.zeros(3 * COLUMN, np.int64),
         np.zeros(COLUMNS, np.float32),
-        np.zeros(3 * COLUMN, np.float32),
+        RowPixels(
+            np.zeros(COLUMN, np.float32),
+            np.zeros(COLUMN, np.float32),
+            np.zeros(3 * COLUMN, np.float32),
+            np.zeros(3 * COLUMN, np.float32),
+            np.zeros(COLUMN, np.float32),
+            np.zeros(COLUMN, np.float32),
+            np.zeros(3 * COLUMN, np.int32),
+        ),
         np.empty(DOUBLE_SUMS * COLUMN),
         np.empty(SUMS * COLUMN, np.float32),
         np.empty(MAX_ROWS, np.int64),
@@ -305,8 +350,7 @@ def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore
             held = 0
         half = min(REACH_SIGMA * sigma, MAX_REACH * clearance[e, HEIGHT]) / abs(frame.up)
         own_place, own_rows = place[begin[held] :], rows[begin[held] :]
-        shape = pixel_shape(lines[e, UX], lines[e, UY], sigma)
-        _fill_rows(first, every, count, frame, half, sides[e], shape, own_place, own_rows)
+        _fill_rows(first, every, count, frame, half, sides[e], own_place, own_rows)
         buffers.owner[held], begin[held + 1] = e, begin[held] + count
         held += 1
     _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out)

@@ -98,8 +98,10 @@ def _remove_bleed(levels, color, share, median_share):  # type: ignore[no-untype
 def levels_at_blur(levels, xy, cells, color, drawn_sigma, sigma):  # type: ignore[no-untyped-def]
     """``InkLevels`` that the cells' middles show with the blur ``sigma`` instead of ``drawn_sigma``, px.
 
-    ``levels``: ``InkLevels`` where ``drawn_sigma`` is drawn. ``xy``: (M, 2) px, the markers. ``cells``, ``color``: as in
-    ``Topology``.
+    Args:
+        levels: ``InkLevels`` that they show with ``drawn_sigma``.
+        xy: (M, 2) px, the markers.
+        cells, color: as ``cells`` and ``cell_color`` in ``Topology``.
     """
     inscribed = _inscribed_radii(xy, cells)
     size = np.nanmedian(inscribed)

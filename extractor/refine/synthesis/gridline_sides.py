@@ -32,7 +32,7 @@ def gridline_sides(lines, xy, cells, edge_cells, levels, frame):  # type: ignore
     Returns:
         (E, 6) light 0 to 255, three channels before the gridline and three beyond; 0 where not known.
     """
-    out, terms = np.zeros((lines.shape[0], SIDE_COLUMNS)), np.empty(TERMS)
+    out = np.zeros((lines.shape[0], SIDE_COLUMNS))
     for e in range(lines.shape[0]):
         if lines[e, KNOWN] == 0.0:
             continue
@@ -54,15 +54,26 @@ def gridline_sides(lines, xy, cells, edge_cells, levels, frame):  # type: ignore
                 out[e, side + channel] += levels.cell[i, channel] + rise
         if lines[e, KNOWN] == 0.0:
             out[e] = 0.0
+    add_black(out, lines, levels.black, frame)
+    return out
+
+
+@compiled
+def add_black(sides, lines, black, frame):  # type: ignore[no-untyped-def]
+    """Add the black polynomial (3, 10), at the middles of the chords, to both sides (E, 6) of known gridlines."""
+    terms = np.empty(TERMS)
+    for e in range(lines.shape[0]):
+        if lines[e, KNOWN] == 0.0:
             continue
+        half = 0.5 * lines[e, LENGTH]
+        mx, my = lines[e, X] + half * lines[e, UX], lines[e, Y] + half * lines[e, UY]
         fill_monomials((mx - frame.x) / frame.scale, (my - frame.y) / frame.scale, terms)
         for channel in range(3):
-            black = 0.0
+            level = 0.0
             for k in range(TERMS):
-                black += terms[k] * levels.black[channel, k]
-            out[e, BEFORE + channel] += black
-            out[e, BEYOND + channel] += black
-    return out
+                level += terms[k] * black[channel, k]
+            sides[e, BEFORE + channel] += level
+            sides[e, BEYOND + channel] += level
 
 
 @compiled

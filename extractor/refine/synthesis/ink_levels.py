@@ -98,7 +98,7 @@ def cell_means(image, light, model, xy, cells, sigma):  # type: ignore[no-untype
 
     Args:
         image: (H, W, 3) uint8. light: (256,) of its values.
-        model: (H, W, 3) float32, light, or empty for 0.
+        model: (H, W, 3) float32, the drawn light, or empty for 0.
         xy: (M, 2) px, the markers. cells: (K, 3) marker ids.
         sigma: px, the blur; 0 where the pattern is drawn.
 
@@ -288,35 +288,3 @@ def level_change(before, now):  # type: ignore[no-untyped-def]
             sizes[i] = max(sizes[i], abs(before[i, channel]))
             changes[i] = max(changes[i], abs(now[i, channel] - before[i, channel]))
     return np.median(changes) / max(np.median(sizes), 1e-9)
-
-
-@compiled
-def black_levels_at(black, xy, frame):  # type: ignore[no-untyped-def]
-    """(K, 3) light: the polynomial (3, 10) of the black at the points (K, 2) px."""
-    out, terms = np.zeros((xy.shape[0], 3)), np.empty(TERMS)
-    for i in range(xy.shape[0]):
-        fill_monomials((xy[i, 0] - frame.x) / frame.scale, (xy[i, 1] - frame.y) / frame.scale, terms)
-        for channel in range(3):
-            for k in range(TERMS):
-                out[i, channel] += terms[k] * black[channel, k]
-    return out
-
-
-@compiled
-def fill_black(model, black, box, frame):  # type: ignore[no-untyped-def]
-    """Fill the box (x from, y from, x to, y to; px) of a float32 image with the polynomial (3, 10) of the black."""
-    step, coefficients = 1.0 / frame.scale, np.empty((3, 4), np.float32)
-    for y in range(box[1], box[3]):
-        v = (y - frame.y) * step
-        for channel in range(3):
-            b = black[channel]
-            coefficients[channel, 0] = b[0] + v * (b[2] + v * (b[5] + v * b[9]))
-            coefficients[channel, 1] = b[1] + v * (b[4] + v * b[8])
-            coefficients[channel, 2] = b[3] + v * b[7]
-            coefficients[channel, 3] = b[6]
-        row = model[y]
-        for x in range(box[0], box[2]):
-            u = np.float32((x - frame.x) * step)
-            for channel in range(3):
-                k = coefficients[channel]
-                row[x, channel] = k[0] + u * (k[1] + u * (k[2] + u * k[3]))

@@ -87,29 +87,19 @@ class SideLight(NamedTuple):
 
     Attributes:
         contrast0, contrast1, contrast2: of the drawn light, before the gridline less beyond.
-        shape: factor of ``shape_terms``, for the contrast that a square pixel shows unlike a Gaussian one.
         step0, step1, step2: of the light that is added to the drawing, likewise.
         beyond0, beyond1, beyond2: of the light that is added, beyond the gridline.
-        bleed_step0, bleed_step1, bleed_step2, bleed0, bleed1, bleed2: the same two of the light that a change of the
-            blur by its own width adds.
     """
 
     contrast0: np.float32
     contrast1: np.float32
     contrast2: np.float32
-    shape: np.float32
     step0: np.float32
     step1: np.float32
     step2: np.float32
     beyond0: np.float32
     beyond1: np.float32
     beyond2: np.float32
-    bleed_step0: np.float32
-    bleed_step1: np.float32
-    bleed_step2: np.float32
-    bleed0: np.float32
-    bleed1: np.float32
-    bleed2: np.float32
 
 
 class Residuals(NamedTuple):
@@ -120,17 +110,18 @@ class Residuals(NamedTuple):
             the gridline, summed.
         information: (n,) float32, these derivatives squared, summed.
         square: (n,) float32, the residuals squared, summed.
-        bleed_projection: (n,) float32, the residuals times the derivatives by the bleed, summed.
-        bleed_cross: (n,) float32, the derivatives by the share and by the bleed, multiplied, summed.
-        bleed_square: (n,) float32, the derivatives by the bleed squared, summed.
+        light, value, slope: (3 n,) float32, by channel: the drawn light, then the residual; its value; the derivative
+            of the value by the light.
+        place: (3 n,) int32, the places of the light in the table of values.
     """
 
     projection: NDArray[np.float32]
     information: NDArray[np.float32]
     square: NDArray[np.float32]
-    bleed_projection: NDArray[np.float32]
-    bleed_cross: NDArray[np.float32]
-    bleed_square: NDArray[np.float32]
+    light: NDArray[np.float32]
+    value: NDArray[np.float32]
+    slope: NDArray[np.float32]
+    place: NDArray[np.int32]
 
 
 @compiled
@@ -140,9 +131,10 @@ def allocate_residuals():  # type: ignore[no-untyped-def]
         np.zeros(CHUNK, np.float32),
         np.zeros(CHUNK, np.float32),
         np.zeros(CHUNK, np.float32),
-        np.zeros(CHUNK, np.float32),
-        np.zeros(CHUNK, np.float32),
-        np.zeros(CHUNK, np.float32),
+        np.zeros(3 * CHUNK, np.float32),
+        np.zeros(3 * CHUNK, np.float32),
+        np.zeros(3 * CHUNK, np.float32),
+        np.zeros(3 * CHUNK, np.int32),
     )
 
 
@@ -230,38 +222,25 @@ def fill_rows(block, first, frame, half, rows):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def side_light(drawn, sigma, e):  # type: ignore[no-untyped-def]
-    """The ``SideLight`` of gridline e; ``drawn`` has the columns of ``DrawnGridlines``, ``sigma`` is the blur, px."""
-    f, lines, sides, added, bleed = np.float32, drawn.lines, drawn.sides, drawn.added, drawn.bleed
+def side_light(sides, added, e):  # type: ignore[no-untyped-def]
+    """The ``SideLight`` of gridline e; ``sides`` and ``added`` (E, 6) are the drawn light and that to add on both
+    sides."""
+    f = np.float32
     return SideLight(
         f(sides[e, 0] - sides[e, 3]),
         f(sides[e, 1] - sides[e, 4]),
         f(sides[e, 2] - sides[e, 5]),
-        f(pixel_shape(lines[e, UX], lines[e, UY], sigma)),
         f(added[e, 0] - added[e, 3]),
         f(added[e, 1] - added[e, 4]),
         f(added[e, 2] - added[e, 5]),
         f(added[e, 3]),
         f(added[e, 4]),
         f(added[e, 5]),
-        f(sigma * (bleed[e, 0] - bleed[e, 3])),
-        f(sigma * (bleed[e, 1] - bleed[e, 4])),
-        f(sigma * (bleed[e, 2] - bleed[e, 5])),
-        f(sigma * bleed[e, 3]),
-        f(sigma * bleed[e, 4]),
-        f(sigma * bleed[e, 5]),
     )
 
 
 @inlined_no_refcount
-def pixel_shape(ux, uy, sigma):  # type: ignore[no-untyped-def]
-    """The fourth cumulant of a square pixel across a gridline of direction (ux, uy), over 24 and over that of the blur:
-    the first term by which a Gaussian of the same variance differs (Gram-Charlier series)."""
-    return -(ux**4 + uy**4) / 120.0 / (24.0 * sigma**4)
-
-
-@inlined_no_refcount
-def fill_residuals(image, model, encoded, block, light, shares, shape_terms, out):  # type: ignore[no-untyped-def]
+def fill_residuals(image, model, encoded, block, light, shares, out):  # type: ignore[no-untyped-def]
     """Fill in the ``Residuals`` of the pixels of a block: pixel j of row i at j * padded rows + i.
 
     Args:
@@ -270,35 +249,61 @@ def fill_residuals(image, model, encoded, block, light, shares, shape_terms, out
         block: ``RowBlock``.
         light: ``SideLight``.
         shares: (n,) the share of the light before the gridline in each pixel.
-        shape_terms: (n,) (z^3 - 3 z) times the normal density, z the distance beyond the gridline in units of the blur.
         out: ``Residuals``, filled.
     """
-    at, lanes, is_drawn = block.first, padded_count(block.row_count), model.shape[0] > 0
-    one, two, zero = np.uint64(1), np.uint64(2), np.float32(0.0)
-    c0, c1, c2 = light.contrast0, light.contrast1, light.contrast2
+    count = padded_count(block.row_count) * block.row_length
+    if model.shape[0] > 0:
+        _fill_channels(model, block, out.light)
+    else:
+        out.light[: 3 * CHUNK] = np.float32(0.0)
+    _fill_places(light, shares, count, out)
+    _fill_values(encoded, count, out)
+    _fill_channels(image, block, out.light)
+    _fill_projections(light, count, out)
+
+
+@inlined_no_refcount
+def _fill_channels(flat, block, out):  # type: ignore[no-untyped-def]
+    """Fill in the three channels of the pixels of a flat image, in columns of ``CHUNK``."""
+    at, lanes, one, two = block.first, padded_count(block.row_count), np.uint64(1), np.uint64(2)
     for j in range(block.row_length):
-        share, projection = shares[j * lanes :], out.projection[j * lanes :]
-        term = shape_terms[j * lanes :]
-        information, square = out.information[j * lanes :], out.square[j * lanes :]
-        bleed_projection, bleed_cross = out.bleed_projection[j * lanes :], out.bleed_cross[j * lanes :]
-        bleed_square = out.bleed_square[j * lanes :]
+        own, step = out[j * lanes :], j * block.step
         for i in range(block.row_count):
-            k, h, q = np.uint64(at[i] + j * block.step), share[i], light.shape * term[i]
-            m0, m1, m2 = zero, zero, zero
-            if is_drawn:
-                m0, m1, m2 = model[k], model[k + one], model[k + two]
-            p0 = table_place(m0 + light.beyond0 + h * light.step0 + q * c0)
-            p1 = table_place(m1 + light.beyond1 + h * light.step1 + q * c1)
-            p2 = table_place(m2 + light.beyond2 + h * light.step2 + q * c2)
-            r0, r1 = np.float32(image[k]) - encoded[p0], np.float32(image[k + one]) - encoded[p1]
-            r2 = np.float32(image[k + two]) - encoded[p2]
-            w0, w1, w2 = encoded[p0 + one], encoded[p1 + one], encoded[p2 + one]
-            b0, b1 = w0 * (light.bleed0 + h * light.bleed_step0), w1 * (light.bleed1 + h * light.bleed_step1)
-            b2 = w2 * (light.bleed2 + h * light.bleed_step2)
-            d0, d1, d2 = c0 * w0, c1 * w1, c2 * w2
-            bleed_projection[i] = b0 * r0 + b1 * r1 + b2 * r2
-            bleed_cross[i] = b0 * d0 + b1 * d1 + b2 * d2
-            bleed_square[i] = b0 * b0 + b1 * b1 + b2 * b2
-            projection[i] = d0 * r0 + d1 * r1 + d2 * r2
-            information[i] = d0 * d0 + d1 * d1 + d2 * d2
-            square[i] = r0 * r0 + r1 * r1 + r2 * r2
+            k = np.uint64(at[i] + step)
+            own[i], own[CHUNK + i], own[2 * CHUNK + i] = flat[k], flat[k + one], flat[k + two]
+
+
+@vectorized_no_refcount
+def _fill_places(light, shares, count, out):  # type: ignore[no-untyped-def]
+    """Fill in the places of the drawn light in the table of values."""
+    drawn, place = out.light, out.place
+    for k in range(count):
+        h = shares[k]
+        place[k] = table_place(drawn[k] + light.beyond0 + h * light.step0)
+        place[CHUNK + k] = table_place(drawn[CHUNK + k] + light.beyond1 + h * light.step1)
+        place[2 * CHUNK + k] = table_place(drawn[2 * CHUNK + k] + light.beyond2 + h * light.step2)
+
+
+@inlined_no_refcount
+def _fill_values(encoded, count, out):  # type: ignore[no-untyped-def]
+    """Fill in the values and their derivatives at the places of the table."""
+    for channel in range(3):
+        place, value = out.place[channel * CHUNK :], out.value[channel * CHUNK :]
+        slope = out.slope[channel * CHUNK :]
+        for k in range(count):
+            at = np.uint64(place[k])
+            value[k], slope[k] = encoded[at], encoded[at + np.uint64(1)]
+
+
+@vectorized_no_refcount
+def _fill_projections(light, count, out):  # type: ignore[no-untyped-def]
+    """Fill in the sums over the channels, from the image's channels in ``out.light``."""
+    observed, value, slope = out.light, out.value, out.slope
+    for k in range(count):
+        r0, r1 = observed[k] - value[k], observed[CHUNK + k] - value[CHUNK + k]
+        r2 = observed[2 * CHUNK + k] - value[2 * CHUNK + k]
+        d0, d1 = light.contrast0 * slope[k], light.contrast1 * slope[CHUNK + k]
+        d2 = light.contrast2 * slope[2 * CHUNK + k]
+        out.projection[k] = d0 * r0 + d1 * r1 + d2 * r2
+        out.information[k] = d0 * d0 + d1 * d1 + d2 * d2
+        out.square[k] = r0 * r0 + r1 * r1 + r2 * r2

@@ -31,13 +31,13 @@ from extractor.refine.synthesis.pixel_weights import (
     BEFORE_SHARE,
     END_BELL,
     IN_BAND,
-    SHAPE_TERM,
     TO_A,
     TO_B,
     TO_BLUR,
     TO_C,
     TO_D,
     fill_weights,
+    side_bleed,
 )
 
 # columns of the sums over a gridline's pixels
@@ -53,7 +53,7 @@ class DrawnGridlines(NamedTuple):
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
-        added: (E, 6), the light to add to the drawing on both sides, by which the levels have changed since.
+        added: (E, 6), the light to add to the drawing on both sides: the black, and the change of the levels since.
         bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
         is_bending: (E,) bool, gridlines with two more unknowns for their bending.
     """
@@ -69,7 +69,7 @@ class RowBuffers(NamedTuple):
     """Memory for the pixels of one gridline.
 
     Attributes:
-        first: (n,) int64, the first pixels of the rows. rows: their columns. weights: eight columns of the pixels.
+        first: (n,) int64, the first pixels of the rows. rows: their columns. weights: seven columns of the pixels.
         residuals: of the pixels.
     """
 
@@ -83,11 +83,6 @@ class RowBuffers(NamedTuple):
 def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums (22,)."""
     projection, information, square = residuals.projection, residuals.information, residuals.square
-    bleed_projection, bleed_cross, bleed_square = (
-        residuals.bleed_projection,
-        residuals.bleed_cross,
-        residuals.bleed_square,
-    )
     zero = np.float32(0.0)
     blur, curvature, misfit, pixels = zero, zero, zero, zero
     # in float64 the order of summing hardly changes the sums that move the markers
@@ -101,14 +96,13 @@ def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untype
         aa += by_a * ga
         ab += by_a * gb
         bb += by_b * gb
-        blur_cross = own * gz + bleed_cross[k]
-        az += ga * blur_cross
-        bz += gb * blur_cross
+        az += by_a * gz
+        bz += by_b * gz
         sa += ga * pull
         sb += gb * pull
         in_band = weights[IN_BAND + k]
-        blur += gz * pull + in_band * bleed_projection[k]
-        curvature += gz * (blur_cross + bleed_cross[k]) + in_band * bleed_square[k]
+        blur += gz * pull
+        curvature += own * gz * gz
         misfit += in_band * square[k]
         pixels += in_band
     sums[AA] += aa
@@ -154,12 +148,19 @@ def _accumulate_bending_sums(residuals, weights, count, sums):  # type: ignore[n
 
 
 @compiled
+def fill_zeros(model, box):  # type: ignore[no-untyped-def]
+    """Fill the box (x from, y from, x to, y to; px) of a float32 image with zeros."""
+    for y in range(box[1], box[3]):
+        model[y, box[0] : box[2]] = np.float32(0.0)
+
+
+@compiled
 def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no-untyped-def]
     """Sums over the pixels near each gridline.
 
     Args:
         view: ``PyramidLevel``.
-        model: (H, W, 3) float32, the light of the drawn pattern.
+        model: (H, W, 3) float32, the light of the drawn pattern over black.
         drawn: ``DrawnGridlines`` in the model.
         sigma: px, the blur.
         box: (4,) px, x from, y from, x to, y to: the drawn part of the image.
@@ -174,7 +175,7 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
     sums = np.zeros((drawn.lines.shape[0], SUMS))
     first, rows = np.empty(CHUNK, np.int64), np.empty(4 * CHUNK, np.float32)
     residuals = allocate_residuals()
-    buffers = RowBuffers(first, rows, np.empty(8 * CHUNK, np.float32), residuals)
+    buffers = RowBuffers(first, rows, np.empty(7 * CHUNK, np.float32), residuals)
     width = view.image.shape[1]
     start = 3 * (box[1] * width + box[0])
     image, light = view.image.reshape(-1)[start:], model.reshape(-1)[start:]
@@ -189,11 +190,11 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
     width, encoded = view.image.shape[1], view.response.encoded
     rows, weights, residuals = buffers.rows, buffers.weights, buffers.residuals
     for e in range(lines.shape[0]):
-        light = side_light(drawn, sigma, e)
+        light = side_light(drawn.sides, drawn.added, e)
         strength = light.contrast0**2 + light.contrast1**2 + light.contrast2**2
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
-        frame = row_frame(lines, e, box, width)
+        frame, bleed = row_frame(lines, e, box, width), side_bleed(drawn.sides, drawn.bleed, sigma, e)
         line, p_end = pixel_geometry(frame, sigma), frame.p + frame.length * frame.up
         end_width = np.float32(END_BELL * sigma / frame.length)
         begin = max(int(np.ceil(min(frame.p, p_end) - reach)), 0)
@@ -205,10 +206,8 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
             block = RowBlock(buffers.first, min(most, last + 1 - first), wide, frame.step_q)
             count = padded_count(block.row_count) * wide
             fill_rows(block, first, frame, half, rows)
-            fill_weights(rows, block, line, np.float32(reach), end_width, weights)
-            fill_residuals(
-                image, model, encoded, block, light, weights[BEFORE_SHARE:], weights[SHAPE_TERM:], residuals
-            )
+            fill_weights(rows, block, line, np.float32(reach), end_width, bleed, weights)
+            fill_residuals(image, model, encoded, block, light, weights[BEFORE_SHARE:], residuals)
             _accumulate_sums(residuals, weights, count, sums)
             if drawn.is_bending[e]:
                 _accumulate_bending_sums(residuals, weights, count, sums)
