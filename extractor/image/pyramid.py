@@ -69,7 +69,9 @@ class Pyramid:
 
 
 def _pyramid_level(image: NDArray[np.uint8], scale: int, response: ResponseTables) -> PyramidLevel:
-    if scale > 1:
+    if scale == 2:
+        image = _halved(image, response.light_steps, response.value_of_steps)
+    elif scale > 1:
         image = _block_means(image, scale, response.light_steps, response.value_of_steps)
     height, width = image.shape[:2]
     frame = PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
@@ -113,3 +115,22 @@ def _fill_block_sums(column, scale, width, total):  # type: ignore[no-untyped-de
             red += column[i + two]
             i += three
         total[three * x], total[three * x + one], total[three * x + two] = blue, green, red
+
+
+@compiled
+def _halved(image, light_steps, value_of_steps):  # type: ignore[no-untyped-def]
+    """The same for 2 x 2 pixels, in half of the time."""
+    height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
+    out = np.empty((height, width, 3), np.uint8)
+    flat, means = image.reshape(-1), out.reshape(-1)
+    three, six, two = np.uint64(3), np.uint64(6), np.uint32(2)
+    for y in range(height):
+        above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
+        line = means[3 * y * width : 3 * (y + 1) * width]
+        for x in range(np.uint64(width)):
+            for channel in range(three):
+                k = six * x + channel
+                left = np.uint32(light_steps[above[k]]) + np.uint32(light_steps[below[k]])
+                right = np.uint32(light_steps[above[k + three]]) + np.uint32(light_steps[below[k + three]])
+                line[three * x + channel] = value_of_steps[(left + right + two) >> two]
+    return out

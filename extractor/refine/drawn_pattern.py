@@ -60,7 +60,7 @@ class Synthesis(NamedTuple):
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
         sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
         added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
-        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
+        bleed: (E, 6) light, the change of the levels on both sides where the blur grows by its own width.
         sums: (E, 22), as ``accumulate_residual_sums`` gives them.
         levels: of the inks, as drawn.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.
@@ -118,7 +118,7 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     add_black(added, lines, levels.black, view.frame)
     wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma, (1.0 + BLUR_STEP) * sigma)
     bleed = gridline_sides(lines, xy, cells, topology.edge_cells, wider, view.frame) - sides
-    bleed /= BLUR_STEP * sigma
+    bleed /= BLUR_STEP
     drawn = DrawnGridlines(lines, sides, added, bleed, bending_gridlines(state.roughness, bend, edges))
     sums = accumulate_residual_sums(view, picture, drawn, sigma, box)
     contrasts, edge_px = value_contrasts(sides, view.response.encoded), median_edge(xy, edges)

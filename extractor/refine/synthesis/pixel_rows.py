@@ -110,6 +110,8 @@ class Residuals(NamedTuple):
             the gridline, summed.
         information: (n,) float32, these derivatives squared, summed.
         square: (n,) float32, the residuals squared, summed.
+        bleed_projection, bleed_cross, bleed_square: (n,) float32, the residuals times the derivatives by the bleed,
+            these times the derivatives by the share, and these squared, each summed.
         light, value, slope: (3 n,) float32, by channel: the drawn light, then the residual; its value; the derivative
             of the value by the light.
         place: (3 n,) int32, the places of the light in the table of values.
@@ -118,6 +120,9 @@ class Residuals(NamedTuple):
     projection: NDArray[np.float32]
     information: NDArray[np.float32]
     square: NDArray[np.float32]
+    bleed_projection: NDArray[np.float32]
+    bleed_cross: NDArray[np.float32]
+    bleed_square: NDArray[np.float32]
     light: NDArray[np.float32]
     value: NDArray[np.float32]
     slope: NDArray[np.float32]
@@ -128,6 +133,9 @@ class Residuals(NamedTuple):
 def allocate_residuals():  # type: ignore[no-untyped-def]
     """``Residuals`` of ``CHUNK`` pixels, zeros."""
     return Residuals(
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
+        np.zeros(CHUNK, np.float32),
         np.zeros(CHUNK, np.float32),
         np.zeros(CHUNK, np.float32),
         np.zeros(CHUNK, np.float32),
@@ -307,3 +315,27 @@ def _fill_projections(light, count, out):  # type: ignore[no-untyped-def]
         out.projection[k] = d0 * r0 + d1 * r1 + d2 * r2
         out.information[k] = d0 * d0 + d1 * d1 + d2 * d2
         out.square[k] = r0 * r0 + r1 * r1 + r2 * r2
+
+
+@vectorized_no_refcount
+def fill_bleed(light, bleed, shares, count, out):  # type: ignore[no-untyped-def]
+    """Fill in the bleed's columns of ``Residuals``, after ``fill_residuals``.
+
+    Args:
+        light: ``SideLight``. bleed: ``SideLight`` whose added light is the change of the levels by the blur.
+        shares: (n,) the share of the light before the gridline in each pixel.
+        count: pixels.
+        out: ``Residuals``, filled.
+    """
+    observed, value, slope = out.light, out.value, out.slope
+    for k in range(count):
+        h, s0, s1, s2 = shares[k], slope[k], slope[CHUNK + k], slope[2 * CHUNK + k]
+        b0, b1 = s0 * (bleed.beyond0 + h * bleed.step0), s1 * (bleed.beyond1 + h * bleed.step1)
+        b2 = s2 * (bleed.beyond2 + h * bleed.step2)
+        out.bleed_projection[k] = (
+            b0 * (observed[k] - value[k])
+            + b1 * (observed[CHUNK + k] - value[CHUNK + k])
+            + b2 * (observed[2 * CHUNK + k] - value[2 * CHUNK + k])
+        )
+        out.bleed_cross[k] = b0 * s0 * light.contrast0 + b1 * s1 * light.contrast1 + b2 * s2 * light.contrast2
+        out.bleed_square[k] = b0 * b0 + b1 * b1 + b2 * b2

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from extractor.numeric.compilation import inlined_no_refcount
@@ -29,37 +27,6 @@ I1, I2, I3, I4, I5 = (np.float32(c / (2 * k + 3)) for k, c in enumerate((C1, C2,
 P1, P3, P5 = np.float32(15 / 16), np.float32(-5 / 8), np.float32(3 / 16)
 END = np.float32(0.42)
 END_BELL = 0.3989
-
-
-class SideBleed(NamedTuple):
-    """The change of the light on both sides where the blur grows by its own width: bleed changes the levels that the
-    middles of the cells show. In units of the contrast.
-
-    Attributes:
-        beyond: beyond the gridline.
-        step: before the gridline less beyond.
-    """
-
-    beyond: np.float32
-    step: np.float32
-
-
-@inlined_no_refcount
-def side_bleed(sides, bleed, sigma, e):  # type: ignore[no-untyped-def]
-    """The ``SideBleed`` of gridline e.
-
-    Args:
-        sides: (E, 6) light on both sides. bleed: (E, 6) light per px, its change with the blur.
-        sigma: px, the blur.
-    """
-    strength, before, beyond = 0.0, 0.0, 0.0
-    for channel in range(3):
-        contrast = sides[e, channel] - sides[e, 3 + channel]
-        strength += contrast * contrast
-        before += contrast * bleed[e, channel]
-        beyond += contrast * bleed[e, 3 + channel]
-    unit = sigma / max(strength, 1e-9)
-    return SideBleed(np.float32(unit * beyond), np.float32(unit * (before - beyond)))
 
 
 @inlined_no_refcount
@@ -101,8 +68,8 @@ def half_share(z):  # type: ignore[no-untyped-def]
 
 
 @inlined_no_refcount
-def fill_weights(rows, block, line, reach, end_width, bleed, weights):  # type: ignore[no-untyped-def]
-    """Fill in the weights of all pixels of the rows across a gridline, 0 beyond ``reach`` px; ``bleed``: ``SideBleed``.
+def fill_weights(rows, block, line, reach, end_width, weights):  # type: ignore[no-untyped-def]
+    """Fill in the weights of all pixels of the rows across a gridline, 0 beyond ``reach`` px.
 
     The weights are polynomials close to the derivative of the drawing: the normal density of the distance, and the
     blurred ends of 1 - t and t. Any weights give an unbiased gradient. Loops without branches and tables are fast.
@@ -121,7 +88,6 @@ def fill_weights(rows, block, line, reach, end_width, bleed, weights):  # type: 
             ga, gb = keep * g * to_a, keep * g * to_b
             gc = ga * to_b
             out[IN_BAND + i], out[TO_A + i], out[TO_B + i] = keep, ga, gb
-            share = half_share(z)
-            out[TO_BLUR + i] = z * (ga + gb) + keep * (bleed.beyond + share * bleed.step)
+            out[TO_BLUR + i] = z * (ga + gb)
             out[TO_C + i], out[TO_D + i] = gc, gc * (to_a - to_b)
-            out[BEFORE_SHARE + i] = share
+            out[BEFORE_SHARE + i] = half_share(z)

@@ -18,6 +18,7 @@ from extractor.refine.synthesis.pixel_rows import (
     Residuals,
     RowBlock,
     allocate_residuals,
+    fill_bleed,
     fill_residuals,
     fill_rows,
     padded_count,
@@ -37,7 +38,6 @@ from extractor.refine.synthesis.pixel_weights import (
     TO_C,
     TO_D,
     fill_weights,
-    side_bleed,
 )
 
 # columns of the sums over a gridline's pixels
@@ -54,7 +54,7 @@ class DrawnGridlines(NamedTuple):
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides: the black, and the change of the levels since.
-        bleed: (E, 6) light per px, the change of the levels on both sides with a change of the blur.
+        bleed: (E, 6) light, the change of the levels on both sides where the blur grows by its own width.
         is_bending: (E,) bool, gridlines with two more unknowns for their bending.
     """
 
@@ -83,7 +83,8 @@ class RowBuffers(NamedTuple):
 def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untyped-def]
     """Add ``count`` pixels to a gridline's sums (22,)."""
     projection, information, square = residuals.projection, residuals.information, residuals.square
-    zero = np.float32(0.0)
+    bleed_projection, bleed_cross = residuals.bleed_projection, residuals.bleed_cross
+    bleed_square, zero = residuals.bleed_square, np.float32(0.0)
     blur, curvature, misfit, pixels = zero, zero, zero, zero
     # in float64 the order of summing hardly changes the sums that move the markers
     double = np.float64(0.0)
@@ -96,13 +97,14 @@ def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untype
         aa += by_a * ga
         ab += by_a * gb
         bb += by_b * gb
-        az += by_a * gz
-        bz += by_b * gz
+        blur_cross = own * gz + bleed_cross[k]
+        az += ga * blur_cross
+        bz += gb * blur_cross
         sa += ga * pull
         sb += gb * pull
         in_band = weights[IN_BAND + k]
-        blur += gz * pull
-        curvature += own * gz * gz
+        blur += gz * pull + in_band * bleed_projection[k]
+        curvature += gz * (blur_cross + bleed_cross[k]) + in_band * bleed_square[k]
         misfit += in_band * square[k]
         pixels += in_band
     sums[AA] += aa
@@ -194,7 +196,7 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
         strength = light.contrast0**2 + light.contrast1**2 + light.contrast2**2
         if lines[e, KNOWN] == 0.0 or strength == 0.0:
             continue
-        frame, bleed = row_frame(lines, e, box, width), side_bleed(drawn.sides, drawn.bleed, sigma, e)
+        frame, bleed = row_frame(lines, e, box, width), side_light(drawn.sides, drawn.bleed, e)
         line, p_end = pixel_geometry(frame, sigma), frame.p + frame.length * frame.up
         end_width = np.float32(END_BELL * sigma / frame.length)
         begin = max(int(np.ceil(min(frame.p, p_end) - reach)), 0)
@@ -206,8 +208,10 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
             block = RowBlock(buffers.first, min(most, last + 1 - first), wide, frame.step_q)
             count = padded_count(block.row_count) * wide
             fill_rows(block, first, frame, half, rows)
-            fill_weights(rows, block, line, np.float32(reach), end_width, bleed, weights)
-            fill_residuals(image, model, encoded, block, light, weights[BEFORE_SHARE:], residuals)
+            fill_weights(rows, block, line, np.float32(reach), end_width, weights)
+            shares = weights[BEFORE_SHARE:]
+            fill_residuals(image, model, encoded, block, light, shares, residuals)
+            fill_bleed(light, bleed, shares, count, residuals)
             _accumulate_sums(residuals, weights, count, sums)
             if drawn.is_bending[e]:
                 _accumulate_bending_sums(residuals, weights, count, sums)
