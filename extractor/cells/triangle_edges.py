@@ -58,8 +58,7 @@ COLUMNS = 32
 def update_triangle_corners(view, corners, good):  # type: ignore[no-untyped-def]
     """Move the corners of triangles to the intersections of their measured edges.
 
-    The first profiles reach across the cell; for large cells shorter ones follow, down to
-    ``FINE_REACH_PX``.
+    The first profiles reach across the cell; for large cells shorter ones follow, down to ``FINE_REACH_PX``.
 
     Args:
         view: ``PyramidLevel``.
@@ -70,9 +69,9 @@ def update_triangle_corners(view, corners, good):  # type: ignore[no-untyped-def
     light = view.response.light
     edges, buffers = np.zeros(COLUMNS * BATCH_POINTS), allocate_sample_buffers()
     left, reach = np.flatnonzero(good), np.full(good.shape[0], PROFILE_REACH)
-    for _ in range(MAX_PASSES):
-        for first in range(0, left.shape[0], BATCH_CELLS):
-            cells = left[first : first + BATCH_CELLS]
+    for number in range(MAX_PASSES):
+        for begin in range(0, left.shape[0], BATCH_CELLS):
+            cells = left[begin : begin + BATCH_CELLS]
             count = 3 * cells.shape[0]
             _fill_edges(corners, cells, reach, edges)
             _fill_normals(edges, count)
@@ -81,7 +80,7 @@ def update_triangle_corners(view, corners, good):  # type: ignore[no-untyped-def
             _fill_profile_areas(flat, light, height, width, False, edges, count, buffers)
             _fill_profile_areas(flat, light, height, width, True, edges, count, buffers)
             _fill_edge_lines(edges, count)
-            _update_corners(edges, cells, corners, good, reach)
+            _update_corners(edges, cells, corners, good, reach, number == 0)
         left = left[reach[left] > 0.0]
 
 
@@ -227,8 +226,11 @@ def _fill_edge_lines(edges, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _update_corners(edges, cells, corners, good, reach):  # type: ignore[no-untyped-def]
-    """Move the cells' corners to the lines' intersections, and write the next pass's ``reach`` (N,), 0 for none."""
+def _update_corners(edges, cells, corners, good, reach, first):  # type: ignore[no-untyped-def]
+    """Move the cells' corners to the lines' intersections, and write the next pass's ``reach`` (N,), 0 for none.
+
+    A second pass always follows the ``first`` one: the values of blurred light make cells look too large at the start.
+    """
     count, moved = cells.shape[0], np.empty((3, 2))
     for n in range(count):
         i, size = cells[n], edges[SIZE + n]
@@ -237,8 +239,8 @@ def _update_corners(edges, cells, corners, good, reach):  # type: ignore[no-unty
         if good[i]:
             for k in range(3):
                 corners[i, k, 0], corners[i, k, 1] = moved[k, 0], moved[k, 1]
-        is_done = not good[i] or (reach[i] != PROFILE_REACH and reach[i] * size < 2 * FINE_REACH_PX)
-        reach[i] = 0.0 if is_done else min(max(0.25 * reach[i], 2 * FINE_REACH_PX / size), 0.79)
+        is_done = not good[i] or (not first and reach[i] * size < 2 * FINE_REACH_PX)
+        reach[i] = 0.0 if is_done else min(max(0.25 * reach[i], 2 * FINE_REACH_PX / size), reach[i])
 
 
 @compiled
