@@ -45,6 +45,7 @@ AA, AB, BB, A, B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE, A_BLUR, B_BLUR = range(1
 AC, AD, BC, BD, CC, CD, DD, C, D = range(11, 20)
 READ_AA, READ_BB = 20, 21  # AA and BB as read, where bending is eliminated from them
 SUMS = 22
+FULL_DENSITY = np.float32(np.sqrt(2.0 * np.pi))  # by which the normal density is 1 on the gridline
 
 
 class DrawnGridlines(NamedTuple):
@@ -97,14 +98,17 @@ def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untype
         aa += by_a * ga
         ab += by_a * gb
         bb += by_b * gb
-        blur_cross = own * gz + bleed_cross[k]
+        # in the middles of cells the levels follow the image: bleed counts beside the gridline
+        beside = FULL_DENSITY * (ga + gb)
+        cross = beside * bleed_cross[k]
+        blur_cross = own * gz + cross
         az += ga * blur_cross
         bz += gb * blur_cross
         sa += ga * pull
         sb += gb * pull
         in_band = weights[IN_BAND + k]
-        blur += gz * pull + in_band * bleed_projection[k]
-        curvature += gz * (blur_cross + bleed_cross[k]) + in_band * bleed_square[k]
+        blur += gz * pull + beside * bleed_projection[k]
+        curvature += gz * (blur_cross + cross) + beside * beside * bleed_square[k]
         misfit += in_band * square[k]
         pixels += in_band
     sums[AA] += aa
