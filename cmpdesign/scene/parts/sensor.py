@@ -53,6 +53,14 @@ class Sensor:
         return light_of_values(self.response)
 
 
+def encoding_slope(sensor: Sensor, light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The derivative of the value by light, of any array of light (0 to 255); 0 where the sensor clips."""
+    light_of_value = sensor.light_of_values()
+    step = np.clip(np.searchsorted(light_of_value, light, side="right") - 1, 0, len(light_of_value) - 2)
+    slope = 1.0 / np.diff(light_of_value)[step]
+    return np.where((light < 0) | (light > light_of_value[-1]), 0.0, slope)
+
+
 def expose_sensor(
     sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
