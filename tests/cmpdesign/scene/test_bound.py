@@ -28,7 +28,7 @@ from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.drawing.render import render_truth
 from cmpdesign.scene.standard import INKS
 
-Response = Literal["linear", "srgb"] | float
+Response = Literal["srgb", "linear"] | float
 
 
 def rms_per_axis(covariance: np.ndarray) -> float:

@@ -24,6 +24,7 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
+from cmpdesign.scene.drawing.encoding import encode_planes
 from cmpdesign.scene.parts.sensor import encoding_slope
 
 SIZE = (120, 100)
@@ -114,6 +115,15 @@ def test_light_and_saturation_act_before_the_encoding() -> None:
     assert render(bright, size=SIZE).image[1, 1, 2] == 255
     exponent = replace(scene, light=Light(rgb=(0.5, 0.5, 0.5)), sensor=Sensor(response=2.0))
     assert render(exponent, size=SIZE).image[1, 1, 2] == round(200 * 0.5**0.5)
+
+
+@pytest.mark.parametrize("response", ["srgb", 0.3, 4.0, tuple(np.linspace(0.1, 3, 256) ** 2)])
+def test_both_engines_encode_alike(response) -> None:  # type: ignore[no-untyped-def]
+    light = np.concatenate([np.linspace(-1, 400, 9001), 10.0 ** np.linspace(-9, 0, 2000)]).astype(np.float32)
+    plain, loop = (
+        encode_planes(Sensor(response=response), light, engine) for engine in ("numpy", "compiled")
+    )
+    np.testing.assert_allclose(loop, plain, rtol=1e-6, atol=1e-6)
 
 
 def test_noise_is_that_of_the_encoded_picture() -> None:
