@@ -67,7 +67,7 @@ def test_render_takes_a_response(made: Path, tmp_path: Path) -> None:
     usual, linear, power = (rendered("--response", text) for text in ("srgb", "linear", "2.2"))
     np.testing.assert_array_equal(rendered(), usual)
     # blurred edges are brighter once encoded; most pixels lie inside cells and do not differ
-    assert usual.mean() > linear.mean() + 1 and np.median(np.abs(usual - linear)) == 0
+    assert usual.mean() > linear.mean() + 0.3 and np.median(np.abs(usual - linear)) == 0
     assert 0 < np.abs(usual - power).max() < np.abs(usual - linear).max()
 
 
