@@ -10,9 +10,9 @@ One thread each, processor time. The repetitions of all methods alternate, each 
 frame a method reads another frame, not timed, as in a stream.
 
 The pooled table is over three patterns, flat, with edges of 13 px, tilted, bulged and twisted, at blurs of 1 and
-1.6 px; boards have no patterns. RMS of all markers' errors over RMS of their exact bounds; z is the square root of the
-mean of e' C^-1 e / 2 for an error e and its stated covariance C: 1 is right. ``--response linear`` measures the same
-scenes on linear pictures.
+1.6 px; boards have no patterns. RMS of all markers' errors over RMS of their exact bounds, and the same over "inner"
+markers, those with all their gridlines; z is the square root of the mean of e' C^-1 e / 2 for an error e and its stated
+covariance C: 1 is right. ``--response linear`` measures the same scenes on linear pictures.
 """
 
 from __future__ import annotations

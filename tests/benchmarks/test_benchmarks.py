@@ -171,6 +171,8 @@ def test_pooled_figures_are_those_of_one_scene() -> None:
             result.rms_px == pytest.approx(alone[name].all_px, rel=1e-6) and result.wrong == alone[name].wrong
         )
         assert result.bound_px == pytest.approx(alone[name].all_bound_px, rel=0.02)
+        assert result.inner_px == pytest.approx(alone[name].inner_px, rel=1e-6)
+        assert result.inner_bound_px == pytest.approx(alone[name].bound_px, rel=0.02)
         assert (result.z is not None) == name.startswith("cmpdesign")
     rows = pooled_markdown(list(pooled.values())).split("\n")
     assert len(rows) == len(pooled) + 2 and len({row.count("|") for row in rows}) == 1

@@ -48,6 +48,7 @@ class PooledResult:
         found_share: share of the markers in view; of the board's inner corners.
         wrong: see ``MethodResult``.
         rms_px, bound_px: the errors, and the exact bounds of the same markers.
+        inner_px, inner_bound_px: the same over markers with all their gridlines.
         z: sqrt(mean(e' C^-1 e) / 2) over found markers; None if the method states no covariance.
         ms: median processor time.
     """
@@ -59,6 +60,8 @@ class PooledResult:
     wrong: int
     rms_px: float
     bound_px: float
+    inner_px: float
+    inner_bound_px: float
     z: float | None
     ms: float
 
@@ -72,6 +75,7 @@ class _PooledSums:
     wrong: int = 0
     squared_px2: list[NDArray[np.float64]] = field(default_factory=list)
     bound_px2: list[NDArray[np.float64]] = field(default_factory=list)
+    inner: list[NDArray[np.bool_]] = field(default_factory=list)
     normalised: list[NDArray[np.float64]] = field(default_factory=list)
     ms: list[float] = field(default_factory=list)
 
@@ -102,7 +106,7 @@ def _update_sums(
 ) -> None:
     """Add one scene, of the pattern or of the board, to the methods' sums."""
     scene = case.board() if board else case.scene()
-    every = required_markers(scene).every
+    every, inner = required_markers(scene)
     bound_px2 = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
     for method in methods:
         sums[method.name].scenes += 1
@@ -119,6 +123,7 @@ def _update_sums(
             part.wrong += wrong
             part.squared_px2.append((errors[found] ** 2).sum(axis=1))
             part.bound_px2.append(bound_px2[found])
+            part.inner.append(inner[found])
             part.normalised.append(_normalised_squares(errors, reading, found))
             part.ms.append(reading.ms)
 
@@ -135,10 +140,11 @@ def _normalised_squares(
 
 def _pooled_result(name: str, part: _PooledSums) -> PooledResult:
     squared, bound = np.concatenate(part.squared_px2), np.concatenate(part.bound_px2)
-    normalised = np.concatenate(part.normalised)
+    inner, normalised = np.concatenate(part.inner), np.concatenate(part.normalised)
     return PooledResult(
         method=name, scenes=part.scenes, pictures=len(part.ms), found_share=len(squared) / part.required,
         wrong=part.wrong, rms_px=_rms_per_axis(squared), bound_px=_rms_per_axis(bound),
+        inner_px=_rms_per_axis(squared[inner]), inner_bound_px=_rms_per_axis(bound[inner]),
         z=_rms_per_axis(normalised) if len(normalised) else None, ms=float(np.median(part.ms)),
     )  # fmt: skip
 

@@ -24,7 +24,18 @@ COLUMNS = (
     "ms",
     "time / SB",
 )
-POOLED_COLUMNS = ("method", "scenes", "found", "wrong", "RMS px", "bound px", "of the bound", "z", "ms")
+POOLED_COLUMNS = (
+    "method",
+    "scenes",
+    "found",
+    "wrong",
+    "RMS px",
+    "of the bound",
+    "inner px",
+    "of the bound",
+    "z",
+    "ms",
+)
 MARKS = {
     "flat": "o", "tilt": "^", "bulge": "s", "twist": "D", "blur 1.6 px": "v", "pitch 13 px": "*", "round": "h",
     "elliptical": "p",
@@ -102,8 +113,9 @@ def pooled_markdown(results: Sequence[PooledResult]) -> str:
 
 def _pooled_cells(r: PooledResult) -> tuple[str, ...]:
     return (
-        r.method, f"{r.scenes}", f"{r.found_share:.1%}", f"{r.wrong}", f"{r.rms_px:.4f}", f"{r.bound_px:.4f}",
-        f"{r.rms_px / r.bound_px:.2f}", "" if r.z is None else f"{r.z:.2f}", f"{r.ms:.1f}",
+        r.method, f"{r.scenes}", f"{r.found_share:.1%}", f"{r.wrong}", f"{r.rms_px:.4f}",
+        f"{r.rms_px / r.bound_px:.2f}", f"{r.inner_px:.4f}", f"{r.inner_px / r.inner_bound_px:.2f}",
+        "" if r.z is None else f"{r.z:.2f}", f"{r.ms:.1f}",
     )  # fmt: skip
 
 
