@@ -7,9 +7,9 @@ the back), and that in the two halves of a virtual binocular. Blur 1 px and none
 dent that hides a part of itself.
 
 The reference (``benchmarks.support.scanlines``) shares no step with the renderer. It is inexact for sides along its
-scan lines, so the patterns are rotated by 30 degrees, the flat one by 7.3. The error in grey levels is that of a 16-bit
-image, in 8-bit units. The error in px is the shift of the gridlines' middles along their normals with which the
-reference fits the image best. One core.
+scan lines, so the patterns are rotated by 30 degrees, the flat one by 7.3. The error in grey levels is that of a linear
+16-bit image, in 8-bit units. The error in px is the shift of the gridlines' middles along their normals with which the
+reference fits the image best. Times are those of sRGB images. One core.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def measure_speed(name: str, scene: Scene, repeats: int) -> Speed:
 
 
 def result_tables(errors: Sequence[RenderError], speeds: Sequence[Speed]) -> list[Table]:
-    error_table = Table(box=SIMPLE_HEAD, title="the renderer's own error")
+    error_table = Table(box=SIMPLE_HEAD, title="the renderer's own error, linear pictures")
     for heading in ("scene", "blur px", "grey RMS", "largest", "edge RMS px", "largest", "gridlines"):
         error_table.add_column(heading, justify="left" if heading == "scene" else "right")
     for error in errors:
@@ -122,7 +122,7 @@ def result_tables(errors: Sequence[RenderError], speeds: Sequence[Speed]) -> lis
             f"{error.edges}",
         )
     speed_table = Table(
-        box=SIMPLE_HEAD, title="time of a picture, 640x480, 331 markers, blur 1 px, noise 2/255"
+        box=SIMPLE_HEAD, title="time of a picture, 640x480, 331 markers, blur 1 px, sRGB, noise 2/255"
     )
     for heading in ("scene", "p50 ms", "p95 ms", "CPU p50 ms"):
         speed_table.add_column(heading, justify="left" if heading == "scene" else "right")

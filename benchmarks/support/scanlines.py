@@ -61,7 +61,7 @@ class CellSides(NamedTuple):
 
 
 def reference_image(scene: Scene, view: SceneView, window: ImageWindow) -> Points:
-    """(height, width, 3) BGR in 8-bit units: the inks over black in every pixel of the window."""
+    """(height, width, 3) BGR in 8-bit units: the inks over black in every pixel of the window, linear."""
     bands = []
     for top in range(0, window.height, BAND_ROWS):
         rows = min(BAND_ROWS, window.height - top)
@@ -157,8 +157,8 @@ def _blurred_box(distance: Points, blur_px: float) -> Points:
 def measure_render_error(
     name: str, scene: Scene, blur_px: float, window: ImageWindow, size: tuple[int, int]
 ) -> RenderError:
-    """The renderer's error in a window; of several views in the first view."""
-    clean = replace(scene, sensor=Sensor(bits=16), optics=Optics(blur_px))
+    """The renderer's error in a window, on linear pictures; of several views in the first view."""
+    clean = replace(scene, sensor=Sensor(bits=16, response="linear"), optics=Optics(blur_px))
     view = scene_views(clean, size)[0]
     rows, columns = slice(window.y, window.y + window.height), slice(window.x, window.x + window.width)
     drawn = render(clean, size=size).image[rows, columns] / 257

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from inspect import signature
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,24 +29,33 @@ SURFACES = {
     "bulge": composed(Press(radius_mm=5.0, depth_mm=1.2)),
     "twist": composed(Twist(radius_mm=5.0, angle_deg=18.0)),
 }
+STANDARD_BLUR_PX, STANDARD_PITCH_PX = 1.0, 20.0
+Response = Literal["srgb", "linear"] | float
 BOARD_LAYERS = 10  # 21 x 21 squares
 
 
 @dataclass(frozen=True)
 class SceneCase:
-    """A pattern and its imaging conditions. Lengths in px of the image, noise in grey levels."""
+    """A pattern and its imaging conditions. Lengths in px of the image, noise in grey levels of the encoded image."""
 
     pattern: str = "honeycomb"
     kind: str = "flat"
-    blur_px: float = 1.0
+    blur_px: float = STANDARD_BLUR_PX
     noise: float = 2.0
-    pitch_px: float = 20.0
+    pitch_px: float = STANDARD_PITCH_PX
     layers: int = STANDARD_LAYERS
+    response: Response = "srgb"
 
     @property
     def name(self) -> str:
-        """The pattern's name; of honeycomb patterns the kind of scene."""
-        return self.pattern if self.pattern != "honeycomb" else self.kind
+        """The pattern's name; of honeycomb patterns the kind of scene, or what is unusual in a flat one."""
+        if self.pattern != "honeycomb":
+            return self.pattern
+        if self.kind == "flat" and self.blur_px != STANDARD_BLUR_PX:
+            return f"blur {self.blur_px:g} px"
+        if self.kind == "flat" and self.pitch_px != STANDARD_PITCH_PX:
+            return f"pitch {self.pitch_px:g} px"
+        return self.kind
 
     def scene(self, layout: Layout | None = None) -> Scene:
         """The case's scene, of its pattern or of another layout."""
@@ -54,7 +65,7 @@ class SceneCase:
             camera=Camera(self.pitch_px, rotation_deg=7.3, tilt_deg=tilt_deg, tilt_axis_deg=30.0),
             surface=SURFACES.get(self.kind),
             optics=Optics(self.blur_px),
-            sensor=Sensor(noise=self.noise),
+            sensor=Sensor(noise=self.noise, response=self.response),
         )
 
     def board(self, plain: bool = True) -> Scene:
@@ -73,8 +84,16 @@ def cached_reference(pattern: str, layers: int) -> Reference:
     return parse_layout(layout_to_json(standard_layout(pattern, layers)))
 
 
+def make_extractor(reference: Reference, preset: Preset, response: Response) -> Extractor:
+    """The extractor for pictures with a response. sRGB is its default; it is told another one if it takes one."""
+    options: dict[str, Any] = {}
+    if response != "srgb" and "response" in signature(Extractor).parameters:
+        options["response"] = response
+    return Extractor(reference, preset, **options)
+
+
 def cached_extractor(case: SceneCase, preset: Preset = "balanced") -> Extractor:
-    return Extractor(cached_reference(case.pattern, case.layers), preset)
+    return make_extractor(cached_reference(case.pattern, case.layers), preset, case.response)
 
 
 @cache

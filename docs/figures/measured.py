@@ -6,7 +6,8 @@ from pathlib import Path
 
 from benchmarks import accuracy, extraction
 from benchmarks.suites.comparison.measure import MethodResult
-from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture
+from benchmarks.suites.comparison.pooled import PooledResult
+from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
 from benchmarks.support.machine import conditions_text
 from benchmarks.support.published import read_measured, updated_pages
 
@@ -25,6 +26,9 @@ def pages() -> dict[Path, str]:
     precise = [accuracy.AccuracyResult(**row) for row in read_measured("accuracy")["results"]]
     conditions = conditions_text(read_measured("comparison")["conditions"])
     blocks = {"comparison": comparison_markdown(_compared()), "conditions": conditions}
+    pooled = [PooledResult(**row) for row in read_measured("comparison").get("pooled", ())]
+    if pooled:
+        blocks["comparison-pooled"] = pooled_markdown(pooled)
     return updated_pages(
         blocks | accuracy.documentation_blocks(precise) | extraction.markdown(read_measured("extraction"))
     )

@@ -13,13 +13,19 @@ import numpy as np
 import pytest
 
 from benchmarks.suites.article.corners import fit_plain_triangles
-from benchmarks.suites.comparison.measure import measure_case, point_errors
+from benchmarks.suites.comparison.measure import CASES, measure_case, point_errors
 from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD
-from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture
+from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
+from benchmarks.suites.comparison.report import (
+    MARKS,
+    comparison_markdown,
+    comparison_picture,
+    pooled_markdown,
+)
 from benchmarks.support.published import replace_blocks
 from benchmarks.support.scenes import SceneCase, checkerboard_layout, inner_markers
 from cmpdesign.patterns.colors import BLACK, RED, WHITE
-from cmpdesign.scene import Rendered, Truth, standard_layout
+from cmpdesign.scene import Rendered, Sensor, Truth, standard_layout
 
 ROOT = Path(__file__).parents[2]
 
@@ -139,6 +145,37 @@ def test_the_checkerboard_is_one() -> None:
     assert (side[1:] != side[:-1]).all() and (side[:, 1:] != side[:, :-1]).all()
     assert inner_markers(board).sum() == 400
     assert (checkerboard_layout(plain=False).cell_color == RED).sum() == 1
+
+
+def test_the_comparisons_scenes_are_named_apart() -> None:
+    for response in ("srgb", "linear"):
+        pooled = pooled_cases(response)
+        assert len(set(pooled)) == 30 and {case.response for case in pooled} == {response}
+        assert all(
+            case.scene().sensor == Sensor(2.0, response) == case.board().sensor for case in pooled[::9]
+        )
+    names = [case.name for case in CASES]
+    assert len(set(names)) == len(names) and set(names) == set(MARKS)
+    assert {"blur 1.6 px", "pitch 13 px"} < set(names) and SceneCase("round", blur_px=1.6).name == "round"
+
+
+@pytest.mark.slow
+def test_pooled_figures_are_those_of_one_scene() -> None:
+    """On one linear picture the pooled error is the scene's, and its bound is the exact one of the same markers."""
+    case = SceneCase(response="linear")
+    pooled = {result.method: result for result in measure_pooled([case], 1)}
+    assert [result.scenes for result in pooled.values()] == [1] * len(pooled)
+    alone = {result.method: result for result in measure_case(case, 1)}
+    for name, result in pooled.items():
+        assert (
+            result.rms_px == pytest.approx(alone[name].all_px, rel=1e-6) and result.wrong == alone[name].wrong
+        )
+        assert result.bound_px == pytest.approx(alone[name].all_bound_px, rel=0.02)
+        assert result.inner_px == pytest.approx(alone[name].inner_px, rel=1e-6)
+        assert result.inner_bound_px == pytest.approx(alone[name].bound_px, rel=0.02)
+        assert (result.z is not None) == name.startswith("cmpdesign")
+    rows = pooled_markdown(list(pooled.values())).split("\n")
+    assert len(rows) == len(pooled) + 2 and len({row.count("|") for row in rows}) == 1
 
 
 @pytest.mark.slow

@@ -23,7 +23,14 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Rendered, Scene, render
 from cmpdesign.scene.standard import STANDARD_SIZE
 
-CASES = (*(SceneCase(kind=kind) for kind in SCENE_KINDS), SceneCase("round"), SceneCase("elliptical"))
+WIDE_BLUR_PX, SMALL_PITCH_PX = 1.6, 13.0
+CASES = (
+    *(SceneCase(kind=kind) for kind in SCENE_KINDS),
+    SceneCase(blur_px=WIDE_BLUR_PX),
+    SceneCase(pitch_px=SMALL_PITCH_PX),
+    SceneCase("round"),
+    SceneCase("elliptical"),
+)
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ def _match_points(
 def _summarise_methods(
     case: SceneCase, scenes: dict[bool, Scene], methods: list[Method], samples: dict[str, _MethodSamples]
 ) -> Iterator[MethodResult]:
-    required = {board: _required_markers(scene) for board, scene in scenes.items()}
+    required = {board: required_markers(scene) for board, scene in scenes.items()}
     bounds = {board: bound_rms_px(scene, *required[board]) for board, scene in scenes.items()}
     for method in methods:
         sample, (every, inner) = samples[method.name], required[method.board]
@@ -152,7 +159,7 @@ def _summarise_methods(
         )  # fmt: skip
 
 
-def _required_markers(scene: Scene) -> RequiredMarkers:
+def required_markers(scene: Scene) -> RequiredMarkers:
     """The markers of a scene that a method should find; of a board only inner corners."""
     from cmpdesign.scene.drawing.render import render_truth
 

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
-from benchmarks.support.scenes import BOARD_LAYERS, SceneCase, cached_extractor, cached_reference
+from benchmarks.support.scenes import (
+    BOARD_LAYERS,
+    SceneCase,
+    cached_extractor,
+    cached_reference,
+    make_extractor,
+)
 from extractor import Extractor
 from extractor.cells.region_growing import grow
 from extractor.cells.seeds import find_seeds
@@ -43,10 +49,12 @@ class Reading:
     Attributes:
         points: (M, 2) px by marker id, NaN where lost, or (N, 2) px without numbers.
         ms: processor time, which excludes other processes.
+        cov_px2: (M, 2, 2) px^2, the stated covariances; None if the method states none.
     """
 
     points: Points
     ms: float
+    cov_px2: Points | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,8 @@ def method_extractor(case: SceneCase, preset: Preset, points: bool = True) -> Ex
     """An extractor of the case's pattern, with or without virtual markers (``points``)."""
     if points:
         return cached_extractor(case, preset)
-    return Extractor(replace(cached_reference(case.pattern, case.layers), virtual_per_edge=0), preset)
+    reference = replace(cached_reference(case.pattern, case.layers), virtual_per_edge=0)
+    return make_extractor(reference, preset, case.response)
 
 
 def extractor_method(preset: Preset, points: bool = True) -> Method:
@@ -80,8 +89,8 @@ def extractor_method(preset: Preset, points: bool = True) -> Method:
     def read(case: SceneCase, image: Image) -> Reading:
         reader = method_extractor(case, preset, points)
         started = time.process_time()
-        found = reader.extract(image).xy_px
-        return Reading(found, _elapsed_ms(started))
+        found = reader.extract(image)
+        return Reading(found.xy_px, _elapsed_ms(started), found.cov_px2)
 
     return Method(f"cmpdesign, {preset}" + ("" if points else ", markers only"), False, True, read)
 

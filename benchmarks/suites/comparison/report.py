@@ -10,6 +10,7 @@ from rich.table import Table
 
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.methods import METHODS
+from benchmarks.suites.comparison.pooled import PooledResult
 
 COLUMNS = (
     "method",
@@ -23,7 +24,22 @@ COLUMNS = (
     "ms",
     "time / SB",
 )
-MARKS = {"flat": "o", "tilt": "^", "bulge": "s", "twist": "D", "round": "h", "elliptical": "p"}
+POOLED_COLUMNS = (
+    "method",
+    "scenes",
+    "found",
+    "wrong",
+    "RMS px",
+    "of the bound",
+    "inner px",
+    "of the bound",
+    "z",
+    "ms",
+)
+MARKS = {
+    "flat": "o", "tilt": "^", "bulge": "s", "twist": "D", "blur 1.6 px": "v", "pitch 13 px": "*", "round": "h",
+    "elliptical": "p",
+}  # fmt: skip
 COLORS = {
     "cmpdesign, fast, markers only": "#a9d3f5",
     "cmpdesign, fast": "#7fb3e6",
@@ -75,6 +91,32 @@ def comparison_markdown(results: Sequence[MethodResult]) -> str:
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def pooled_table(results: Sequence[PooledResult], caption: str = "") -> Table:
+    """The pooled results, for the terminal."""
+    table = Table(
+        title="pooled", box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
+    )
+    for number, column in enumerate(POOLED_COLUMNS):
+        table.add_column(column, justify="right" if number else "left", no_wrap=True)
+    for r in results:
+        table.add_row(*_pooled_cells(r))
+    return table
+
+
+def pooled_markdown(results: Sequence[PooledResult]) -> str:
+    """One row per method."""
+    rows = [POOLED_COLUMNS, ("---",) * len(POOLED_COLUMNS), *map(_pooled_cells, results)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _pooled_cells(r: PooledResult) -> tuple[str, ...]:
+    return (
+        r.method, f"{r.scenes}", f"{r.found_share:.1%}", f"{r.wrong}", f"{r.rms_px:.4f}",
+        f"{r.rms_px / r.bound_px:.2f}", f"{r.inner_px:.4f}", f"{r.inner_px / r.inner_bound_px:.2f}",
+        "" if r.z is None else f"{r.z:.2f}", f"{r.ms:.1f}",
+    )  # fmt: skip
 
 
 def comparison_picture(results: Sequence[MethodResult]) -> bytes:

@@ -15,6 +15,7 @@ from benchmarks.suites.stress.kinds import ConditionKind, group_kinds
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
 from cmpdesign.scene import Busy, Plain, Sensor, render, standard_scene
+from extractor.image.response import decode_values, encode_light
 
 Pixels = NDArray[np.float32]
 
@@ -33,9 +34,16 @@ def uniform_image(rng: np.random.Generator, size: Size, sigma: float) -> Pixels:
     return np.asarray(rng.uniform(0, 255, 3) + sigma * grain, dtype=np.float32)
 
 
+def blur_light(image: Pixels) -> Pixels:
+    """An sRGB image (H, W, 3) blurred as a lens does: its light, by a sigma of 0.8 px."""
+    light_of_value = Sensor().light_of_values()
+    light = cv2.GaussianBlur(decode_values(image, light_of_value), (0, 0), 0.8)
+    return encode_light(light, light_of_value).astype(np.float32)
+
+
 def clutter_image(rng: np.random.Generator, size: Size, shapes: float, *, triangles: bool) -> Pixels:
     planes = Busy(int(shapes), triangles).planes(size, rng)
-    return np.asarray(cv2.GaussianBlur(planes.transpose(1, 2, 0), (0, 0), 0.8), dtype=np.float32)
+    return blur_light(planes.transpose(1, 2, 0))
 
 
 def photo_like_image(rng: np.random.Generator, size: Size, steps: float) -> Pixels:
@@ -53,7 +61,7 @@ def checkerboard_image(rng: np.random.Generator, size: Size, pitch_px: float) ->
     color = rng.integers(0, 4, (512, 512))[u % 512, v % 512] + 1
     palette = np.array(_ink_colors(), dtype=np.float32)
     image = palette[np.where((u + v) % 2 == 0, color, 0)]
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8), dtype=np.float32)
+    return blur_light(image)
 
 
 def _ink_colors() -> list[tuple[float, float, float]]:

@@ -75,7 +75,7 @@ IMAGING_KINDS = group_kinds(
         (120, 80, 60, 40),
         lambda f, s: with_contrast(f.with_sensor(noise=5), s),
     ),
-    ConditionKind("gamma", "", (0.45, 0.7, 1.4, 2.2), lambda f, s: f.with_sensor(gamma=s)),
+    ConditionKind("response", "exponent", (0.45, 0.7, 1.4, 2.2), lambda f, s: f.with_sensor(response=s)),
     ConditionKind("jpeg", "quality", (95, 80, 60, 40, 20), lambda f, s: f.with_sensor(jpeg_quality=int(s))),
     ConditionKind("saturation", "x", (1.3, 1.6, 2, 2.5), lambda f, s: f.with_light(rgb=gray_rgb(s))),
     ConditionKind("dark", "x", (0.7, 0.5, 0.3, 0.2), lambda f, s: f.with_light(rgb=gray_rgb(s))),

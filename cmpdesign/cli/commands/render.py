@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -26,6 +26,7 @@ SCENE_FILE_KEYS = {
     "press_radius": "[surface.press] radius_mm",
     "blur": "[optics] blur_px",
     "noise": "[sensor] noise",
+    "response": "[sensor] response",
 }
 
 
@@ -92,6 +93,13 @@ def render(
     noise: Annotated[
         float, typer.Option(callback=require_finite, help="Noise, standard deviation in 255ths.")
     ] = 0.0,
+    response: Annotated[
+        str,
+        typer.Option(
+            metavar="srgb|linear|EXPONENT",
+            help="How light becomes values; with an exponent light is value ** exponent.",
+        ),
+    ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
     """Render the pattern as a camera sees it: seeded, exact to a thousandth of a pixel."""
@@ -113,7 +121,7 @@ def render(
         camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
         surface=composed(Press(radius, press)) if press else None,
         optics=Optics(blur),
-        sensor=Sensor(noise=noise) if noise else None,
+        sensor=Sensor(noise=noise, response=parse_response(response)),
         seed=seed,
     )
     _write_rendered(pattern_scene, pixels, output, truth)
@@ -163,3 +171,21 @@ def parse_image_size(text: str) -> tuple[int, int]:
     if not match:
         raise CmpDesignError(f"--size {text}: expected WIDTHxHEIGHT, 10 to 9999 pixels each, as in 640x480")
     return int(match[1]), int(match[2])
+
+
+def parse_response(text: str) -> Literal["srgb", "linear"] | float:
+    """The response from "srgb", "linear" or an exponent, whose limits ``Sensor`` checks.
+
+    Raises:
+        CmpDesignError: another text.
+    """
+    if text == "srgb":
+        return "srgb"
+    if text == "linear":
+        return "linear"
+    try:
+        return float(text)
+    except ValueError:
+        raise CmpDesignError(
+            f"--response {text}: expected srgb, linear or an exponent from 0.2 to 5, as in 2.2"
+        ) from None

@@ -95,7 +95,7 @@ class Instrument:
             surface=surface,
             light=conditions.light,
             optics=Optics(conditions.blur_px),
-            sensor=Sensor(noise=conditions.noise),
+            sensor=Sensor(noise=conditions.noise, response=self.sensor.response),
             damage=conditions.damage,
             seed=seed,
         )
@@ -148,7 +148,7 @@ def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray
     axes = np.array([right_px - middle_px, down_px - middle_px])
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     kind = SaddleReader if instrument.reader == "saddles" else SquareReader
-    reader = kind(instrument.layout, instrument.edge_px, axes)
+    reader = kind(instrument.layout, instrument.edge_px, axes, instrument.sensor.response)
     return lambda image: markers_from_places(reader.read(image), instrument.layout)
 
 

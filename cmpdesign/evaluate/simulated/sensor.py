@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from cmpdesign.errors import CmpDesignError
+from extractor.image.response import light_of_values
 
 if TYPE_CHECKING:
     from cmpdesign.contact import Elastomer
@@ -22,6 +23,7 @@ Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
 Counts = tuple[Annotated[int, Field(ge=0, le=100)], Annotated[int, Field(ge=0, le=100)]]
+SensorResponse = Literal["srgb", "linear"] | float | tuple[float, ...]
 METHODS = ("square", "multicolor")
 OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge", "large_ball", "cube")
 
@@ -100,8 +102,15 @@ class SensorTable(_StrictTable):
     patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
     elastomer: ElastomerTable
     contact: ContactTable
+    response: str | float | tuple[float, ...] = "srgb"
     load: tuple[LoadTable, ...] = ()
     conditions: ConditionRanges = ConditionRanges()
+
+    @field_validator("response")
+    @classmethod
+    def _known_response(cls, value: str | float | tuple[float, ...]) -> str | float | tuple[float, ...]:
+        light_of_values(cast(SensorResponse, value))
+        return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +130,11 @@ class SimulatedSensor:
     @property
     def size_px(self) -> tuple[int, int]:
         return self.table.size_px
+
+    @property
+    def response(self) -> SensorResponse:
+        """How light becomes the picture's values, as a scene's sensor has it."""
+        return cast(SensorResponse, self.table.response)
 
     @cached_property
     def cameras(self) -> tuple[Pinhole, ...]:

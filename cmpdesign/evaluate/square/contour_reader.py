@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from cmpdesign.evaluate.square.quads import Quads, find_quads
 from cmpdesign.layout.layout import Layout
+from extractor.image.response import Response, light_of_values
 
 Points = NDArray[np.float64]
+Gray = NDArray[np.float32]
 CORNER_JOIN_EDGES = (
     0.4  # corners of different quads within this distance, in edges of the smaller quad, are joined
 )
@@ -34,29 +36,34 @@ class SquareReader:
         layout: a square pattern.
         edge_px: the edges' length at rest.
         axes_px: (2, 2) unit vectors in the image at rest: the direction of ascending columns, then of ascending rows.
+        response: the camera's response, as a scene's sensor has it; corners are refined in light.
     """
 
     layout: Layout
     edge_px: float
     axes_px: Points
+    response: Response = "srgb"
 
     def read(self, bgr: NDArray[np.uint8]) -> Points:
         """(M, 2) the markers' positions in px, NaN where lost. A poor image never raises an exception."""
-        return read_square(bgr, self.layout, self.edge_px, self.axes_px)
-
-
-def read_square(bgr: NDArray[np.uint8], layout: Layout, edge_px: float, axes_px: Points) -> Points:
-    """(M, 2) the markers' positions in px, NaN where lost; see ``SquareReader``."""
-    xy_px = np.full((len(layout.marker_xy_mm), 2), np.nan)
-    quads = find_quads(bgr, edge_px)
-    if quads.reference is None:
+        xy_px = np.full((len(self.layout.marker_xy_mm), 2), np.nan)
+        quads = find_quads(bgr, self.edge_px)
+        if quads.reference is None:
+            return xy_px
+        nodes, places = join_corners(quads.corners_px)
+        numbers = number_nodes(quads, nodes, self.layout, self.axes_px)
+        found = np.array(sorted(numbers), dtype=np.int64)
+        ids = np.array([numbers[node] for node in found], dtype=np.int64)
+        xy_px[ids] = refine_corners(gray_light(bgr, self.response), places[found], self.edge_px)
         return xy_px
-    nodes, places = join_corners(quads.corners_px)
-    numbers = number_nodes(quads, nodes, layout, axes_px)
-    found = np.array(sorted(numbers), dtype=np.int64)
-    ids = np.array([numbers[node] for node in found], dtype=np.int64)
-    xy_px[ids] = refine_corners(bgr, places[found], edge_px)
-    return xy_px
+
+
+def gray_light(bgr: NDArray[np.uint8], response: Response) -> Gray:
+    """(H, W) float32, 0 to 255: the light of an image (H, W, 3), in gray."""
+    import cv2
+
+    light = light_of_values(response).astype(np.float32)[bgr]
+    return np.asarray(cv2.cvtColor(light, cv2.COLOR_BGR2GRAY), dtype=np.float32)
 
 
 def join_corners(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
@@ -185,23 +192,22 @@ def _is_consistent(corner_nodes: list[int], ids: list[int], numbers: dict[int, i
     return all(numbers.get(node, marker) == marker for node, marker in zip(corner_nodes, ids, strict=True))
 
 
-def refine_corners(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
+def refine_corners(gray: Gray, places: Points, edge_px: float) -> Points:
     """(N, 2) px: positions refined by cv2.cornerSubPix, unchanged where the refinement leaves its window.
 
     NaN outside the image.
     """
-    inside = ((places >= 0) & (places <= np.array(bgr.shape[1::-1]) - 1)).all(axis=1)
+    inside = ((places >= 0) & (places <= np.array(gray.shape[1::-1]) - 1)).all(axis=1)
     refined = np.full(places.shape, np.nan)
     if inside.any():
-        refined[inside] = _refine_sub_pixel(bgr, places[inside], edge_px)
+        refined[inside] = _refine_sub_pixel(gray, places[inside], edge_px)
     return refined
 
 
-def _refine_sub_pixel(bgr: NDArray[np.uint8], places: Points, edge_px: float) -> Points:
+def _refine_sub_pixel(gray: Gray, places: Points, edge_px: float) -> Points:
     import cv2
 
     window = max(round(SEARCH_WINDOW_EDGES * edge_px), MIN_SEARCH_WINDOW_PX)
-    gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
     start = places.astype(np.float32)[:, None]
     refined = cv2.cornerSubPix(gray, start.copy(), (window, window), (-1, -1), stop)[:, 0].astype(np.float64)

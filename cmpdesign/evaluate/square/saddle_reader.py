@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.square.contour_reader import SquareReader, refine_corners
+from cmpdesign.evaluate.square.contour_reader import Gray, SquareReader, gray_light, refine_corners
 
 Points = NDArray[np.float64]
 SMOOTHING_EDGES = 0.08  # sigma of the Gaussian before the second derivatives, in edges
@@ -53,11 +53,12 @@ class SaddleReader(SquareReader):
             return xy_px
         side = int(self.layout.marker_index.max()) + 1
         start = {LatticePlace(*divmod(marker, side)): xy_px[marker] for marker in known}
-        placed = grow_lattice(find_saddles(bgr, self.edge_px), start, side, self.edge_px * self.axes_px)
+        gray = gray_light(bgr, self.response)
+        placed = grow_lattice(find_saddles(gray, self.edge_px), start, side, self.edge_px * self.axes_px)
         more = sorted(placed.keys() - start.keys())
         if more:
             ids = [place.row * side + place.column for place in more]
-            xy_px[ids] = refine_corners(bgr, np.array([placed[place] for place in more]), self.edge_px)
+            xy_px[ids] = refine_corners(gray, np.array([placed[place] for place in more]), self.edge_px)
         return xy_px
 
 
@@ -69,11 +70,10 @@ class SaddlePoints:
     hessian: Points
 
 
-def find_saddles(bgr: NDArray[np.uint8], edge_px: float) -> SaddlePoints:
+def find_saddles(gray: Gray, edge_px: float) -> SaddlePoints:
     """The strong local maxima of the negative Hessian determinant of the smoothed brightness."""
     import cv2
 
-    gray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)
     smooth = cv2.GaussianBlur(gray, (0, 0), max(SMOOTHING_EDGES * edge_px, 1.0))
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
     response = xy * xy - xx * yy

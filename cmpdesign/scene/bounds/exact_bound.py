@@ -1,9 +1,10 @@
 """The exact Cramer-Rao bound of a scene, from derivatives of its rendered image.
 
 ``gridline_bound.cramer_rao`` treats every gridline as isolated. This module needs no such assumption: it renders the
-image's derivative with respect to every marker (central differences). The Fisher matrix is the derivatives' Gram matrix
-over the noise's variance. Markers far from each other are shifted in the same rendering, so a few dozen renderings are
-sufficient for any pattern.
+encoded image's derivative with respect to every marker (central differences of 16-bit images with the scene's
+response). The noise is that of the encoded image, so the Fisher matrix is the derivatives' Gram matrix over its
+variance. Markers far from each other are shifted in the same rendering, so a few dozen renderings are sufficient for
+any pattern.
 """
 
 from __future__ import annotations
@@ -13,10 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.scene.bounds.gridline_bound import marker_covariances
+from cmpdesign.scene.bounds.gridline_bound import marker_covariances, noisy_sensor
 from cmpdesign.scene.drawing.render import render, render_truth
 from cmpdesign.scene.drawing.view import single_view
-from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
 
@@ -28,8 +28,8 @@ REACH_SIGMA = 5.0  # of the blur, around the cells of a marker
 def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
     """The smallest covariance (M, 2, 2) px^2 of an unbiased estimate of the markers; NaN where not visible.
 
-    A gridline moves with its two markers and keeps its curvature. Inks, light and blur are assumed to be known. Gamma,
-    JPEG and quantisation are neglected.
+    A gridline moves with its two markers and keeps its curvature. Inks, light, blur and response are assumed to be
+    known. Clipped pixels tell nothing. JPEG and quantisation are neglected.
 
     Args:
         scene: a scene with noise and one view.
@@ -40,10 +40,8 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     """
     from scipy.sparse import coo_array
 
-    noise = scene.sensor.noise if scene.sensor else 0.0
-    if noise <= 0:
-        raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
-    clean = replace(scene, sensor=Sensor(bits=16))
+    sensor = noisy_sensor(scene)
+    clean = replace(scene, sensor=Sensor(bits=16, response=sensor.response))
     truth = render_truth(scene, size=size)
     markers = len(truth.visible)
     groups = _separated_groups(scene.layout.edges, markers)
@@ -61,7 +59,7 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
                 y, x, channel = np.nonzero(part)
                 rows.append(((y + low[1]) * size[0] + x + low[0]) * 3 + channel)
                 columns.append(np.full(len(x), 2 * marker + axis))
-                values.append(part[y, x, channel] / noise)
+                values.append(part[y, x, channel] / sensor.noise)
     jacobian = coo_array(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
         shape=(size[0] * size[1] * 3, 2 * markers),

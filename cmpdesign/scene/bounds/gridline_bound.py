@@ -1,8 +1,10 @@
 """The Cramer-Rao bound of a scene: the smallest possible covariance of marker positions, gridline by gridline.
 
-A gridline of contrast A (norm over the channels), blur s and pixel noise sigma has the Fisher information
-A^2 / (2 sqrt(pi) s sigma^2) per pixel of its length about its offset along its normal: the integral of the
-squared derivative of a Gaussian edge, over sigma^2; s^2 = blur^2 + 1/12 adds the pixel's box. A
+A gridline between the light a and b of a channel, blur s and pixel noise sigma has the Fisher information
+(b - a)^2 / (s sigma^2) times the integral of (v'(a + (b - a) Phi(u)) phi(u))^2 over u, per pixel of its length about
+its offset along its normal: the integral of the squared derivative of an encoded Gaussian edge, over sigma^2. v' is the
+derivative of the value by light, which the sensor's response gives; s^2 = blur^2 + 1/12 adds the pixel's box. Channels
+add up. With a linear response this is A^2 / (2 sqrt(pi) s sigma^2), A the norm of the contrast over the channels. A
 gridline is straight between its two markers, so a point at the fraction t moves with the weights 1 - t and
 t. All gridlines together give a sparse information matrix; the diagonal blocks of its inverse bound every
 marker's covariance.
@@ -25,19 +27,22 @@ from cmpdesign.scene.drawing.render import missing_cell_mask, render_truth
 from cmpdesign.scene.drawing.view import single_view
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.light import light_gain
+from cmpdesign.scene.parts.sensor import Sensor, encoding_slope
 from cmpdesign.scene.scene import Scene
 from cmpdesign.scene.truth import Truth
+from extractor.image.response import decode_values
 
 # Without information about a marker the matrix would be singular: a prior with a deviation of 1000 px prevents this.
 PRIOR_PER_PX2 = 1e-6
 SOLVED_AT_ONCE = 512  # markers, to limit memory
+PROFILE_REACH, PROFILE_NODES = 6.0, 241  # of the integral along the normal, in sigma and points
 
 
 def cramer_rao(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[np.float64]:
     """The smallest covariance (M, 2, 2) px^2 that an unbiased estimate of the markers can have.
 
-    The bound uses the scene's inks, light, blur, noise, missing cells and true positions. Gamma, JPEG, quantisation and
-    the bending of gridlines are neglected. NaN for markers that are not visible.
+    The bound uses the scene's inks, light, blur, response, noise, missing cells and true positions. JPEG, quantisation,
+    saturation by noise and the bending of gridlines are neglected. NaN for markers that are not visible.
 
     Args:
         scene: a scene with noise and one view.
@@ -58,36 +63,65 @@ def edge_information(scene: Scene, truth: Truth, size: tuple[int, int]) -> Any:
         SceneError: the scene has no noise, or several views.
     """
     area = single_view(scene, size).area
-    noise = scene.sensor.noise if scene.sensor else 0.0
-    if noise <= 0:
-        raise SceneError(f"the sensor's noise is {noise:g}; a bound needs noise above 0 8-bit steps")
+    sensor = noisy_sensor(scene)
     ends = truth.marker_xy_px[scene.layout.edges]
     spread = np.sqrt(scene.blur_px**2 + 1 / 12)
-    contrast_squared = _contrast_squared(scene, ends.mean(axis=1), size)
-    per_px = contrast_squared / (2 * np.sqrt(np.pi) * spread * noise**2)
+    light = _light_beside_edges(scene, ends.mean(axis=1), size)
+    per_px = _profile_information(sensor, light) / (spread * sensor.noise**2)
     return _sum_information(scene.layout.edges, ends, per_px, area, len(truth.marker_xy_px))
 
 
-def _contrast_squared(
+def noisy_sensor(scene: Scene) -> Sensor:
+    """The scene's sensor.
+
+    Raises:
+        SceneError: the sensor has no noise.
+    """
+    sensor = scene.sensor or Sensor()
+    if sensor.noise <= 0:
+        raise SceneError(f"the sensor's noise is {sensor.noise:g}; a bound needs noise above 0 8-bit steps")
+    return sensor
+
+
+def _profile_information(sensor: Sensor, light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(E,): the integral of the squared derivative of each edge's encoded profile, for blur 1 and noise 1.
+
+    Args:
+        sensor: the sensor.
+        light: (E, 2, C) light on both sides.
+    """
+    from scipy.special import ndtr
+
+    along_normal = np.linspace(-PROFILE_REACH, PROFILE_REACH, PROFILE_NODES)
+    density = np.exp(-(along_normal**2)) / (2 * np.pi)
+    start, contrast = light[:, 0, :, None], (light[:, 1] - light[:, 0])[..., None]
+    slope = encoding_slope(sensor, start + contrast * ndtr(along_normal))
+    step = along_normal[1] - along_normal[0]
+    return np.asarray(np.sum((contrast * slope) ** 2 * density, axis=(1, 2)) * step)
+
+
+def _light_beside_edges(
     scene: Scene, middle_px: NDArray[np.float64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """(E,): squared difference of the colors on both sides of each edge, under the light at the edge's middle."""
-    layout = scene.layout
+    """(E, 2, 3): the light B, G, R on both sides of each edge, with the gain at the edge's middle."""
+    layout, light_of_values = scene.layout, (scene.sensor or Sensor()).light_of_values()
     color = np.where(missing_cell_mask(scene), BLACK, layout.cell_color)
-    over_black = np.array([np.subtract(scene.ink(c)[::-1], scene.ink(BLACK)[::-1]) for c in color])
+    cell_light = decode_values(
+        np.array([scene.ink(c)[::-1] for c in color], dtype=np.float64), light_of_values
+    )
     corners = layout.cell_corners.astype(np.int64)
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
     markers = len(layout.marker_xy_mm)
     edge_key = layout.edges[:, 0].astype(np.int64) * markers + layout.edges[:, 1]
     edge = np.searchsorted(edge_key, sides.min(axis=1) * markers + sides.max(axis=1))
     # The corners of an edge's two cells run along it in opposite directions. Beyond the rim there is black.
-    sign = np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0)[:, None]
-    difference = np.zeros((len(edge_key), 3))
-    np.add.at(difference, edge, sign * np.repeat(over_black, corners.shape[1], axis=0))
+    black = decode_values(np.array(scene.ink(BLACK)[::-1], dtype=np.float64), light_of_values)
+    light = np.tile(black, (len(edge_key), 2, 1))
+    light[edge, np.where(sides[:, 0] < sides[:, 1], 1, 0)] = np.repeat(cell_light, corners.shape[1], axis=0)
     if scene.light:
         x, y = np.clip(np.rint(middle_px), 0, np.asarray(size) - 1).astype(np.int64).T
-        difference = difference * light_gain(scene.light, size)[:, y, x].T
-    return np.asarray(np.sum(difference**2, axis=1))
+        light = light * light_gain(scene.light, size)[:, y, x].T[:, None]
+    return light
 
 
 def _sum_information(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.plain import pitch_mm
 from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
+from cmpdesign.scene.drawing.encoding import encode_planes
 from cmpdesign.scene.drawing.occlusion import update_hidden_parts
 from cmpdesign.scene.drawing.paths import join_segments, project_polygons
 from cmpdesign.scene.drawing.view import SceneView, scene_views
@@ -61,7 +62,8 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
         planes = planes * light_gain(scene.light, size)
     for glare in scene.damage.glare if scene.damage else ():
         planes = planes + glare.plane(size)
-    image = expose_sensor(scene.sensor or Sensor(), planes, _noise_rng(scene))
+    sensor = scene.sensor or Sensor()
+    image = expose_sensor(sensor, encode_planes(sensor, planes, engine), _noise_rng(scene))
     warnings = (*scene.warnings, *(view.warning for view in views if view.occlusion))
     return Rendered(image, _make_truth(scene, views, missing), warnings)
 

@@ -39,6 +39,7 @@ LOOKING_KEYS = (
     "back",
 )
 BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
+MUST_BE = "; it must be "  # between a value and the type that it must have
 # A key frame's value is a number, or a position as [x, y] or [x, y, z].
 Value = float | tuple[float, ...]
 
@@ -211,9 +212,8 @@ def _validate_table(model: type, table: Mapping[str, Any], where: str) -> Any:
         # Strict validation of JSON accepts lists for tuples and tables for dataclasses, but no texts for numbers.
         return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        # pydantic reports a value once for each type that does not fit.
-        messages = dict.fromkeys(_error_message(item, model, where) for item in error.errors())
-        raise SceneError("; ".join(messages)) from None
+        messages = [_error_message(item, model, where) for item in error.errors()]
+        raise SceneError("; ".join(_join_alternatives(messages))) from None
 
 
 def _error_message(item: Any, model: type, where: str) -> str:
@@ -237,7 +237,19 @@ def _error_message(item: Any, model: type, where: str) -> str:
     unit = next((f" in {unit}" for unit in ("mm", "deg", "px") if key.endswith(f"_{unit}")), "")
     text = text.replace("an object", "a table").replace("a valid array", "a list")
     shown = "a table" if isinstance(item["input"], dict) else json.dumps(item["input"])
-    return f"{table}{key} is {shown}; it must be {text}{unit}"
+    return f"{table}{key} is {shown}{MUST_BE}{text}{unit}"
+
+
+def _join_alternatives(messages: list[str]) -> list[str]:
+    """One message a value: pydantic reports a value once for each type that does not fit."""
+    wanted: dict[str, list[str]] = {}
+    for message in messages:
+        value, _, type_text = message.partition(MUST_BE)
+        wanted.setdefault(value, []).append(type_text)
+    return [
+        value + (MUST_BE + " or ".join(dict.fromkeys(texts)) if any(texts) else "")
+        for value, texts in wanted.items()
+    ]
 
 
 def _is_type_name(part: int | str) -> bool:

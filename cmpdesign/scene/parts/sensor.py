@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.scene.errors import STRICT, SceneError
-from extractor.image.response import encode_light, light_of_values
+from extractor.image.response import light_of_values
 
 Depth = TypeVar("Depth", np.uint8, np.uint16)
 
@@ -53,15 +53,20 @@ class Sensor:
         return light_of_values(self.response)
 
 
+def encoding_slope(sensor: Sensor, light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The derivative of the value by light, of any array of light (0 to 255); 0 where the sensor clips."""
+    light_of_value = sensor.light_of_values()
+    step = np.clip(np.searchsorted(light_of_value, light, side="right") - 1, 0, len(light_of_value) - 2)
+    slope = 1.0 / np.diff(light_of_value)[step]
+    return np.where((light < 0) | (light > light_of_value[-1]), 0.0, slope)
+
+
 def expose_sensor(
-    sensor: Sensor, planes: NDArray[np.float32], rng: np.random.Generator
+    sensor: Sensor, values: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """The image (H, W, 3) of light (3, H, W) float32, 0 to 255, channels B, G, R; uint8 or uint16."""
-    values = planes
-    if sensor.response != "linear":
-        values = encode_light(planes, sensor.light_of_values()).astype(np.float32)
+    """The image (H, W, 3) of encoded values (3, H, W) float32, 0 to 255, channels B, G, R; uint8 or uint16."""
     if sensor.noise:
-        noise = rng.standard_normal(planes.shape, dtype=np.float32)
+        noise = rng.standard_normal(values.shape, dtype=np.float32)
         noise *= np.float32(sensor.noise)
         values = noise + values
     if sensor.bits == 16:

@@ -59,6 +59,18 @@ def test_render_is_seeded(made: Path, tmp_path: Path) -> None:
     assert rendered(1) == rendered(1) != rendered(2)
 
 
+def test_render_takes_a_response(made: Path, tmp_path: Path) -> None:
+    def rendered(*options: object) -> np.ndarray:
+        assert run("render", made / "layout.json", "-o", tmp_path / "a.png", *options).exit_code == 0
+        return np.asarray(cv2.imread(str(tmp_path / "a.png")), dtype=float)
+
+    usual, linear, power = (rendered("--response", text) for text in ("srgb", "linear", "2.2"))
+    np.testing.assert_array_equal(rendered(), usual)
+    # blurred edges are brighter once encoded; most pixels lie inside cells and do not differ
+    assert usual.mean() > linear.mean() + 0.3 and np.median(np.abs(usual - linear)) == 0
+    assert 0 < np.abs(usual - power).max() < np.abs(usual - linear).max()
+
+
 @pytest.mark.parametrize(
     ("option", "value", "expected"),
     [
@@ -69,6 +81,9 @@ def test_render_is_seeded(made: Path, tmp_path: Path) -> None:
         ("--blur", "-1", "blur_px is -1"),
         ("--noise", "-1", "noise is -1"),
         ("--press", "50", "fold"),
+        ("--response", "rec709", "--response rec709: expected srgb, linear or an exponent from 0.2 to 5"),
+        ("--response", "9", "response is the exponent 9; it must lie between 0.2 and 5"),
+        ("--response", "nan", "response is the exponent nan; it must lie"),
         ("--size", "640", "expected WIDTHxHEIGHT"),
         ("--truth", "missing/truth.npz", "missing/truth.npz"),
     ],

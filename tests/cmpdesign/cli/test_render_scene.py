@@ -74,6 +74,7 @@ def test_the_command_refuses_what_does_not_fit(run: Callable[..., tuple[int, str
         (odd, ("-o", tmp_path / "a.mp4"), "an .mp4 has even sides"),
         (deep, ("-o", tmp_path / "a.avi"), "a video has 8 bits, the sensor 16"),
         (still, ("-o", tmp_path / "a.png", "--pitch", 30), "--pitch has no place beside --scene"),
+        (still, ("-o", tmp_path / "a.png", "--response", "linear"), "write [sensor] response into the file"),
         (still, ("-o", tmp_path / "a.png", "--front"), "--front or --mirrored has no place"),
     ):
         code, said = run(text, *words)

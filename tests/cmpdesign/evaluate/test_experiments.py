@@ -191,6 +191,20 @@ def test_conditions_stay_in_their_ranges() -> None:
     assert mean_conditions(ranges).damage is None and mean_conditions(ranges).blur_px == pytest.approx(1.2)
 
 
+def test_pictures_and_the_square_readers_have_the_sensors_response() -> None:
+    """Read by its own response, a linear camera's picture gives what an sRGB camera's gives."""
+    rms, brightness = {}, {}
+    for response in ("srgb", "linear"):
+        text = small_sensor_text().replace('response = "srgb"', f'response = "{response}"')
+        one = instrument_for_method(text, "square")
+        seen = one.picture(mean_conditions(one.sensor.table.conditions), 0)
+        errors = [m.xy_px - xy for m, xy in zip(one.read(seen.image), seen.truth.marker_xy_px, strict=True)]
+        rms[response] = float(np.sqrt(np.nanmean(np.square(errors))))
+        brightness[response] = np.mean(seen.image)
+    assert brightness["srgb"] > brightness["linear"] + 2
+    assert rms["srgb"] == pytest.approx(rms["linear"], rel=0.1)
+
+
 def test_what_counts_as_successful() -> None:
     """All markers right; one lost; one wrong far away from the contact."""
     one = instrument_for_method(small_sensor_text(), "square")
@@ -231,6 +245,8 @@ def test_rest_poses_are_those_of_the_sensor() -> None:
         (("size_px = [640, 360]", ""), "size_px"),
         (("focal_px = [900.0, 900.0]", "focal_px = [900.0, 0.0]"), "focal_px"),
         (("friction = 0.8", "friction = 0.8\nstickiness = 1"), "stickiness"),
+        (('response = "srgb"', 'response = "rec709"'), "response is 'rec709'; give 'srgb', 'linear'"),
+        (('response = "srgb"', "response = 9"), "response is the exponent 9; it must lie between 0.2 and 5"),
     ],
 )
 def test_a_bad_sensor_is_one_clear_line(change: tuple[str, str], message: str) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -45,6 +48,17 @@ def test_every_marker_is_found_to_a_fraction_of_a_pixel(
     image, truth = seen(turn_deg, mirrored)
     error = away(reader(kind, mirrored).read(image), truth)
     assert np.isfinite(error).all() and np.sqrt(np.mean(error**2)) < 0.2
+
+
+@pytest.mark.parametrize("response", ["srgb", 2.2])
+def test_corners_are_refined_in_light(response: Literal["srgb"] | float) -> None:
+    """Refined in values, the corners of the rim and of the reference cell are off by twice as much and more."""
+    image, truth = seen(20, sensor=Sensor(noise=2.0, response=response))
+    light, values = (
+        np.sqrt(np.mean(away(replace(reader(), response=known).read(image), truth) ** 2))
+        for known in (response, "linear")
+    )
+    assert light < 0.5 * values
 
 
 @pytest.mark.parametrize("turn_deg", [52, 90, -60])

@@ -54,10 +54,10 @@ def test_its_error_is_a_few_ten_thousandths_of_a_pixel(
 def test_the_comparison_sees_a_hundredth_of_a_pixel() -> None:
     flat = scene("flat")
     moved = replace(flat, camera=Camera(20, 7.3, centre_px=(99.5 + 0.01, 79.5)))
-    clean = replace(flat, sensor=Sensor(bits=16), optics=Optics(1.0))
+    clean = replace(flat, sensor=Sensor(bits=16, response="linear"), optics=Optics(1.0))
     view = scene_views(clean, SIZE)[0]
     here = reference_image(clean, view, WINDOW)
-    drawn = render(replace(moved, sensor=Sensor(bits=16), optics=Optics(1.0)), size=SIZE).image
+    drawn = render(replace(moved, sensor=clean.sensor, optics=Optics(1.0)), size=SIZE).image
     there = drawn[50:110, 70:130]
     assert np.abs(there / 257 - here).max() > 0.3
     shifts = fit_edge_offsets(there / 257 - here, here, clean.layout, view, WINDOW)

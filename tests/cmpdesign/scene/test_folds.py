@@ -20,6 +20,7 @@ from cmpdesign.scene import (
     Pinhole,
     Scene,
     SceneError,
+    Sensor,
     composed,
     render,
     standard_layout,
@@ -39,7 +40,12 @@ def steep() -> Scene:
     camera = Pinhole.looking(
         SIZE, distance_mm=12, field_of_view_deg=24, tilt_deg=55, azimuth_deg=30, back=True
     )
-    return Scene(standard_layout(layers=3), camera, composed(Dent(0.5, 1.1, (0.3, 0.4))))
+    return Scene(
+        standard_layout(layers=3),
+        camera,
+        composed(Dent(0.5, 1.1, (0.3, 0.4))),
+        sensor=Sensor(response="linear"),
+    )
 
 
 def depth_buffer(scene: Scene) -> tuple[NDArray[np.float64], Points]:

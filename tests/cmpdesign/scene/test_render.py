@@ -54,9 +54,9 @@ def layout() -> Layout:
 
 @pytest.fixture(scope="module")
 def small(layout: Layout) -> Scene:
-    """Large cells, 16 bits, no noise: what is measured on it is the renderer's own error."""
+    """Large cells, 16 bits of light, no noise: what is measured on it is the renderer's own error."""
     camera = Camera(pitch_px=60, rotation_deg=3)
-    return Scene(layout, camera, optics=Optics(1.0), sensor=Sensor(bits=16), inks=INKS)
+    return Scene(layout, camera, optics=Optics(1.0), sensor=Sensor(bits=16, response="linear"), inks=INKS)
 
 
 def edge_on_rows(image: NDArray[np.uint16], at: Points, reach: int) -> Points:
@@ -263,7 +263,9 @@ def test_presses_move_as_far_as_they_say() -> None:
 
 
 def test_light_multiplies_each_channel(small: Scene) -> None:
-    paper = replace(small, sensor=None, background=Plain((100, 100, 100)), camera=Camera(5))
+    paper = replace(
+        small, sensor=Sensor(response="linear"), background=Plain((100, 100, 100)), camera=Camera(5)
+    )
     warm = render(replace(paper, light=Light(rgb=(1.2, 1.0, 0.5))), size=SIZE).image
     np.testing.assert_array_equal(warm[5, 5], (50, 100, 120))
     slope = render(replace(paper, light=Light(gradient=(0.5, 0.2))), size=SIZE).image[..., 0]
@@ -291,9 +293,6 @@ def test_the_sensor_adds_what_it_says(small: Scene) -> None:
     grey = replace(small, background=Plain((128, 128, 128)), camera=Camera(1), optics=None)
     noisy = render(replace(grey, sensor=Sensor(noise=4)), size=SIZE).image[:100]
     assert noisy.std() == pytest.approx(4, rel=0.02) and noisy.mean() == pytest.approx(128, abs=0.1)
-    assert render(replace(grey, sensor=Sensor(gamma=0.5)), size=SIZE).image[0, 0, 0] == round(
-        255 * (128 / 255) ** 0.5
-    )
     sixteen = render(replace(grey, sensor=Sensor(bits=16)), size=SIZE).image
     assert sixteen.dtype == np.uint16 and sixteen[0, 0, 0] == 128 * 257
     rough = render(replace(small, sensor=Sensor(jpeg_quality=20)), size=SIZE).image.astype(int)

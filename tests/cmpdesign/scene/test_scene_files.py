@@ -82,6 +82,7 @@ def test_a_file_says_what_python_says(written, layout: Layout, tmp_path: Path) -
         blur_px = 0.8
         [sensor]
         noise = 2
+        response = 2.2
         [damage]
         missing_cells = [3]
         [inks]
@@ -95,7 +96,7 @@ def test_a_file_says_what_python_says(written, layout: Layout, tmp_path: Path) -
         composed(Twist(2, 9), Dent(1, 0.3)),
         background=Gradient(angle_deg=70),
         optics=Optics(0.8),
-        sensor=Sensor(noise=2),
+        sensor=Sensor(noise=2, response=2.2),
         damage=Damage(missing_cells=(3,)),
         inks={"red": (255, 0, 0), "white": (200, 210, 220)},
         seed=4,
@@ -154,6 +155,17 @@ def test_a_picture_lies_beside_the_file(written, tmp_path: Path) -> None:  # typ
         ("seed = -1", "seed is -1"),
         ("[sensor]\nbits = 8.0", r"\[sensor\] bits is 8.0; it must be a valid integer"),
         ("[sensor]\nbits = 12", r"\[sensor\] bits is 12; it must be 8 or 16"),
+        (
+            '[sensor]\nresponse = "rec709"',
+            r"response is \"rec709\"; it must be 'srgb' or 'linear' or a valid number or a list$",
+        ),
+        ("[sensor]\nresponse = 9", r"\[sensor\] response is the exponent 9; it must lie between 0.2 and 5"),
+        ("[sensor]\nresponse = [0, 9]", r"\[sensor\] response is a table of shape \(2,\); give 256 values"),
+        (
+            f"[sensor]\nresponse = {[0.5] * 256}",
+            r"does not rise from value 0 \(0.5\) to the next \(0.5\); each value must",
+        ),
+        ("[sensor]\ngamma = 2.2", r"\[sensor\] gamma is unknown; there are noise, response, bits"),
         ('[background]\nkind = "papr"', r"kind is 'papr' \(did you mean paper\?\)"),
         ('[background]\nkind = "paper"\ngrain = true', r"\[background\] grain is true"),
         (
@@ -357,11 +369,14 @@ def test_parts_that_do_nothing_change_no_byte(written: Callable[..., SceneFile])
     def image(text: str) -> bytes:
         return render(written(plain + text).scene(), size=SIZE).image.tobytes()
 
-    idle = (
-        "[light]\nvignetting = 0\n[damage]\nbleed_mm = 0\nmissing_share = 0\n[sensor]\nnoise = 0\ngamma = 1"
-    )
+    idle = "[light]\nvignetting = 0\n[damage]\nbleed_mm = 0\nmissing_share = 0\n[sensor]\nnoise = 0\nresponse = 'srgb'"
     assert image("") == image(idle)
-    for part in ("[light]\nvignetting = 0.1", "[damage]\nbleed_mm = 0.05", "[damage]\nmissing_share = 0.1"):
+    light, bleed, missing = (
+        "[light]\nvignetting = 0.1",
+        "[damage]\nbleed_mm = 0.05",
+        "[damage]\nmissing_share = 0.1",
+    )
+    for part in (light, bleed, missing, "[sensor]\nresponse = 'linear'", "[sensor]\nresponse = 2.2"):
         assert image("") != image(part)
 
 
