@@ -19,7 +19,7 @@ from benchmarks.suites.scoring.score import (
     shortest_edges,
     wrong_markers,
 )
-from benchmarks.suites.scoring.squares import PictureSquares, picture_squares
+from benchmarks.suites.scoring.squares import PictureSquares, nearest_truth, picture_squares
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
 from benchmarks.suites.stress.frames import CaseImage, cached_layout, plain_frame
 from benchmarks.suites.stress.kinds import StressCase, make_frame
@@ -113,7 +113,7 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         return CaseReading(failed, shot, None)
     score = score_markers(markers, shot, promised=kind.promised)
     reason = str(markers.reason) if markers.reason else ""
-    squares = picture_squares(markers, find_wrong_markers(shot, markers)[1]) if shot.scene else {}
+    squares = picture_squares(markers, nearest_truth(markers, shot.truths)) if shot.truths else {}
     result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False, squares)
     return CaseReading(result, shot, markers)
 
