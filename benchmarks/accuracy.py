@@ -4,8 +4,9 @@
 
 Standard scene (640 x 480 px, 11 layers, edges of 20 px, turned by 7.3 degrees, blur 1 px, sRGB, noise 2/255) unless a
 row says otherwise; inks, blur and noise are not given to the extractor. Errors are RMS per axis; the bound is the exact
-Cramer-Rao bound of the same sRGB picture and markers. "inner" are the markers with all their gridlines. The normalised
-error is that over the covariance, RMS: 1 is ideal.
+Cramer-Rao bound of the same sRGB picture and markers. "inner" are the markers with all their gridlines. z is the RMS
+error over the stated covariance per axis: 1 is right. The calibration of all markers and virtual markers follows each
+table.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,13 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.suites.scoring.calibration import calibration_head, squared_distances, summarise
+from benchmarks.suites.scoring.squares import (
+    PictureSquares,
+    calibration_lines,
+    calibrations_by_position,
+    picture_squares,
+)
 from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.published import write_published
 from benchmarks.support.scenes import (
@@ -55,14 +63,17 @@ GROUPS: dict[str, tuple[SceneCase, ...]] = {
     "pitch": tuple(SceneCase(pitch_px=pitch, layers=layers) for pitch, layers in PITCHES),
 }
 COLUMNS = (
-    "case", "preset", "found", "wrong", "inner px", "/ bound", "all px", "/ bound", "bias px", "normalised",
+    "case", "preset", "found", "wrong", "inner px", "/ bound", "all px", "/ bound", "bias px", "inner z",
     "refine ms",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class AccuracyResult:
-    """A preset on a case, over all noise seeds; see the module. ``wrong``: error above 0.3 of the shortest edge."""
+    """A preset on a case, over all noise seeds; see the module. ``wrong``: error above 0.3 of the shortest edge.
+
+    ``z`` is of the inner markers.
+    """
 
     group: str
     case: str
@@ -74,8 +85,16 @@ class AccuracyResult:
     all_px: float
     all_bound_px: float
     bias_px: float
-    normalised: float
+    z: float
     refine_ms: float
+
+
+@dataclass(frozen=True)
+class MeasuredCase:
+    """A preset's result on a case, and its errors over covariances, one entry per noise seed."""
+
+    result: AccuracyResult
+    squares: tuple[PictureSquares, ...]
 
 
 def case_name(group: str, case: SceneCase) -> str:
@@ -85,7 +104,7 @@ def case_name(group: str, case: SceneCase) -> str:
     return value[group]
 
 
-def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyResult]:
+def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCase]:
     """All presets on the same images."""
     scene = case.scene()
     inner = inner_markers(scene.layout)
@@ -99,17 +118,20 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[AccuracyRe
         errors = np.array([markers.xy_px for markers in read]) - true
         wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
         found = np.isfinite(errors[..., 0]) & visible
-        squares = np.full(found.shape, np.nan)
-        inverse = np.linalg.inv(np.array([markers.cov_px2 for markers in read])[found])
-        squares[found] = np.einsum("ni,nij,nj->n", errors[found], inverse, errors[found]) / 2
         good = found & inner
-        yield AccuracyResult(
+        inner_d2 = [
+            squared_distances(error[chosen], markers.cov_px2[chosen])
+            for error, markers, chosen in zip(errors, read, good, strict=True)
+        ]
+        result = AccuracyResult(
             group, case_name(group, case), preset, float(found[:, visible].mean()), int((wrong & found).sum()),
             rms(errors[good]), bounds[0], rms(errors[found]), bounds[1],
             float(abs(errors[good].mean(axis=0)).max()) if good.any() else float("nan"),
-            float(np.sqrt(np.mean(squares[good]))) if good.any() else float("nan"),
+            summarise(inner_d2).z.value,
             float(np.min([markers.timings_ms.get("refine", np.nan) for markers in read])),
         )  # fmt: skip
+        truths = [picture.truth for picture in rendered]
+        yield MeasuredCase(result, tuple(map(picture_squares, read, truths)))
 
 
 def rms(errors: NDArray[np.float64]) -> float:
@@ -125,14 +147,28 @@ def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
         shown.add_row(
             r.case, r.preset, f"{r.found_share:.1%}", str(r.wrong), f"{r.inner_px:.4f}",
             f"{r.inner_px / r.inner_bound_px:.2f}", f"{r.all_px:.4f}", f"{r.all_px / r.all_bound_px:.2f}",
-            f"{r.bias_px:.4f}", f"{r.normalised:.2f}", f"{r.refine_ms:.1f}",
+            f"{r.bias_px:.4f}", f"{r.z:.2f}", f"{r.refine_ms:.1f}",
         )  # fmt: skip
     return shown
 
 
+def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[PictureSquares]]:
+    """The squares of all cases' pictures by preset."""
+    return {
+        preset: [squares for case in measured if case.result.preset == preset for squares in case.squares]
+        for preset in PRESETS
+    }
+
+
+def calibration_text(squares: Mapping[str, Sequence[PictureSquares]]) -> str:
+    """The calibration of all markers and virtual markers, one line per preset and status."""
+    lines = [line for preset, pictures in squares.items() for line in calibration_lines(preset, pictures)]
+    return "\n".join([calibration_head("errors over covariances"), *lines, ""])
+
+
 def markdown(results: Sequence[AccuracyResult]) -> str:
-    """One row per case, columns per preset: error over the bound, and the normalised error."""
-    head = " | ".join(f"{preset}: of the bound | normalised" for preset in PRESETS)
+    """One row per case, columns per preset: error over the bound, and z."""
+    head = " | ".join(f"{preset}: of the bound | z" for preset in PRESETS)
     lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
     for name in dict.fromkeys(r.case for r in results):
         by_preset: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
@@ -140,7 +176,7 @@ def markdown(results: Sequence[AccuracyResult]) -> str:
         for preset in PRESETS:
             cells += [
                 f"{by_preset[preset].inner_px / by_preset[preset].inner_bound_px:.2f}",
-                f"{by_preset[preset].normalised:.2f}",
+                f"{by_preset[preset].z:.2f}",
             ]
         lines.append(f"| {' | '.join(cells)} | {by_preset['accurate'].bias_px:.4f} |")
     return "\n".join(lines)
@@ -167,12 +203,25 @@ def main(arguments: list[str] | None = None) -> int:
     terminal = Console()
     console = terminal if terminal.is_terminal else Console(width=130)  # a pipe has no width
     results: list[AccuracyResult] = []
+    calibrations: dict[str, Any] = {}
     for group, cases in GROUPS.items():
-        of_group = [result for case in cases for result in measure_case(group, case, seeds)]
-        console.print(results_table(f"{group}; sRGB pictures, {seeds} noises", of_group))
-        results += of_group
+        of_group = [measured for case in cases for measured in measure_case(group, case, seeds)]
+        results += [measured.result for measured in of_group]
+        console.print(
+            results_table(
+                f"{group}; sRGB pictures, {seeds} noises", [measured.result for measured in of_group]
+            )
+        )
+        squares = squares_by_preset(of_group)
+        console.print(calibration_text(squares), highlight=False, soft_wrap=True)
+        calibrations[group] = {
+            preset: {name: asdict(found) for name, found in calibrations_by_position(pictures).items()}
+            for preset, pictures in squares.items()
+        }
     console.print(conditions_text(), style="dim", soft_wrap=True)
-    found: dict[str, Any] = {"seeds": seeds, "results": [asdict(result) for result in results]}
+    found: dict[str, Any] = {
+        "seeds": seeds, "results": [asdict(result) for result in results], "calibration": calibrations,
+    }  # fmt: skip
     if options.json:
         write_json(options.json, found)
     if options.publish:

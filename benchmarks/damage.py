@@ -16,12 +16,13 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scoring.calibration import Calibration, calibration_head, calibration_line
 from benchmarks.suites.scoring.reading import (
     CaseResult,
     draw_overlay,
@@ -31,12 +32,15 @@ from benchmarks.suites.scoring.reading import (
     warm_up,
 )
 from benchmarks.suites.scoring.report import result_line
+from benchmarks.suites.scoring.squares import calibrations_by_position
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage
 from benchmarks.suites.stress.kinds import StressCase
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
+from benchmarks.support.machine import null_for_nan
 from extractor import Markers
 
 IMAGES, SEED = 2100, 5000
+NAME_WIDTH = 48  # of a kind and a status
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class DamageTotal:
         lost: visible and not reported.
         sure, kept: see ``MarkerScore``; only of images with markers.
         seeds: names of the images with wrong markers, and the numbers of these.
+        calibrations: errors over stated covariances, by how positions were found.
     """
 
     kind: str
@@ -73,6 +78,7 @@ class DamageTotal:
     sure: int
     kept: int
     seeds: tuple[tuple[str, int], ...]
+    calibrations: dict[str, Calibration]
 
 
 def sample_cases(images: int, seed: int) -> list[StressCase]:
@@ -158,6 +164,7 @@ def total_of_kind(kind: str, entries: Sequence[DamageResult]) -> DamageTotal:
         sure=sum(entry.sure for entry in read_in),
         kept=sum(entry.kept for entry in read_in),
         seeds=tuple((case_name(entry.case), entry.score.wrong) for entry in results if entry.score.wrong),
+        calibrations=calibrations_by_position([entry.squares for entry in results]),
     )
 
 
@@ -191,6 +198,16 @@ def totals_table(rows: Sequence[DamageTotal]) -> str:
     return "\n".join(lines)
 
 
+def calibration_table(rows: Sequence[DamageTotal]) -> str:
+    """Errors over stated covariances, by kind and by how positions were found."""
+    lines = [
+        calibration_line(f"{row.kind}: {position}", calibration, NAME_WIDTH)
+        for row in rows
+        for position, calibration in row.calibrations.items()
+    ]
+    return "\n".join([calibration_head("errors over covariances", NAME_WIDTH), *lines])
+
+
 def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
     """Read one image in this process, print its wrong markers, and write the image with its overlay."""
     import cv2
@@ -212,7 +229,9 @@ def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
 def write_json(rows: Sequence[DamageTotal], path: Path) -> None:
     """Write every row as an object."""
     partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps([row.__dict__ for row in rows], indent=1) + "\n", encoding="utf-8")
+    partial.write_text(
+        json.dumps([null_for_nan(asdict(row)) for row in rows], indent=1) + "\n", encoding="utf-8"
+    )
     partial.replace(path)
 
 
@@ -235,6 +254,7 @@ def main(arguments: list[str] | None = None) -> int:
     started = time.perf_counter()
     rows = totals_by_kind(with_progress(sample_cases(options.images, options.seed), options.processes))
     print(totals_table(rows))
+    print(calibration_table(rows))
     last = options.seed + options.images - 1
     print(f"{options.images} images, seeds {options.seed} to {last}; {time.perf_counter() - started:.0f} s")
     if options.json:

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from benchmarks.suites.scoring.reading import CaseResult, draw_overlay, notable_lines, read_case, warm_up
 from benchmarks.suites.scoring.report import (
+    calibration_table,
     condition_rows,
     failure_lines,
     plot_conditions,
@@ -115,6 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.table or not options.quick:
         print(results_table(rows))
     print("\n".join(failure_lines(rows)))
+    print(calibration_table(results))
     print(f"{summary_text(rows)}; {len(BY_NAME)} kinds; {time.perf_counter() - started:.0f} s")
     if options.json:
         write_json(rows, options.json)

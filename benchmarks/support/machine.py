@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 from collections.abc import Mapping
@@ -42,10 +43,20 @@ def conditions_text(conditions: Mapping[str, str] | None = None) -> str:
     return f"{conditions['cpu']}; {conditions['system']}; Python {conditions['python']}, {packages}"
 
 
+def null_for_nan(value: Any) -> Any:
+    """The value with None for every float that JSON has no text for: NaN and infinities, in lists and mappings, too."""
+    if isinstance(value, Mapping):
+        return {key: null_for_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [null_for_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def write_json(path: Path, results: Mapping[str, Any]) -> None:
-    """Write conditions and results to a file, completely or not at all."""
+    """Write conditions and results to a file, completely or not at all; NaN as null."""
     partial = path.with_name(path.name + ".part")
     partial.write_text(
-        json.dumps({"conditions": machine_conditions(), **results}, indent=1) + "\n", encoding="utf-8"
+        json.dumps({"conditions": machine_conditions(), **null_for_nan(results)}, indent=1) + "\n",
+        encoding="utf-8",
     )
     partial.replace(path)

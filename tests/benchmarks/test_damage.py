@@ -121,8 +121,12 @@ def test_a_run_prints_and_writes_and_one_image_is_saved(
 ) -> None:
     out = tmp_path / "rows.json"
     assert main(["--images", "3", "--seed", "300", "--processes", "1", "--json", str(out)]) == 0
-    assert "3 images, seeds 300 to 302" in capsys.readouterr().out
-    assert [row["images"] for row in json.loads(out.read_text())] == [1, 1, 1, 3]
+    text = capsys.readouterr().out
+    assert "3 images, seeds 300 to 302" in text and "together: virtual, measured" in text
+    rows = json.loads(out.read_text())
+    assert [row["images"] for row in rows] == [1, 1, 1, 3]
+    assert [row["calibrations"]["measured"]["pictures"] for row in rows] == [1, 1, 1, 3]
+    assert rows[0]["calibrations"]["measured"]["z"]["low"] is None  # one picture has no interval
     assert read_one_image(parse_case("random scratches/honeycomb/300"), tmp_path).score.wrong == 0
     assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png"}
     with pytest.raises(SystemExit):

@@ -5,18 +5,27 @@ The whole suite is ``python -m benchmarks.stress``; it runs here, too, marked sl
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.stress.run import main
 from benchmarks.suites.scoring.reading import CaseResult, cached_extractor, read_case
-from benchmarks.suites.scoring.report import PROMISED_SHARE, condition_rows, failure_lines
+from benchmarks.suites.scoring.report import (
+    PROMISED_SHARE,
+    calibration_table,
+    condition_rows,
+    failure_lines,
+    results_table,
+    write_json,
+)
 from benchmarks.suites.scoring.score import score_markers, smallest_contrast
 from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage, plain_frame
-from benchmarks.suites.stress.kinds import ConditionKind, StressCase
+from benchmarks.suites.stress.kinds import ConditionKind, StressCase, make_frame
 from extractor import Markers, Status
 
 STANDARD_STEPS = ("megapixels", "small cells", "medium cells", "large cells")  # whose later steps are large
@@ -122,6 +131,30 @@ def test_markers_on_an_empty_image_are_wrong_and_reported_as_such() -> None:
     case = StressCase("nothing: noise", 1, "honeycomb", 0)
     rows = condition_rows([CaseResult(case, figures, 10.0, 1.0, "", False)], KINDS)
     assert failure_lines(rows)[0].startswith("WRONG")
+
+
+def test_errors_over_covariances_are_stated(tmp_path: Path) -> None:
+    """Of a condition with a pattern in a row and a table; of one without, none."""
+    cases = [StressCase("plain", 0, "honeycomb", 0), StressCase("nothing: noise", 1, "honeycomb", 0)]
+    results = [result_of(case) for case in cases]
+    rows = condition_rows(results, KINDS)
+    assert [row.calibration.count for row in rows] == [results[0].score.measured, 0]
+    assert f"{rows[0].calibration.z.value:.2f}" in results_table(rows)
+    assert "all images: virtual, measured" in calibration_table(results)
+    write_json(rows, tmp_path / "rows.json")
+    written = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))
+    assert written[0]["calibration"]["pictures"] == 1 and written[1]["calibration"]["z"]["value"] is None
+
+
+def test_the_virtual_markers_of_a_second_pattern_lie_on_it() -> None:
+    first, second = (
+        make_frame(StressCase("two alike", 20, "honeycomb", 0), BY_NAME["two alike"]).shoot().truths
+    )
+    for truth in (first, second):
+        low, high = truth.marker_xy_px.min(axis=0), truth.marker_xy_px.max(axis=0)
+        virtual_px = truth.virtual_xy_px.reshape(-1, 2)
+        assert ((virtual_px >= low) & (virtual_px <= high)).all()
+    assert second.marker_xy_px[0, 0] > first.marker_xy_px[:, 0].max()
 
 
 def test_two_patterns_may_be_read_as_either_but_not_mixed() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.suites.scoring.calibration import squared_distances, summarise
 from benchmarks.support.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus
@@ -24,14 +25,9 @@ PATTERNS = ("honeycomb", "round", "elliptical")
 Squares = NDArray[np.float64]
 
 
-def squares(error: Squares, covariance: Squares) -> Squares:
-    """(N,) squared errors (N, 2) over their covariances (N, 2, 2), per axis."""
-    return np.asarray(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error) / 2)
-
-
 @cache
-def normalised(preset: str, kind: str) -> tuple[Squares, Squares]:
-    """Of the measured inner markers and the measured virtual markers of all patterns."""
+def squares_of(preset: str, kind: str) -> tuple[list[Squares], list[Squares]]:
+    """d2 of the measured inner markers and of the measured virtual markers of all patterns, by picture."""
     markers_found, virtual_found = [], []
     for pattern in PATTERNS:
         case = SceneCase(pattern, kind, layers=LAYERS)
@@ -43,26 +39,26 @@ def normalised(preset: str, kind: str) -> tuple[Squares, Squares]:
             mine = inner & (markers.status == Status.MEASURED)
             assert mine.sum() > 0.99 * inner.sum()
             error = markers.xy_px - seen.truth.marker_xy_px
-            markers_found.append(squares(error[mine], markers.cov_px2[mine]))
+            markers_found.append(squared_distances(error[mine], markers.cov_px2[mine]))
             virtual = markers.virtual_status == VirtualStatus.MEASURED
             error = markers.virtual_xy_px - seen.truth.virtual_xy_px
-            virtual_found.append(squares(error[virtual], markers.virtual_cov_px2[virtual]))
-    return np.concatenate(markers_found), np.concatenate(virtual_found)
+            virtual_found.append(squared_distances(error[virtual], markers.virtual_cov_px2[virtual]))
+    return markers_found, virtual_found
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
-    found, _ = normalised(preset, kind)
-    assert 0.9 < np.sqrt(found.mean()) < {"fast": 1.25, "balanced": 1.15, "accurate": 1.1}[preset]
-    # the bulk of them too: half of all squares of normal errors in two axes lie below ln 2 of their mean
-    assert 0.85 < np.sqrt(np.median(found)) / np.sqrt(np.log(2)) < 1.2
-    assert np.sqrt(found.max()) < 6
+    d2, _ = squares_of(preset, kind)
+    found = summarise(d2)
+    assert 0.9 < found.z.value < {"fast": 1.25, "balanced": 1.15, "accurate": 1.1}[preset]
+    assert 0.85 < found.median_z < 1.2  # the bulk of them, too
+    assert np.concatenate(d2).max() < 72  # six deviations per axis
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_covariance_of_a_measured_virtual_marker_is_true(preset: str, kind: str) -> None:
-    _, found = normalised(preset, kind)
-    assert len(found) > 1000
-    assert 0.85 < np.sqrt(found.mean()) < 1.2
+    found = summarise(squares_of(preset, kind)[1])
+    assert found.count > 1000 and not found.singular
+    assert 0.85 < found.z.value < 1.2

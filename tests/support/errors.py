@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scoring.calibration import squared_distances
 from cmpdesign.scene import Rendered
 from extractor import Markers
 
@@ -19,7 +20,7 @@ def errors_px(markers: Markers, seen: Rendered) -> Array:
 def deviations(markers: Markers, seen: Rendered) -> Array:
     """(M,) the errors per axis in units of the markers' own standard deviations; NaN where lost."""
     error = markers.xy_px - seen.truth.marker_xy_px
-    return np.asarray(np.sqrt(np.einsum("mi,mij,mj->m", error, np.linalg.inv(markers.cov_px2), error) / 2))
+    return np.sqrt(squared_distances(error, markers.cov_px2) / 2)
 
 
 def rms(values: Array) -> float:

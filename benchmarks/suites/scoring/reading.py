@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from benchmarks.suites.scoring.score import (
     shortest_edges,
     wrong_markers,
 )
+from benchmarks.suites.scoring.squares import PictureSquares, nearest_truth, picture_squares
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
 from benchmarks.suites.stress.frames import CaseImage, cached_layout, plain_frame
 from benchmarks.suites.stress.kinds import StressCase, make_frame
@@ -41,6 +42,7 @@ class CaseResult:
         ratio: median ratio of times to the plain frame's time; NaN for other sizes of image.
         reason: the extractor's reason, or the text of its exception.
         raised: the extractor raised an exception.
+        squares: errors over stated covariances; empty without a pattern or markers.
     """
 
     case: StressCase
@@ -49,6 +51,7 @@ class CaseResult:
     ratio: float
     reason: str
     raised: bool
+    squares: PictureSquares = field(default_factory=dict, compare=False, repr=False)
 
 
 class CaseReading(NamedTuple):
@@ -110,7 +113,8 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         return CaseReading(failed, shot, None)
     score = score_markers(markers, shot, promised=kind.promised)
     reason = str(markers.reason) if markers.reason else ""
-    result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False)
+    squares = picture_squares(markers, nearest_truth(markers, shot.truths)) if shot.truths else {}
+    result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False, squares)
     return CaseReading(result, shot, markers)
 
 

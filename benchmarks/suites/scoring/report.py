@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.suites.scoring.calibration import Calibration, calibration_head, summarise
 from benchmarks.suites.scoring.reading import CaseResult
+from benchmarks.suites.scoring.squares import MEASURED, calibration_lines
 from benchmarks.suites.stress.kinds import ConditionKind
+from benchmarks.support.machine import null_for_nan
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
@@ -31,6 +34,7 @@ class ConditionRow:
 
     Attributes:
         promised: yes, no, or the number of images with a promise.
+        calibration: errors of measured markers over their covariances.
         worst, slowest: names of images.
     """
 
@@ -51,6 +55,7 @@ class ConditionRow:
     promised: str
     rms_px: float
     repaired_rms_px: float
+    calibration: Calibration
     ms: float
     ratio: float
     raised: int
@@ -99,6 +104,7 @@ def _condition_row(kind: ConditionKind, of_condition: list[CaseResult]) -> Condi
         repaired_rms_px=_pooled_rms(
             [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in of_condition]
         ),
+        calibration=summarise([r.squares[MEASURED] for r in of_condition if r.squares]),
         ms=_median([r.ms for r in of_condition]),
         ratio=_median([r.ratio for r in of_condition]),
         raised=sum(r.raised for r in of_condition),
@@ -148,7 +154,8 @@ def failure_lines(rows: list[ConditionRow]) -> list[str]:
 
 HEAD = (
     f"{'condition':<38}{'prom.':>6}{'visible':>8}{'meas.%':>8}{'rep.%':>7}{'fit.%':>7}{'lost%':>7}{'wrong':>7}"
-    f"{'outs.':>6}{'hidden':>7}{'kept%':>8}{'rms px':>9}{'rep.rms':>9}{'ms':>8}{'ratio':>7}  reason"
+    f"{'outs.':>6}{'hidden':>7}{'kept%':>8}{'rms px':>9}{'rep.rms':>9}{'z':>7}{'med.z':>7}"
+    f"{'bey.%':>8}{'ms':>8}{'ratio':>7}  reason"
 )
 
 
@@ -171,6 +178,8 @@ def _row_line(row: ConditionRow) -> str:
     return (
         f"{row.condition:<38}{row.promised:>6}{row.visible:>8}{shares}{row.wrong:>7}{row.outside:>6}{row.hidden:>7}"
         f"{_or_dash(100 * row.kept_share, 8, 2)}{_or_dash(row.rms_px, 9, 4)}{_or_dash(row.repaired_rms_px, 9, 3)}"
+        f"{_or_dash(row.calibration.z.value, 7, 2)}{_or_dash(row.calibration.median_z, 7, 2)}"
+        f"{_or_dash(100 * row.calibration.beyond.value, 8, 2)}"
         f"{_or_dash(row.ms, 8, 1)}{_or_dash(row.ratio, 7, 2)}  {row.reasons}"
     )
 
@@ -210,9 +219,15 @@ def summary_text(rows: list[ConditionRow]) -> str:
     )
 
 
+def calibration_table(results: Sequence[CaseResult]) -> str:
+    """Errors over covariances, pooled over all images, by how positions were found."""
+    lines = calibration_lines("all images", [result.squares for result in results])
+    return "\n".join([calibration_head("errors over covariances"), *lines])
+
+
 def write_json(rows: list[ConditionRow], path: Path) -> None:
     """Write every row as an object, NaN as null."""
-    columns = [{k: None if v != v else v for k, v in asdict(row).items()} for row in rows]
+    columns = [null_for_nan(asdict(row)) for row in rows]
     partial = path.with_name(path.name + ".part")
     partial.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
     partial.replace(path)

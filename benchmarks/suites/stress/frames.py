@@ -112,7 +112,12 @@ class PatternFrame:
         if self.second is None:
             return CaseImage(first.image, (first.truth,), self.scene)
         second = render(self.second, size=self.size)
-        moved = replace(second.truth, marker_xy_px=second.truth.marker_xy_px + [self.size[0], 0])
+        aside_px = np.array([self.size[0], 0])
+        moved = replace(
+            second.truth,
+            marker_xy_px=second.truth.marker_xy_px + aside_px,
+            virtual_xy_px=second.truth.virtual_xy_px + aside_px,
+        )
         image = np.ascontiguousarray(np.hstack([first.image, second.image]))
         return CaseImage(image, (first.truth, moved), self.scene)
 

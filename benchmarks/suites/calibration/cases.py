@@ -1,0 +1,53 @@
+"""One picture of a suite of calibration, and random standard views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.suites.scoring.squares import TruePositions
+from benchmarks.suites.stress.frames import PatternFrame
+from benchmarks.support.scenes import SceneCase, standard_layout
+from cmpdesign.layout.layout import Layout
+
+
+class CalibrationPicture(Protocol):
+    """A picture with known positions, such as ``CaseImage``."""
+
+    @property
+    def image(self) -> NDArray[Any]:
+        """(H, W, 3) BGR, uint8 or uint16."""
+
+    @property
+    def truths(self) -> Sequence[TruePositions]:
+        """One entry for each pattern in the picture, at least one."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationCase:
+    """One picture.
+
+    Attributes:
+        kind: the name of its row within the suite.
+        layout: the layout that the reader is given; the picture may show a different one.
+        shoot: makes the picture.
+    """
+
+    kind: str
+    layout: Layout
+    shoot: Callable[[], CalibrationPicture]
+
+
+def random_view(case: SceneCase, rng: np.random.Generator) -> PatternFrame:
+    """The case's scene at a random rotation, with a random seed of its noise; ``rng`` is advanced."""
+    turn_deg, seed = float(rng.uniform(0, 360)), int(rng.integers(2**31))
+    return PatternFrame(case.scene()).with_camera(rotation_deg=turn_deg).with_parts(seed=seed)
+
+
+def frame_case(kind: str, case: SceneCase, frame: PatternFrame) -> CalibrationCase:
+    """A frame that is read with the nominal layout of the case's pattern."""
+    return CalibrationCase(kind, standard_layout(case.pattern, case.layers), frame.shoot)

@@ -1,0 +1,99 @@
+"""Reading of the pictures of a suite by presets, and the rows of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+
+from benchmarks.suites.calibration.suites import suites_by_name
+from benchmarks.suites.scoring.calibration import Calibration
+from benchmarks.suites.scoring.squares import (
+    MEASURED,
+    VIRTUAL_MEASURED,
+    PictureSquares,
+    calibrations_by_position,
+    nearest_truth,
+    picture_squares,
+)
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import Layout
+from extractor import Extractor, parse_layout
+from extractor.presets import Preset
+
+TOGETHER = "together"
+
+
+@dataclass(frozen=True)
+class SuiteJob:
+    """Every ``parts``-th picture of a suite from number ``part`` on, read by all ``presets``."""
+
+    suite: str
+    presets: tuple[Preset, ...]
+    quick: bool = False
+    seed: int = 0
+    part: int = 0
+    parts: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class PictureReading:
+    """One picture, read by one preset. ``number`` is the picture's place in its suite."""
+
+    suite: str
+    kind: str
+    number: int
+    preset: Preset
+    squares: PictureSquares
+
+
+@dataclass(frozen=True)
+class CalibrationRow:
+    """The pictures of one kind, or of a suite together; ``positions`` is one of ``squares.POSITIONS``."""
+
+    preset: Preset
+    suite: str
+    kind: str
+    positions: str
+    calibration: Calibration
+
+
+@lru_cache(maxsize=64)
+def _cached_reader(layout: Layout, preset: Preset) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(layout)), preset)
+
+
+def read_pictures(job: SuiteJob) -> list[PictureReading]:
+    """The job's pictures in the order of the suite, each by all presets."""
+    return list(_readings(job))
+
+
+def _readings(job: SuiteJob) -> Iterator[PictureReading]:
+    cases = enumerate(suites_by_name()[job.suite](job.quick, job.seed))
+    for number, case in islice(cases, job.part, None, job.parts):
+        shot = case.shoot()
+        for preset in job.presets:
+            markers = _cached_reader(case.layout, preset).extract(shot.image)
+            squares = picture_squares(markers, nearest_truth(markers, shot.truths))
+            yield PictureReading(job.suite, case.kind, number, preset, squares)
+
+
+def calibration_rows(readings: Sequence[PictureReading]) -> list[CalibrationRow]:
+    """Rows by preset, suite and kind, of measured markers and virtual markers; of a suite together, of all positions.
+
+    The order of presets, suites and kinds is that of the readings' first entries.
+    """
+    rows = []
+    for preset in dict.fromkeys(reading.preset for reading in readings):
+        of_preset = [reading for reading in readings if reading.preset == preset]
+        for suite in dict.fromkeys(reading.suite for reading in of_preset):
+            of_suite = [reading for reading in of_preset if reading.suite == suite]
+            for kind in (*dict.fromkeys(reading.kind for reading in of_suite), TOGETHER):
+                chosen = [reading.squares for reading in of_suite if kind in (reading.kind, TOGETHER)]
+                rows += [
+                    CalibrationRow(preset, suite, kind, positions, found)
+                    for positions, found in calibrations_by_position(chosen).items()
+                    if kind == TOGETHER or positions in (MEASURED, VIRTUAL_MEASURED)
+                ]
+    return rows

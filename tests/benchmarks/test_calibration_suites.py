@@ -1,0 +1,121 @@
+"""The command of calibration: its suites, its rows, and that parts of a suite are the suite."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.calibration.run import main, read_jobs, rows_text
+from benchmarks.suites.calibration.cases import CalibrationCase
+from benchmarks.suites.calibration.damaged import DAMAGE_KINDS, MILD_KINDS
+from benchmarks.suites.calibration.plain import scattered_layout
+from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, read_pictures
+from benchmarks.suites.calibration.suites import CAMERA_MODULE, suites_by_name
+from benchmarks.suites.scoring.squares import POSITIONS, nearest_truth, picture_squares
+from benchmarks.suites.stress.frames import PATTERNS, plain_frame
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.scene import standard_layout
+from extractor import Extractor, Status, parse_layout
+
+
+def kinds_of(suite: str) -> list[str]:
+    return list(dict.fromkeys(case.kind for case in suites_by_name()[suite](True, 0)))
+
+
+def test_suites_have_their_kinds_in_all_patterns() -> None:
+    assert [name for name in suites_by_name() if name != "camera"] == [
+        "plain", "mild dirt", "damage", "stress", "scatter",
+    ]  # fmt: skip
+    plain = list(suites_by_name()["plain"](True, 0))
+    assert len({case.kind for case in plain}) == 8 and {case.layout.pattern for case in plain} == set(
+        PATTERNS
+    )
+    assert kinds_of("mild dirt") == list(MILD_KINDS) and kinds_of("damage") == list(DAMAGE_KINDS)
+    assert kinds_of("scatter") == ["0.05 px", "0.2 px", "0.5 px"]
+    full = list(suites_by_name()["damage"](False, 0))
+    assert len(full) == 108
+
+
+def test_a_seed_gives_the_same_pictures_and_another_seed_others() -> None:
+    first, again, other = (
+        next(suites_by_name()["mild dirt"](True, seed)).shoot().image for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).any()
+
+
+def test_markers_are_scattered_as_stated() -> None:
+    layout = standard_layout("honeycomb", 11)
+    moved = scattered_layout(layout, 0.01, np.random.default_rng(0))
+    off = moved.marker_xy_mm - layout.marker_xy_mm
+    assert off.std() == pytest.approx(0.01, rel=0.1) and abs(off.mean()) < 0.001
+    np.testing.assert_array_equal(moved.edges, layout.edges)
+
+
+def test_squares_are_of_each_status_and_of_the_pattern_that_was_read() -> None:
+    frame = plain_frame("honeycomb", 3, layers=4)
+    shot = frame.shoot()
+    markers = Extractor(parse_layout(layout_to_json(frame.layout))).extract(shot.image)
+    status = markers.status.copy()
+    status[:4] = Status.LOST, Status.REPAIRED, Status.FITTED, Status.FITTED
+    markers = replace(markers, status=status)
+    truth = shot.truths[0]
+    far = replace(truth, marker_xy_px=truth.marker_xy_px + 700.0, virtual_xy_px=truth.virtual_xy_px + 700.0)
+    assert nearest_truth(markers, (far, truth)) is truth
+    found = picture_squares(markers, truth)
+    counts = [len(found[name]) for name in POSITIONS]
+    assert counts[1:3] == [1, 2] and counts[0] == (status == Status.MEASURED).sum()
+    assert sum(counts[3:]) == (markers.virtual_status > 0).sum()
+    error = truth.virtual_xy_px - markers.virtual_xy_px
+    twice = replace(markers, virtual_xy_px=markers.virtual_xy_px - error)
+    np.testing.assert_allclose(
+        picture_squares(twice, truth)["virtual, measured"], 4 * found["virtual, measured"]
+    )
+
+
+def test_parts_of_a_suite_are_the_suite() -> None:
+    jobs = [SuiteJob("scatter", ("fast",), True, 0, part, 2) for part in range(2)]
+    apart, whole = read_jobs(jobs, 1), read_pictures(SuiteJob("scatter", ("fast",), True))
+    assert [reading.number for reading in apart] == [reading.number for reading in whole] == list(range(9))
+    assert calibration_rows(apart) == calibration_rows(whole)
+    rows = calibration_rows(whole)
+    assert rows_text(rows).splitlines()[1] == "-- scatter"
+    together = [
+        row.calibration.count for row in rows if (row.kind, row.positions) == ("together", "measured")
+    ]
+    kinds = [row.calibration.count for row in rows if row.kind.endswith("px") and row.positions == "measured"]
+    assert len(kinds) == 3 and together == [sum(kinds)]
+
+
+def test_the_camera_suite_is_read_where_it_offers_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = plain_frame("honeycomb", 5, layers=4)
+
+    def camera_cases(quick: bool, seed: int) -> Iterator[CalibrationCase]:
+        yield CalibrationCase("lamps", frame.layout, frame.shoot)
+
+    monkeypatch.setitem(sys.modules, CAMERA_MODULE, SimpleNamespace(camera_cases=camera_cases))  # type: ignore[arg-type]
+    (reading,) = read_pictures(SuiteJob("camera", ("balanced",), True))
+    assert (reading.suite, reading.kind) == ("camera", "lamps") and len(reading.squares["measured"]) == 61
+
+
+def test_a_quick_run_prints_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "rows.json"
+    arguments = ["--quick", "--preset", "balanced", "--suite", "scatter", "--processes", "1"]
+    assert main([*arguments, "--json", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "0.5 px: virtual, measured" in text and "9 pictures, seed 0" in text
+    written = json.loads(out.read_text(encoding="utf-8"))
+    assert {row["kind"] for row in written["rows"]} == {"0.05 px", "0.2 px", "0.5 px", "together"}
+    row = next(row for row in written["rows"] if (row["kind"], row["positions"]) == ("together", "measured"))
+    calibration = row["calibration"]
+    assert calibration["pictures"] == 9 and calibration["singular"] == 0
+    assert calibration["z"]["low"] <= calibration["z"]["value"] <= calibration["z"]["high"]
+    with pytest.raises(SystemExit):
+        main(["--suite", "nothing"])
