@@ -41,7 +41,7 @@ def cell_polygons_mm(layout: Layout, pad: Pad, pitch_px: float, rng: np.random.G
 
 
 def color_shifts(longest: float, rng: np.random.Generator) -> Points:
-    """(colors, 2): a shift for each color of a layout. The mean of red, green and blue is zero, the longest as given."""
+    """(colors, 2): a shift for each color. The mean of red, green and blue is zero, the longest of them as given."""
     shift = rng.standard_normal((len(COLORS), 2))
     inks = [RED, GREEN, BLUE]
     shift[inks] -= shift[inks].mean(axis=0)

@@ -68,8 +68,10 @@ def _noisy(light: Planes, sensor: Sensor, rng: np.random.Generator) -> Planes:
     noise = rng.standard_normal(light.shape, dtype=np.float32)
     electrons = np.maximum(light, 0) * np.float32(sensor.electrons)
     noise *= np.sqrt(electrons + np.float32(sensor.read_noise) ** 2)
-    return np.minimum(light + noise / np.float32(sensor.electrons), np.float32(1.0))
+    return np.asarray(
+        np.minimum(light + noise / np.float32(sensor.electrons), np.float32(1.0)), dtype=np.float32
+    )
 
 
 def _balanced(light: Planes, gain: NDArray[np.float32]) -> Planes:
-    return np.minimum(light * gain, np.float32(1.0))
+    return np.asarray(np.minimum(light * gain, np.float32(1.0)), dtype=np.float32)
