@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.suites.camera.cases import KINDS
-from benchmarks.suites.camera.reading import PictureResult
+from benchmarks.suites.camera.reading import LOST, UNSEEN, PictureResult
 from benchmarks.suites.scoring.calibration import Calibration, summarise
 
 TOGETHER = "together"
+NO_REASON = "no reason given"
 MOST_FAILURES = 40  # listed pictures
 
 
@@ -27,7 +28,7 @@ class EffectRow:
         unread: pictures without any marker.
         rms_px: per axis, of visible measured markers that are not wrong.
         calibration: of all measured markers, wrong ones included.
-        reasons: number of pictures by the extractor's reason.
+        reasons: number of pictures by the extractor's reason, and of unread ones without any.
         p50_ms, p99_ms: processor time of one picture.
     """
 
@@ -66,11 +67,12 @@ def effect_row(effect: str, results: Sequence[PictureResult]) -> EffectRow:
     squared_px2 = sum(result.squared_px2 for result in results)
     times_ms = [result.ms for result in results if not result.raised] or [math.nan]
     p50_ms, p99_ms = np.percentile(times_ms, (50, 99)).tolist()
-    reasons = Counter(result.reason for result in results if result.reason)
+    unread = [result for result in results if not result.outcomes.strip(UNSEEN + LOST)]
+    reasons = Counter(result.reason or NO_REASON for result in results if result.reason or result in unread)
     return EffectRow(
         effect=effect,
         pictures=len(results),
-        unread=sum(not any(letter in result.outcomes for letter in "mepi") for result in results),
+        unread=len(unread),
         raised=sum(result.raised for result in results),
         visible=sum(result.visible for result in results),
         measured=sum(result.measured for result in results),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
+from benchmarks.camera import page as camera
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture
 from benchmarks.support.machine import conditions_text
@@ -26,5 +27,8 @@ def pages() -> dict[Path, str]:
     conditions = conditions_text(read_measured("comparison")["conditions"])
     blocks = {"comparison": comparison_markdown(_compared()), "conditions": conditions}
     return updated_pages(
-        blocks | accuracy.documentation_blocks(precise) | extraction.markdown(read_measured("extraction"))
+        blocks
+        | accuracy.documentation_blocks(precise)
+        | extraction.markdown(read_measured("extraction"))
+        | camera.documentation_blocks(read_measured("camera"))
     )

@@ -85,7 +85,10 @@ def _sample_lamp_rgb(strength: float, rng: Rng) -> RGB:
 def _temperature_rgb(strength: float, rng: Rng) -> RGB:
     extreme = float(rng.choice((WARMEST_K, COLDEST_K)))
     share = strength * float(rng.uniform(0.5, 1.0))
-    return blackbody_rgb(float(np.exp((1 - share) * np.log(NEUTRAL_K) + share * np.log(extreme))))
+    temperature_k = float(np.exp((1 - share) * np.log(NEUTRAL_K) + share * np.log(extreme)))
+    # daylight of the neutral temperature is white
+    relative = np.array(blackbody_rgb(temperature_k)) / np.array(blackbody_rgb(NEUTRAL_K))
+    return _rgb(relative / relative.max())
 
 
 def change_surround(chain: Chain, strength: float, rng: Rng) -> Chain:
