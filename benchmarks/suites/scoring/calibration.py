@@ -22,7 +22,7 @@ MIN_DETERMINANT_SHARE = 1e-12  # of the product of the variances; a covariance b
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
 COLUMNS = ("pictures", "count", "z", "95 %", "median z", "beyond %", "95 %")
-WIDTHS = (9, 8, 8, 14, 10, 10, 14)
+WIDTHS = (9, 9, 8, 16, 10, 10, 18)
 Floats = NDArray[np.float64]
 
 
