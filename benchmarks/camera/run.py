@@ -112,7 +112,8 @@ def main(arguments: list[str] | None = None) -> int:
     results = with_progress(make_cases(options.pictures, options.seed), options.preset, options.processes)
     rows, graded = effect_rows(results), graded_rows(results)
     print(rows_table([*graded, *rows] if options.table else rows))
-    print("\n".join(failure_lines(results)))
+    for line in failure_lines(results):
+        print(line)
     print(conditions_text())
     print(
         f"repeat with --seed {options.seed} --pictures {options.pictures}; {time.perf_counter() - started:.0f} s"
