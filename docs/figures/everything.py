@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.camera.page import page_pictures
+
 from . import fields, gallery, measured
 from .pictures import contact, drawings, hero, scene_templates, stages, surface
 
@@ -12,11 +14,11 @@ IMAGES = DOCS / "images"
 
 
 def pictures() -> dict[str, bytes]:
-    """Name in docs/images -> PNG or SVG."""
+    """Name in docs/images -> PNG, SVG or JPEG."""
     found: dict[str, bytes] = {}
     for part in (hero, drawings, stages, gallery, contact, measured, scene_templates, surface):
         found |= part.figures()
-    return found
+    return found | page_pictures()
 
 
 def pages() -> dict[Path, str]:

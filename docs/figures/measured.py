@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
+from benchmarks.camera import page as camera
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
@@ -30,5 +31,8 @@ def pages() -> dict[Path, str]:
     if pooled:
         blocks["comparison-pooled"] = pooled_markdown(pooled)
     return updated_pages(
-        blocks | accuracy.documentation_blocks(precise) | extraction.markdown(read_measured("extraction"))
+        blocks
+        | accuracy.documentation_blocks(precise)
+        | extraction.markdown(read_measured("extraction"))
+        | camera.documentation_blocks(read_measured("camera"))
     )

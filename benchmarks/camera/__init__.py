@@ -1,0 +1,1 @@
+"""``python -m benchmarks.camera``: how much is read, and how precisely, in pictures as cameras make them."""

@@ -1,0 +1,240 @@
+"""The effects in the order of a camera. Each changes a chain with a strength from 0 (no change) to 1 (the hardest).
+
+What a strength does not fix (directions, signs, kinds) is drawn at random. A new effect is one function and one line
+in ``EFFECTS``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+
+from benchmarks.suites.camera.lamps import blackbody_rgb, led_rgb
+from benchmarks.suites.camera.parts import RGB, Chain, Demosaicing, Inks, Surround, SurroundKind
+from cmpdesign.scene import Led, Light
+
+Rng = np.random.Generator
+Effect = Callable[[Chain, float, Rng], Chain]
+
+NEUTRAL_K, WARMEST_K, COLDEST_K = 6500.0, 2500.0, 15000.0
+LEAST_EXPOSURE, MOST_EXPOSURE = 0.1, 8.0
+BEST_QUALITY, WORST_QUALITY, FIRST_STRENGTH = 95, 15, 0.25  # of JPEG; the best quality up to this strength
+SURROUNDS: tuple[tuple[SurroundKind, RGB], ...] = (
+    ("plain", (0.85, 0.85, 0.83)),
+    ("plain", (0.21, 0.21, 0.21)),
+    ("plain", (0.01, 0.01, 0.01)),
+    ("wood", (0.33, 0.18, 0.08)),
+    ("skin", (0.52, 0.29, 0.20)),
+)
+SHARP_BLUR_PX, SOFT_BLUR_PX = 0.5, 1.1  # of the lens before a mosaic: a sharp one shows false colors
+
+
+def change_inks(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Reflectances drawn at random in the range of prints and pigments, as they are, faded or dark."""
+    target = sample_inks(rng)
+    fading = strength * float(rng.choice((0.0, 0.35, 0.0)))
+    darkness = strength * float(rng.choice((0.0, 0.0, 0.75)))
+    inks = {}
+    for item in fields(Inks):
+        drawn, standard = np.array(getattr(target, item.name)), np.array(getattr(chain.inks, item.name))
+        ink = standard + strength * (drawn - standard)
+        ink = ink + fading * (np.array(target.white) - ink)
+        inks[item.name] = _rgb(ink * (1.0 - darkness))
+    return replace(chain, inks=Inks(**inks))
+
+
+def sample_inks(rng: Rng) -> Inks:
+    """Random inks: each colored ink is strongest in its channel, black is dark and white is bright, both tinted."""
+    low, high = (0.02, 0.02, 0.01), (0.10, 0.12, 0.08)
+    red, green, blue = (rng.uniform(low, high) for _ in range(3))
+    red[0], green[1], blue[2] = rng.uniform((0.35, 0.20, 0.25), (0.70, 0.45, 0.60))
+    blue[1] = rng.uniform(0.03, 0.20)
+    green[2] = rng.uniform(0.03, 0.15)
+    white = rng.uniform(0.60, 0.92) * rng.uniform((0.95, 0.92, 0.82), 1.0)
+    black = rng.uniform(0.004, 0.05) * rng.uniform(0.8, 1.2, 3)
+    return Inks(_rgb(red), _rgb(green), _rgb(blue), _rgb(white), _rgb(black))
+
+
+def change_lamps(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """One to three lamps at the image's rim over a diffuse one, white of any temperature or colored LEDs.
+
+    The white balance follows their mean color in part.
+    """
+    count = int(rng.integers(1, 4))
+    ambient = 1.0 - strength * float(rng.uniform(0.5, 0.95))
+    first = float(rng.uniform(0, 360))
+    leds = []
+    for number in range(count):
+        rgb = np.array(_sample_lamp_rgb(strength, rng)) * (2.0 * (1.0 - ambient) / count)
+        reach = float(rng.uniform(0.5, 1.3))
+        leds.append(Led(first + 360.0 * number / count + float(rng.uniform(-30, 30)), _rgb(rgb), reach))
+    level = ambient * np.array(_temperature_rgb(strength, rng))
+    balance = 1.0 - strength * float(rng.uniform(0.0, 1.0))
+    development = replace(chain.development, balance=balance)
+    return replace(chain, lamps=Light(rgb=_rgb(level), leds=tuple(leds)), development=development)
+
+
+def _sample_lamp_rgb(strength: float, rng: Rng) -> RGB:
+    if rng.random() < 0.5:
+        return _temperature_rgb(strength, rng)
+    return led_rgb(float(rng.uniform(0, 360)), strength * float(rng.uniform(0.4, 0.95)))
+
+
+def _temperature_rgb(strength: float, rng: Rng) -> RGB:
+    extreme = float(rng.choice((WARMEST_K, COLDEST_K)))
+    share = strength * float(rng.uniform(0.5, 1.0))
+    temperature_k = float(np.exp((1 - share) * np.log(NEUTRAL_K) + share * np.log(extreme)))
+    # daylight of the neutral temperature is white
+    relative = np.array(blackbody_rgb(temperature_k)) / np.array(blackbody_rgb(NEUTRAL_K))
+    return _rgb(relative / relative.max())
+
+
+def change_surround(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """White, grey, black, wood-like or skin-like; a weak one is dark."""
+    kind, rgb = SURROUNDS[int(rng.integers(len(SURROUNDS)))]
+    tinted = np.array(rgb) * rng.uniform(0.8, 1.1, 3)
+    mixed = (1.0 - strength) * np.array(chain.surround.rgb) + strength * tinted
+    return replace(chain, surround=Surround(kind, _rgb(np.minimum(mixed, 0.95)), strength))
+
+
+def shift_colors(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Each color's cells shifted by themselves, by up to 0.1 pitch."""
+    return replace(chain, pad=replace(chain.pad, color_shift=0.1 * strength))
+
+
+def scatter_corners(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Corners of cells scattered by up to 0.5 px."""
+    return replace(chain, pad=replace(chain.pad, corner_scatter_px=0.5 * strength))
+
+
+def round_corners(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Corners of cells rounded with a radius of up to 0.2 edges."""
+    return replace(chain, pad=replace(chain.pad, rounding=0.2 * strength))
+
+
+def bleed_edges(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Sides of cells bled outward by up to 0.1 pitch."""
+    return replace(chain, pad=replace(chain.pad, bleed=0.1 * strength))
+
+
+def defocus(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """A disc of defocus with a radius of up to 4 px."""
+    return replace(chain, lens=replace(chain.lens, defocus_px=4.0 * strength))
+
+
+def aberrate(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Red and blue displaced by up to 2 px in the image's corners, in opposite directions."""
+    sign = float(rng.choice((-1, 1)))
+    return replace(chain, lens=replace(chain.lens, aberration_px=2.0 * sign * strength))
+
+
+def bloom(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Up to a fifth of the light scattered far."""
+    return replace(chain, lens=replace(chain.lens, bloom=0.2 * strength))
+
+
+def vignette(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Corners that lose up to 0.8 of the light."""
+    return replace(chain, lens=replace(chain.lens, vignetting=0.8 * strength))
+
+
+def distort(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Barrel or pincushion distortion of up to 0.15 in the image's corners."""
+    sign = float(rng.choice((-1, 1)))
+    return replace(chain, lens=replace(chain.lens, distortion=0.15 * sign * strength))
+
+
+def move(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Motion of up to 13 px during the exposure, in any direction."""
+    direction_deg = float(rng.uniform(0, 180))
+    return replace(chain, lens=replace(chain.lens, motion_px=13.0 * strength, motion_deg=direction_deg))
+
+
+def change_exposure(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """0.1 to 8 times the light that just fits."""
+    extreme = float(rng.choice((LEAST_EXPOSURE, MOST_EXPOSURE)))
+    return replace(chain, sensor=replace(chain.sensor, exposure=extreme**strength))
+
+
+def add_mosaic(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """A Bayer mosaic behind a lens that is the sharper the stronger the effect."""
+    if not strength:
+        return chain
+    methods: tuple[Demosaicing, ...] = ("edge-aware", "bilinear")
+    method = methods[int(rng.integers(2))]
+    blur_px = SOFT_BLUR_PX + strength * (SHARP_BLUR_PX - SOFT_BLUR_PX)
+    sensor = replace(chain.sensor, demosaicing=method, phase=int(rng.integers(4)))
+    return replace(chain, sensor=sensor, lens=replace(chain.lens, blur_px=blur_px))
+
+
+def add_noise(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Shot noise of down to 200 electrons, read noise of up to 12 electrons."""
+    sensor = chain.sensor
+    electrons = sensor.electrons * (200.0 / sensor.electrons) ** strength
+    read_noise = sensor.read_noise + strength * (12.0 - sensor.read_noise)
+    return replace(chain, sensor=replace(sensor, electrons=electrons, read_noise=read_noise))
+
+
+def lift_black(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Black lifted by up to a tenth of the largest light."""
+    return replace(chain, sensor=replace(chain.sensor, lifted_black=0.1 * strength))
+
+
+def misbalance(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """A white balance whose gains are wrong by factors of up to 1.65 each."""
+    error = rng.uniform(-0.5, 0.5, 3) * strength
+    return replace(chain, development=replace(chain.development, balance_error=_rgb(error)))
+
+
+def sharpen(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """An unsharp mask of a strength of up to 2."""
+    return replace(chain, development=replace(chain.development, sharpening=2.0 * strength))
+
+
+def add_s_curve(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """An S-shaped tone curve of a strength of up to 1."""
+    return replace(chain, development=replace(chain.development, s_curve=strength))
+
+
+def compress(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """JPEG of a quality of 95 down to 15, 4:4:4 or 4:2:0."""
+    if not strength:
+        return chain
+    share = max(strength - FIRST_STRENGTH, 0.0) / (1.0 - FIRST_STRENGTH)
+    quality = round(BEST_QUALITY + share * (WORST_QUALITY - BEST_QUALITY))
+    return replace(
+        chain,
+        development=replace(chain.development, jpeg_quality=quality, jpeg_420=bool(rng.random() < 0.5)),
+    )
+
+
+EFFECTS: dict[str, Effect] = {
+    "inks": change_inks,
+    "lamps": change_lamps,
+    "surround": change_surround,
+    "shifted colors": shift_colors,
+    "scattered corners": scatter_corners,
+    "rounded corners": round_corners,
+    "bled edges": bleed_edges,
+    "defocus": defocus,
+    "aberration": aberrate,
+    "bloom": bloom,
+    "vignetting": vignette,
+    "distortion": distort,
+    "motion": move,
+    "exposure": change_exposure,
+    "mosaic": add_mosaic,
+    "noise": add_noise,
+    "lifted black": lift_black,
+    "white balance": misbalance,
+    "sharpening": sharpen,
+    "s-curve": add_s_curve,
+    "jpeg": compress,
+}
+
+
+def _rgb(values: np.ndarray) -> RGB:
+    red, green, blue = (float(value) for value in values)
+    return red, green, blue

@@ -1,0 +1,152 @@
+"""Reading of one picture of the suite: the markers, their errors, their errors over stated covariances, the time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.suites.camera.cases import CameraCase, sample_chain
+from benchmarks.suites.camera.parts import Chain
+from benchmarks.suites.camera.shoot import CameraPicture, cached_layout, shoot
+from benchmarks.suites.scoring.calibration import squared_distances
+from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
+from cmpdesign.files.layout_json import layout_to_json
+from extractor import Extractor, Markers, Status, parse_layout
+from extractor.presets import Preset
+
+RUNS = 2  # readings of a picture
+# a marker's outcome as one letter
+UNSEEN, MEASURED, ESTIMATED, LOST, WRONG_PLACE, WRONG_ID = ".merpi"
+
+
+@dataclass(frozen=True, eq=False)
+class PictureResult:
+    """The result of one picture. Counts are of markers.
+
+    Attributes:
+        case: the picture.
+        pitch_px: of its pattern.
+        outcomes: one letter for each marker: not visible, measured, repaired or fitted, lost, reported with an error
+            above ``WRONG_SHARE`` of the shortest edge, reported at another marker's place. The last two are given to
+            markers that are not visible, too.
+        d2: (N,) errors over stated covariances of all measured markers, wrong ones included.
+        squared_px2: sum of the squared errors of both axes over ``right`` markers.
+        right: markers that are visible, measured and not wrong.
+        measured: markers that are visible and measured, wrong ones included.
+        visible: visible markers.
+        ms: processor time of the faster of two readings; the first one may compile.
+        reason: the extractor's reason, or the text of its exception; empty if there is none.
+        raised: the extractor raised an exception.
+    """
+
+    case: CameraCase
+    pitch_px: float
+    outcomes: str
+    d2: NDArray[np.float64]
+    squared_px2: float
+    right: int
+    measured: int
+    visible: int
+    ms: float
+    reason: str = ""
+    raised: bool = False
+
+    @property
+    def wrong_ids(self) -> int:
+        return self.outcomes.count(WRONG_ID)
+
+    @property
+    def wrong_places(self) -> int:
+        return self.outcomes.count(WRONG_PLACE)
+
+    @property
+    def measured_share(self) -> float:
+        return self.measured / self.visible if self.visible else 0.0
+
+    @property
+    def rms_px(self) -> float:
+        """Per axis, of right markers; NaN without any."""
+        return float(np.sqrt(self.squared_px2 / (2 * self.right))) if self.right else float("nan")
+
+
+@cache
+def cached_extractor(pattern: str, layers: int, preset: Preset) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), preset)
+
+
+def read_case(case: CameraCase, preset: Preset) -> PictureResult:
+    """Make the picture of a case, read and score it. An exception of the extractor is a result."""
+    chain = sample_chain(case)
+    picture = shoot(chain)
+    extractor = cached_extractor(chain.pose.pattern, chain.pose.layers, preset)
+    times_ms = []
+    try:
+        for _ in range(RUNS):
+            started = time.process_time()
+            markers = extractor.extract(picture.image)
+            times_ms.append(1e3 * (time.process_time() - started))
+    except Exception as error:
+        return raised_result(case, chain.pose.pitch_px, picture, repr(error))
+    return score_picture(case, chain.pose.pitch_px, picture, markers, min(times_ms))
+
+
+def raised_result(case: CameraCase, pitch_px: float, picture: CameraPicture, reason: str) -> PictureResult:
+    """The result of a picture on which the extractor raised an exception: all markers are lost, no time is known."""
+    outcomes = "".join(np.where(picture.visible, LOST, UNSEEN))
+    visible = int(picture.visible.sum())
+    return PictureResult(
+        case, pitch_px, outcomes, np.empty(0), 0.0, 0, 0, visible, float("nan"), reason, True
+    )
+
+
+def score_picture(
+    case: CameraCase, pitch_px: float, picture: CameraPicture, markers: Markers, ms: float
+) -> PictureResult:
+    """The result of markers that were read in a picture in ``ms``."""
+    outcome = marker_outcomes(picture, markers)
+    error_px = markers.xy_px - picture.marker_xy_px
+    measured = markers.status == Status.MEASURED
+    right = outcome == MEASURED
+    return PictureResult(
+        case=case,
+        pitch_px=pitch_px,
+        outcomes="".join(outcome),
+        d2=squared_distances(error_px[measured], markers.cov_px2[measured]),
+        squared_px2=float((error_px[right] ** 2).sum()),
+        right=int(right.sum()),
+        measured=int((measured & picture.visible).sum()),
+        visible=int(picture.visible.sum()),
+        ms=ms,
+        reason=str(markers.reason) if markers.reason else "",
+    )
+
+
+def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_]:
+    """(M,) letters, see ``PictureResult``."""
+    true_px = picture.marker_xy_px
+    reported = markers.status != Status.LOST
+    error_px = np.linalg.norm(markers.xy_px - true_px, axis=1)
+    wrong = reported & ~(error_px <= WRONG_SHARE * shortest_edges(picture.layout, true_px))
+    outcome = np.full(len(true_px), UNSEEN)
+    outcome[picture.visible] = ESTIMATED
+    outcome[picture.visible & ~reported] = LOST
+    outcome[picture.visible & (markers.status == Status.MEASURED)] = MEASURED
+    outcome[wrong] = WRONG_PLACE
+    numbers = np.flatnonzero(wrong & np.isfinite(markers.xy_px).all(axis=1))
+    distance_px = np.linalg.norm(markers.xy_px[numbers][:, None] - true_px, axis=2)
+    outcome[numbers[distance_px.argmin(axis=1) != numbers]] = WRONG_ID
+    return outcome
+
+
+def warm_up(preset: Preset) -> None:
+    """Compile before times are measured, and keep OpenCV to one thread."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    chain = Chain()
+    picture = shoot(chain)
+    cached_extractor(chain.pose.pattern, chain.pose.layers, preset).extract(picture.image)
