@@ -108,14 +108,16 @@ class Extractor:
         layout: a triangular pattern.
         preset: "fast", "balanced" or "accurate".
         response: how light became values: "srgb", "linear", an exponent (light is value ** exponent), or a table of the
-            light of all 256 values.
+            light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
         ValueError: no such preset or response.
     """
 
-    def __init__(self, layout: Reference, preset: Preset = "balanced", response: Response = "srgb") -> None:
+    def __init__(
+        self, layout: Reference, preset: Preset = "balanced", response: Response | None = None
+    ) -> None:
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
@@ -125,7 +127,11 @@ class Extractor:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._preset = preset
         self._response = response
-        self._tables = response_tables(light_of_values(response))
+        by_depth = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
+        self._tables = {
+            depth: response_tables(light_of_values(usual if response is None else response))
+            for depth, usual in by_depth.items()
+        }
         self._lattice = lattice_of(layout)
         self._topology = topology_of(layout)
         self._domain_limit = max(MAX_DOMAINS_PER_CELL * len(self._lattice.ink), MIN_DOMAIN_LIMIT)
@@ -154,7 +160,7 @@ class Extractor:
         bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
             return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
-        pyramid = self.pyramid(bgr)
+        pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Reason):
             return ReadImage(no_markers(self.layout, found, stages), None)
@@ -162,9 +168,9 @@ class Extractor:
         places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
-    def pyramid(self, bgr: NDArray[np.uint8]) -> Pyramid:
-        """The image (H, W, 3) at several scales, with the response."""
-        return Pyramid(bgr, self._tables)
+    def pyramid(self, bgr: NDArray[np.uint8], depth: np.dtype[Any]) -> Pyramid:
+        """The image (H, W, 3) at several scales, with the response of images of a ``depth``, uint8 or uint16."""
+        return Pyramid(bgr, self._tables[depth])
 
     def finish(
         self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None

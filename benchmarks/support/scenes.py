@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from inspect import signature
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,11 +84,8 @@ def cached_reference(pattern: str, layers: int) -> Reference:
 
 
 def make_extractor(reference: Reference, preset: Preset, response: Response) -> Extractor:
-    """The extractor for pictures with a response. sRGB is its default; it is told another one if it takes one."""
-    options: dict[str, Any] = {}
-    if response != "srgb" and "response" in signature(Extractor).parameters:
-        options["response"] = response
-    return Extractor(reference, preset, **options)
+    """The extractor for pictures with a response."""
+    return Extractor(reference, preset, response)
 
 
 def cached_extractor(case: SceneCase, preset: Preset = "balanced") -> Extractor:

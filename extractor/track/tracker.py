@@ -194,7 +194,7 @@ class Tracker:
         bgr = stages.record("image", convert_to_bgr(image))
         if bgr is None:
             return None
-        pyramid = self._extractor.pyramid(bgr)
+        pyramid = self._extractor.pyramid(bgr, image.dtype)
         edge_px = float(short_edges(state.xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
         level = pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
         candidates = [level.to_level(state.xy_px)]

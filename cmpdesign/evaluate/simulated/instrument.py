@@ -132,7 +132,7 @@ class Instrument:
         if self.reader == "colors":
             from extractor import Extractor
 
-            extract = Extractor(self.reference, self.preset).extract
+            extract = Extractor(self.reference, self.preset, self.sensor.response).extract
             return [extract] * len(self.sensor.rig.views)
         return [_make_square_reader(self, view) for view in self.sensor.rig.views]
 
