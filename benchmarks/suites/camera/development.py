@@ -1,4 +1,4 @@
-"""The development of a picture: white balance, sharpening, tone curve, encoding, compression."""
+"""The development of a picture: white balance, sharpening, tone mapping, tone curve, encoding, compression."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from extractor.image.response import encode_light, light_of_values
 
 Planes = NDArray[np.float32]
 SHARPENING_SIGMA_PX = 1.0
+TONE_SIGMA_PX = 25.0  # of the surroundings that local tone mapping compares a pixel with
+DARKEST_TONE = 0.02  # of white, below which surroundings are not brightened further
 
 
 def balance_gains(development: Development, lamp_bgr: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -25,6 +27,8 @@ def develop(planes: Planes, development: Development) -> NDArray[np.uint8]:
     if development.sharpening:
         smooth = cv2.GaussianBlur(light, (0, 0), SHARPENING_SIGMA_PX)
         light = light + np.float32(development.sharpening) * (light - smooth)
+    if development.tone_mapping:
+        light = tone_mapped(light, development.tone_mapping)
     values = encode_light(255.0 * np.clip(light, 0, 1), light_of_values("srgb"))
     if development.s_curve:
         values = s_curved(values, development.s_curve)
@@ -32,6 +36,17 @@ def develop(planes: Planes, development: Development) -> NDArray[np.uint8]:
     if development.jpeg_quality is None:
         return image
     return compressed(image, development.jpeg_quality, chroma_420=development.jpeg_420)
+
+
+def tone_mapped(light: Planes, strength: float) -> Planes:
+    """Light (H, W, 3) after local tone mapping: dark surroundings are brightened and bright ones darkened.
+
+    The gain is the surroundings' brightness, relative to that of the whole picture, to the power of -``strength``.
+    """
+    gray = light.mean(axis=2)
+    around = np.maximum(cv2.GaussianBlur(gray, (0, 0), TONE_SIGMA_PX), DARKEST_TONE)
+    gain = (around / max(float(gray.mean()), DARKEST_TONE)) ** np.float32(-strength)
+    return np.asarray(light * gain[:, :, None], dtype=np.float32)
 
 
 def s_curved(values: NDArray[np.float64], strength: float) -> NDArray[np.float64]:

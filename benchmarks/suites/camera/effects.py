@@ -193,6 +193,11 @@ def sharpen(chain: Chain, strength: float, rng: Rng) -> Chain:
     return replace(chain, development=replace(chain.development, sharpening=2.0 * strength))
 
 
+def map_tones(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Local tone mapping as of phones, with an exponent of up to 0.5."""
+    return replace(chain, development=replace(chain.development, tone_mapping=0.5 * strength))
+
+
 def add_s_curve(chain: Chain, strength: float, rng: Rng) -> Chain:
     """An S-shaped tone curve of a strength of up to 1."""
     return replace(chain, development=replace(chain.development, s_curve=strength))
@@ -230,6 +235,7 @@ EFFECTS: dict[str, Effect] = {
     "lifted black": lift_black,
     "white balance": misbalance,
     "sharpening": sharpen,
+    "tone mapping": map_tones,
     "s-curve": add_s_curve,
     "jpeg": compress,
 }

@@ -134,6 +134,7 @@ class Development:
         balance: share of the lamps' mean color that the white balance removes.
         balance_error: (R, G, B) logarithms of further gains.
         sharpening: strength of the unsharp mask.
+        tone_mapping: exponent of the local tone mapping, 0 to 1.
         s_curve: strength of the S-shaped tone curve, 0 to 1.
         jpeg_quality: 1 to 100; None: no compression.
         jpeg_420: colors at half the resolution.
@@ -142,6 +143,7 @@ class Development:
     balance: float = 1.0
     balance_error: RGB = (0.0, 0.0, 0.0)
     sharpening: float = 0.0
+    tone_mapping: float = 0.0
     s_curve: float = 0.0
     jpeg_quality: int | None = None
     jpeg_420: bool = False
