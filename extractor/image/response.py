@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 from extractor.numeric.compilation import inlined_no_refcount
 
 VALUES = 256  # of 8 bits
-SRGB_EXPONENT = 2.4  # of the sRGB curve above its straight part,
-SRGB_STRAIGHT = 0.0392857  # which ends at this share of the largest value (0.055 / 1.4)
+SRGB_SLOPE, SRGB_STRAIGHT = 12.92, 0.04045  # of the straight line from 0, and the value where the line ends
+SRGB_OFFSET, SRGB_EXPONENT = 0.055, 2.4  # of the curve above
 MIN_EXPONENT, MAX_EXPONENT = 0.2, 5.0
 ENTRIES = 2048  # of the table that encodes light; equal steps of the square root of light
 STEPS_PER_ROOT = np.float32((ENTRIES - 1) / 255.0**0.5)
 LIGHT_STEPS = 1 << 14  # steps of light from 0 to 255, for means of pixels
-LINEAR_EXPONENT = 1.0
 
-Response = Literal["auto", "srgb", "linear"] | float | Sequence[float] | NDArray[np.floating[Any]]
+Response = Literal["srgb", "linear"] | float | Sequence[float] | NDArray[np.floating[Any]]
 
 
 class ResponseTables(NamedTuple):
@@ -52,15 +51,16 @@ def light_of_values(response: Response) -> NDArray[np.float64]:
             256 values in any unit, each larger than the one before.
 
     Raises:
-        ValueError: the response is none of these, or "auto", which is found in an image.
+        ValueError: the response is none of these.
     """
     if isinstance(response, str):
-        exponents = {"srgb": SRGB_EXPONENT, "linear": LINEAR_EXPONENT}
-        if response not in exponents:
-            raise ValueError(
-                f"response is {response!r}; give 'srgb', 'linear', an exponent or a table of 256 values"
-            )
-        return standard_light(exponents[response])
+        if response == "srgb":
+            return _srgb_light()
+        if response == "linear":
+            return np.arange(VALUES, dtype=np.float64)
+        raise ValueError(
+            f"response is {response!r}; give 'srgb', 'linear', an exponent or a table of 256 values"
+        )
     if np.ndim(response) == 0:
         exponent = float(response)  # type: ignore[arg-type]
         if not MIN_EXPONENT <= exponent <= MAX_EXPONENT:
@@ -87,16 +87,11 @@ def _checked_table(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(table * (255.0 / table[-1]))
 
 
-def standard_light(exponent: float) -> NDArray[np.float64]:
-    """(256,) the light of each value by the formula of sRGB with another exponent: 2.4 is sRGB, 1 is linear.
-
-    The curve is a power of an offset value, and below ``SRGB_STRAIGHT`` the straight line that touches the curve.
-    """
+def _srgb_light() -> NDArray[np.float64]:
+    """(256,) the light of each value by IEC 61966-2-1: a straight line, then a power of the value with an offset."""
     value = np.linspace(0.0, 1.0, VALUES)
-    offset = SRGB_STRAIGHT * (exponent - 1.0)
-    curve = ((value + offset) / (1.0 + offset)) ** exponent
-    slope = exponent / (1.0 + offset) * ((SRGB_STRAIGHT + offset) / (1.0 + offset)) ** (exponent - 1.0)
-    return np.asarray(255.0 * np.where(value < SRGB_STRAIGHT, slope * value, curve))
+    curve = ((value + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)) ** SRGB_EXPONENT
+    return np.asarray(255.0 * np.where(value <= SRGB_STRAIGHT, value / SRGB_SLOPE, curve))
 
 
 def decode_values(values: NDArray[Any], light_of_value: NDArray[np.float64]) -> NDArray[np.float64]:
