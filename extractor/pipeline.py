@@ -127,7 +127,7 @@ class Extractor:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._preset = preset
         self._response = response
-        by_depth = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
+        by_depth: dict[Any, Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
         self._tables = {
             depth: response_tables(light_of_values(usual if response is None else response))
             for depth, usual in by_depth.items()

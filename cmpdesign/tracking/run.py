@@ -17,6 +17,7 @@ from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:
     from extractor import Markers, Reference
+    from extractor.image.response import Response
 
 
 @dataclass(eq=False)
@@ -110,7 +111,9 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def read_rest_markers(text: str, source: str, reference: Reference, fps: float | None) -> Markers:
+def read_rest_markers(
+    text: str, source: str, reference: Reference, fps: float | None, response: Response | None = None
+) -> Markers:
     """Extract the markers at rest.
 
     Args:
@@ -118,13 +121,14 @@ def read_rest_markers(text: str, source: str, reference: Reference, fps: float |
         source: the source, see ``open_source``.
         reference: the layout.
         fps: see ``open_source``.
+        response: see ``Extractor``.
 
     Raises:
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
     from extractor import Extractor
 
-    markers = Extractor(reference).extract(read_rest_image(text, source, fps))
+    markers = Extractor(reference, response=response).extract(read_rest_image(text, source, fps))
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import ImageError
+from extractor.image.response import Response
 from extractor.layout.reference import Reference
 from extractor.pipeline import Extractor
 from extractor.presets import Preset
@@ -61,13 +62,21 @@ def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> l
 class ViewExtractor:
     """Finds the markers of every view. Can be pickled and copied.
 
+    Args:
+        layout: a triangular pattern.
+        rig: the views.
+        preset, response: see ``Extractor``.
+
     Raises:
         LayoutError: the layout is not a triangular pattern.
+        ValueError: no such preset or response.
     """
 
-    def __init__(self, layout: Reference, rig: Rig, preset: Preset = "balanced") -> None:
+    def __init__(
+        self, layout: Reference, rig: Rig, preset: Preset = "balanced", response: Response | None = None
+    ) -> None:
         self.layout, self.rig = layout, rig
-        self._extractor = Extractor(layout, preset)
+        self._extractor = Extractor(layout, preset, response)
 
     def extract(self, image: Image | Sequence[Image]) -> tuple[Markers, ...]:
         """The markers view by view, in the frame of the full image.
@@ -116,11 +125,18 @@ class ShapeTracker:
     Args:
         reconstructor: with the poses of the views.
         warm: start from the frame before where the image proves the prediction.
+        response: see ``Extractor``.
+
+    Raises:
+        ValueError: no such response.
     """
 
-    def __init__(self, reconstructor: Reconstructor, *, warm: bool = True) -> None:
+    def __init__(
+        self, reconstructor: Reconstructor, *, warm: bool = True, response: Response | None = None
+    ) -> None:
         self.reconstructor = reconstructor
-        self._trackers = [Tracker(reconstructor.layout, warm=warm) for _ in reconstructor.rig.views]
+        layout, views = reconstructor.layout, reconstructor.rig.views
+        self._trackers = [Tracker(layout, warm=warm, response=response) for _ in views]
         self._count = 0
 
     def track(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from extractor.errors import ImageError
 from extractor.image.input import convert_to_bgr
 from extractor.image.pyramid import Pyramid
+from extractor.image.response import Response
 from extractor.layout.reference import Reference
 from extractor.pipeline import Extractor, NumberedMarkers, Stages, no_markers
 from extractor.refine.estimate import Appearance
@@ -113,9 +114,11 @@ class Tracker:
         mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
             homography fitted at rest.
         warm: start from the frame before where the image proves the prediction; False: always cold. Ids are the same.
+        response: see ``Extractor``.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
+        ValueError: no such response.
     """
 
     def __init__(
@@ -125,10 +128,11 @@ class Tracker:
         rest: Markers | None = None,
         mm_per_px: float | None = None,
         warm: bool = True,
+        response: Response | None = None,
     ) -> None:
         self.layout = layout
         self.rest: Rest | None = None
-        self._extractor = Extractor(layout)
+        self._extractor = Extractor(layout, response=response)
         self._mm_per_px = mm_per_px
         self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
         self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])

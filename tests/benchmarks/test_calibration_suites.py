@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.calibration.run import main, read_jobs, rows_text
-from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.damaged import DAMAGE_KINDS, MILD_KINDS
 from benchmarks.suites.calibration.plain import scattered_layout
 from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, read_pictures
-from benchmarks.suites.calibration.suites import CAMERA_MODULE, suites_by_name
+from benchmarks.suites.calibration.suites import suites_by_name, usual_seed
+from benchmarks.suites.camera.cases import KINDS, commit_seed
 from benchmarks.suites.scoring.squares import POSITIONS, nearest_truth, picture_squares
 from benchmarks.suites.stress.frames import PATTERNS, plain_frame
 from cmpdesign.files.layout_json import layout_to_json
@@ -30,8 +27,8 @@ def kinds_of(suite: str) -> list[str]:
 
 
 def test_suites_have_their_kinds_in_all_patterns() -> None:
-    assert [name for name in suites_by_name() if name != "camera"] == [
-        "plain", "mild dirt", "damage", "stress", "scatter",
+    assert list(suites_by_name()) == [
+        "plain", "mild dirt", "damage", "stress", "scatter", "camera",
     ]  # fmt: skip
     plain = list(suites_by_name()["plain"](True, 0))
     assert len({case.kind for case in plain}) == 8 and {case.layout.pattern for case in plain} == set(
@@ -94,15 +91,25 @@ def test_parts_of_a_suite_are_the_suite() -> None:
     assert len(kinds) == 3 and together == [sum(kinds)]
 
 
-def test_the_camera_suite_is_read_where_it_offers_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    frame = plain_frame("honeycomb", 5, layers=4)
+def test_the_camera_suite_has_all_effects_and_the_commits_seed() -> None:
+    assert kinds_of("camera") == list(KINDS)
+    assert usual_seed("camera") == commit_seed() and usual_seed("plain") == 0
+    cases = suites_by_name()["camera"]
+    first, again, other = (next(cases(True, seed)).shoot() for seed in (5, 5, 6))
+    np.testing.assert_array_equal(first.image, again.image)
+    assert (first.image != other.image).any()
 
-    def camera_cases(quick: bool, seed: int) -> Iterator[CalibrationCase]:
-        yield CalibrationCase("lamps", frame.layout, frame.shoot)
 
-    monkeypatch.setitem(sys.modules, CAMERA_MODULE, SimpleNamespace(camera_cases=camera_cases))  # type: ignore[arg-type]
-    (reading,) = read_pictures(SuiteJob("camera", ("balanced",), True))
-    assert (reading.suite, reading.kind) == ("camera", "lamps") and len(reading.squares["measured"]) == 61
+def test_markers_and_virtual_markers_of_cameras_lie_where_their_truth_says() -> None:
+    """An undisturbed picture, and one that is distorted: there gridlines are curved."""
+    cases = list(suites_by_name()["camera"](True, 5))
+    for kind in ("none", "distortion"):
+        case = next(case for case in cases if case.kind == kind)
+        shot = case.shoot()
+        markers = Extractor(parse_layout(layout_to_json(case.layout))).extract(shot.image)
+        found = picture_squares(markers, shot.truths[0])
+        for position in ("measured", "virtual, measured"):
+            assert len(found[position]) > 100 and np.median(found[position]) < 4
 
 
 def test_a_quick_run_prints_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,7 +117,7 @@ def test_a_quick_run_prints_and_writes(tmp_path: Path, capsys: pytest.CaptureFix
     arguments = ["--quick", "--preset", "balanced", "--suite", "scatter", "--processes", "1"]
     assert main([*arguments, "--json", str(out)]) == 0
     text = capsys.readouterr().out
-    assert "0.5 px: virtual, measured" in text and "9 pictures, seed 0" in text
+    assert "0.5 px: virtual, measured" in text and "9 pictures, seed of scatter 0;" in text
     written = json.loads(out.read_text(encoding="utf-8"))
     assert {row["kind"] for row in written["rows"]} == {"0.05 px", "0.2 px", "0.5 px", "together"}
     row = next(row for row in written["rows"] if (row["kind"], row["positions"]) == ("together", "measured"))

@@ -1,31 +1,35 @@
-"""All suites of calibration by name, with the camera suite where it offers pictures."""
+"""All suites of calibration by name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib import import_module
 
+from benchmarks.suites.calibration.camera import camera_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.damaged import damage_cases, mild_dirt_cases, stress_cases
 from benchmarks.suites.calibration.plain import plain_cases, scatter_cases
+from benchmarks.suites.camera.cases import commit_seed
 
 SuiteCases = Callable[[bool, int], Iterator[CalibrationCase]]  # quick, seed -> cases
-CAMERA_PACKAGE = "benchmarks.suites.camera"
-CAMERA_MODULE = f"{CAMERA_PACKAGE}.calibration"  # it offers ``camera_cases``, a ``SuiteCases``
+CAMERA = "camera"
 
 
 def suites_by_name() -> dict[str, SuiteCases]:
-    """Name -> the cases of a suite; camera is left out where ``CAMERA_MODULE`` is missing."""
-    suites: dict[str, SuiteCases] = {
+    """Name -> the cases of a suite."""
+    return {
         "plain": plain_cases,
         "mild dirt": mild_dirt_cases,
         "damage": damage_cases,
         "stress": stress_cases,
         "scatter": scatter_cases,
+        CAMERA: camera_cases,
     }
-    try:
-        suites["camera"] = import_module(CAMERA_MODULE).camera_cases
-    except ModuleNotFoundError as error:
-        if error.name not in (CAMERA_PACKAGE, CAMERA_MODULE):
-            raise
-    return suites
+
+
+def usual_seed(suite: str) -> int:
+    """The seed of a run without ``--seed``: the commit's for the camera suite, 0 for all others.
+
+    Raises:
+        ValueError: the camera suite outside a repository.
+    """
+    return commit_seed() if suite == CAMERA else 0

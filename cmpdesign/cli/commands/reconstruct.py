@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
+    from extractor.image.response import Response
 
 
 def reconstruct(
@@ -51,6 +53,7 @@ def reconstruct(
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -65,7 +68,8 @@ def reconstruct(
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
-    options = _Options(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold)
+    known = parse_reading_response(response)
+    options = _Options(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known)
     run = _prepare_run(options)
     run.limit = frames
     try:
@@ -91,6 +95,7 @@ class _Options(NamedTuple):
     model_px: float | None
     fps: float | None
     cold: bool
+    response: Response | None
 
 
 def _prepare_run(options: _Options) -> TrackingRun:
@@ -105,14 +110,14 @@ def _prepare_run(options: _Options) -> TrackingRun:
     rig = load_rig(options.rig)
     if options.from_rest:
         rig = rig.without_poses()
-    views = ViewExtractor(load_layout(options.layout), rig, "accurate")
+    views = ViewExtractor(load_layout(options.layout), rig, "accurate", options.response)
     at_rest = views.extract(_read_rest_image(options))
     flatness_mm = (0.0, 0.0, options.flatness_mm)
     reconstructor = Reconstructor(
         views.layout, views.rig, at_rest, flatness_mm=flatness_mm, model_px=options.model_px
     )
     sink = open_sink(options.output, ShapeTable(reconstructor))
-    tracker = ShapeTracker(reconstructor, warm=not options.cold)
+    tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
     source = open_sources(options.source, options.fps)
     return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor))
 

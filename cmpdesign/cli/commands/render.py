@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmpdesign.cli.response import METAVAR, parse_response
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError
 
@@ -96,7 +97,7 @@ def render(
     response: Annotated[
         str,
         typer.Option(
-            metavar="srgb|linear|EXPONENT",
+            metavar=METAVAR,
             help="How light becomes values; with an exponent light is value ** exponent.",
         ),
     ] = "srgb",
@@ -171,21 +172,3 @@ def parse_image_size(text: str) -> tuple[int, int]:
     if not match:
         raise CmpDesignError(f"--size {text}: expected WIDTHxHEIGHT, 10 to 9999 pixels each, as in 640x480")
     return int(match[1]), int(match[2])
-
-
-def parse_response(text: str) -> Literal["srgb", "linear"] | float:
-    """The response from "srgb", "linear" or an exponent, whose limits ``Sensor`` checks.
-
-    Raises:
-        CmpDesignError: another text.
-    """
-    if text == "srgb":
-        return "srgb"
-    if text == "linear":
-        return "linear"
-    try:
-        return float(text)
-    except ValueError:
-        raise CmpDesignError(
-            f"--response {text}: expected srgb, linear or an exponent from 0.2 to 5, as in 2.2"
-        ) from None

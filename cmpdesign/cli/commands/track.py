@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
+    from extractor.image.response import Response
     from extractor.layout.reference import Reference
 
 
@@ -49,6 +51,7 @@ def track(
         Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -65,7 +68,8 @@ def track(
     from extractor import load_layout
 
     reference = load_layout(layout)
-    run = _prepare_run(reference, source, output, rest, mm_per_px, fps, overlay, cold)
+    known = parse_reading_response(response)
+    run = _prepare_run(reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known))
     run.limit = frames
     try:
         run_with_progress(run, "tracking")
@@ -77,16 +81,20 @@ def track(
     exit_with_status(run)
 
 
-def _prepare_run(
-    reference: Reference,
-    source: str,
-    output: Path,
-    rest: str | None,
-    mm_per_px: float | None,
-    fps: float | None,
-    overlay: Path | None,
-    cold: bool,
-) -> TrackingRun:
+class _Options(NamedTuple):
+    """Arguments and options of the command."""
+
+    source: str
+    output: Path
+    rest: str | None
+    mm_per_px: float | None
+    fps: float | None
+    overlay: Path | None
+    cold: bool
+    response: Response | None
+
+
+def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.overlay import OverlayWriter
     from cmpdesign.tracking.run import TrackingRun, read_rest_markers
@@ -96,12 +104,16 @@ def _prepare_run(
     from cmpdesign.tracking.table import TrackTable
     from extractor.track.tracker import Tracker
 
-    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps)
-    tracker = Tracker(reference, rest=at_rest, mm_per_px=mm_per_px, warm=not cold)
+    rest, source, fps, response = options.rest, options.source, options.fps, options.response
+    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps, response)
+    tracker = Tracker(
+        reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=not options.cold, response=response
+    )
     frames = open_source(source, fps)
-    video = None if overlay is None else OverlayWriter(overlay, reference, frames.fps or DEFAULT_FPS)
+    path = options.overlay
+    video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
     return TrackingRun(
-        frames, tracker, open_sink(output, TrackTable(tracker)), TrackStatistics(reference), video
+        frames, tracker, open_sink(options.output, TrackTable(tracker)), TrackStatistics(reference), video
     )
 
 

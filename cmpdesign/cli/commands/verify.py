@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, console, error_on_one_line, print_error, printable_path
 
 if TYPE_CHECKING:
@@ -65,14 +66,14 @@ def verify(
             min=0, help="The pictures are print sheets of this resolution (0: unknown), whatever files say."
         ),
     ] = None,
+    response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from extractor import Extractor, load_layout
 
-    reference = load_layout(layout)
-    verifier = _ImageVerifier(
-        reference, cache(lambda: Extractor(reference)), min_share, sheet_dpi, output, debug
-    )
+    reference, known = load_layout(layout), parse_reading_response(response)
+    extractor = cache(lambda: Extractor(reference, response=known))
+    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug)
     names = _unique_names([path.stem for path in images])
     outcomes = [
         verifier.verify_image(path, name)

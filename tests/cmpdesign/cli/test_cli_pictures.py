@@ -96,6 +96,23 @@ def test_render_refuses(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_verify_takes_a_response(made: Path, tmp_path: Path) -> None:
+    """The overlay differs where markers lie elsewhere; a picture is read by its own response without being told."""
+    for response in ("srgb", "linear", "2.2"):
+        options = ("-o", tmp_path / response, "--response", response)
+        assert run("verify", made / "layout.json", made / "good.png", *options).exit_code == 0
+    assert run("verify", made / "layout.json", made / "good.png", "-o", tmp_path / "usual").exit_code == 0
+    usual, srgb, linear, power = (
+        np.asarray(cv2.imread(str(tmp_path / name / "good.overlay.png")), dtype=int)
+        for name in ("usual", "srgb", "linear", "2.2")
+    )
+    np.testing.assert_array_equal(usual, srgb)
+    assert 0 < np.abs(srgb - power).mean() < np.abs(srgb - linear).mean()
+    for value in ("rec709", "9"):
+        expected = f"--response {value}: "
+        assert expected in refused("verify", made / "layout.json", made / "good.png", "--response", value)
+
+
 def test_verify_a_good_picture(made: Path, tmp_path: Path) -> None:
     result = run(
         "verify", made / "layout.json", made / "good.png", "-o", tmp_path, "--debug", tmp_path / "stages"

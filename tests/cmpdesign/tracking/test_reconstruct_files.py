@@ -91,6 +91,21 @@ def test_arrays_hold_the_surface_in_micrometres(made: Path, tmp_path: Path) -> N
         np.testing.assert_allclose(rotation, camera.R_camera_from_layout, atol=1e-3)
 
 
+def test_views_are_read_by_their_response(made: Path, tmp_path: Path) -> None:
+    """The frames are sRGB: read as linear, the rest image and every frame are worse."""
+    truth = np.load(made / "truth.npy")
+
+    def errors(*options: object) -> tuple[float, float]:
+        positions = arrays(made, tmp_path / "a.npz", "--frames", "2", *options)["3D_Positions"]
+        summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+        rest_px = float(np.mean([view["rms_px"] for view in summary["views"]]))
+        return rest_px, float(np.sqrt(np.nanmean((positions - truth[:2]) ** 2)))
+
+    usual, wrong = errors(), errors("--response", "linear")
+    assert errors("--response", "srgb") == usual
+    assert wrong[0] > 1.5 * usual[0] and wrong[1] > 1.5 * usual[1]
+
+
 def test_all_tables_say_the_same(made: Path, tmp_path: Path) -> None:
     import pyarrow.parquet as pyarrow
 

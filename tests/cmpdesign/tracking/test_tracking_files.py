@@ -18,9 +18,10 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
+from cmpdesign.scene import Sensor, Twist, render
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
-from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference
+from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene
 
 FRAMES = 24
 MARKERS = 91
@@ -73,6 +74,30 @@ def test_a_video_becomes_arrays(made: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["layout_xy_mm"], reference().xy_mm)
     assert str(table["digest"]) == reference().digest
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.summary.json"]
+
+
+def test_frames_are_read_by_their_response(made: Path, tmp_path: Path) -> None:
+    """Linear frames, at rest and moved by a twist: positions and displacement are right once the response is told."""
+    scenes = [
+        scene(sensor=Sensor(noise=1.0, response="linear"), surface=surface)
+        for surface in (None, Twist(5.0, 5.0))
+    ]
+    (tmp_path / "frames").mkdir()
+    truth = []
+    for index, each in enumerate(scenes):
+        rendered = render(each, size=SIZE)
+        cv2.imwrite(str(tmp_path / "frames" / f"frame{index}.png"), rendered.image)
+        truth.append(rendered.truth.marker_xy_px)
+
+    def rms_px(*options: object) -> tuple[float, float]:
+        table = tracked(made, str(tmp_path / "frames"), tmp_path / "a.npz", "--rest", "0", *options)
+        rest_error, error = table["rest_xy_px"] - truth[0], table["xy_px"] - truth
+        return float(np.sqrt((rest_error**2).mean())), float(np.sqrt((error**2).mean()))
+
+    for told, usual in zip(rms_px("--response", "linear"), rms_px(), strict=True):
+        assert told < 0.015 < 0.03 < usual
+    command = ("track", made / "layout.json", tmp_path / "frames", "-o", tmp_path / "b.npz")
+    assert "--response rec709: expected srgb" in refused(*command, "--response", "rec709")
 
 
 def test_all_tables_and_sources_say_the_same(made: Path, tmp_path: Path) -> None:
