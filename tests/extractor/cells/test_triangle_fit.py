@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import fit_triangles
-from extractor.image.pyramid import Pyramid, PyramidLevel
-from extractor.image.response import decode_values, encode_light, light_of_values, response_tables
+from extractor.image.pyramid import PyramidLevel
+from tests.support.pictures import extractor
+from tests.support.srgb import srgb_light, srgb_values
 
 Points = NDArray[np.float64]
 FINE = 8  # small pixels to a pixel and axis
-SRGB = light_of_values("srgb")
-BLACK, RED = (decode_values(np.array(values), SRGB) for values in ([20, 20, 20], [45, 50, 200]))  # as light
+BLACK, RED = srgb_light(np.array([20, 20, 20])), srgb_light(np.array([45, 50, 200]))
 
 
 def half_planes(xy: Points, corners: Points) -> NDArray[np.bool_]:
@@ -56,13 +56,13 @@ def region_of(mask: NDArray[np.bool_]) -> Regions:
 
 
 def view_of(image: NDArray[np.uint8]) -> PyramidLevel:
-    return Pyramid(image, response_tables(SRGB)).level(1)
+    return extractor().pyramid(image, image.dtype).level(1)
 
 
 def picture_of(cover: Points, blur_px: float) -> PyramidLevel:
     """The encoded picture of a triangle whose light is blurred."""
     smooth = cv2.GaussianBlur(cover, (0, 0), blur_px) if blur_px else cover
-    return view_of(np.rint(encode_light(BLACK + smooth[..., None] * (RED - BLACK), SRGB)).astype(np.uint8))
+    return view_of(np.rint(srgb_values(BLACK + smooth[..., None] * (RED - BLACK))).astype(np.uint8))
 
 
 def distance_px(found: Points, corners: Points) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from extractor import Extractor, parse_layout
 from extractor.image.response import (
@@ -22,14 +21,9 @@ from extractor.image.response import (
     response_tables,
 )
 from tests.support.layouts import small_text
+from tests.support.srgb import srgb_light
 
-Values = NDArray[np.float64]
 ALL = np.arange(256) / 255
-
-
-def srgb_light(value: Values) -> Values:
-    """IEC 61966-2-1, values and light from 0 to 1."""
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def responses() -> st.SearchStrategy[Any]:
@@ -42,7 +36,7 @@ def responses() -> st.SearchStrategy[Any]:
 
 def test_srgb_is_that_of_the_standard() -> None:
     """The standard rounds its constants: its line has the slope 1 / 12.92, the line that touches has 1 / 12.9232."""
-    np.testing.assert_allclose(light_of_values("srgb"), 255 * srgb_light(ALL), atol=0.002, rtol=3e-4)
+    np.testing.assert_allclose(light_of_values("srgb"), srgb_light(np.arange(256)), atol=0.002, rtol=3e-4)
 
 
 def test_known_values_of_srgb() -> None:
