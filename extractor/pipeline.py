@@ -127,7 +127,7 @@ class Extractor:
             raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
         self._preset = preset
         self._response = response
-        by_depth: dict[Any, Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
+        by_depth: dict[np.dtype[Any], Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
         self._tables = {
             depth: response_tables(light_of_values(usual if response is None else response))
             for depth, usual in by_depth.items()
@@ -139,7 +139,7 @@ class Extractor:
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is built anew from layout and preset; buffers are not copied."""
+        """A copy is built anew from layout, preset and response; buffers are not copied."""
         return type(self), (self.layout, self._preset, self._response)
 
     def extract(self, image: NDArray[Any]) -> Markers:

@@ -22,6 +22,7 @@ MIN_EXPONENT, MAX_EXPONENT = 0.2, 5.0
 ENTRIES = 2048  # of the table that encodes light; equal steps of the square root of light
 STEPS_PER_ROOT = np.float32((ENTRIES - 1) / 255.0**0.5)
 LIGHT_STEPS = 1 << 14  # steps of light from 0 to 255, for means of pixels
+ALLOWED = "give 'srgb', 'linear', an exponent or a table of 256 values"
 
 Response = Literal["srgb", "linear"] | float | Sequence[float] | NDArray[np.floating[Any]]
 
@@ -58,17 +59,18 @@ def light_of_values(response: Response) -> NDArray[np.float64]:
             return _srgb_light()
         if response == "linear":
             return np.arange(VALUES, dtype=np.float64)
-        raise ValueError(
-            f"response is {response!r}; give 'srgb', 'linear', an exponent or a table of 256 values"
-        )
-    if np.ndim(response) == 0:
-        exponent = float(response)  # type: ignore[arg-type]
+        raise ValueError(f"response is {response!r}; {ALLOWED}")
+    numbers = np.asarray(response)
+    if numbers.dtype.kind not in "iuf":
+        raise ValueError(f"response is {response!r}; {ALLOWED}")
+    if numbers.ndim == 0:
+        exponent = float(numbers)
         if not MIN_EXPONENT <= exponent <= MAX_EXPONENT:
             raise ValueError(
                 f"response is the exponent {exponent:g}; it must lie between {MIN_EXPONENT:g} and {MAX_EXPONENT:g}"
             )
         return np.asarray(255.0 * np.linspace(0.0, 1.0, VALUES) ** exponent)
-    return _checked_table(np.asarray(response, dtype=np.float64))
+    return _checked_table(numbers.astype(np.float64))
 
 
 def _checked_table(table: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -84,7 +86,7 @@ def _checked_table(table: NDArray[np.float64]) -> NDArray[np.float64]:
             f"response is a table that does not rise from value {steps[0]} ({table[steps[0]]:g}) to the next "
             f"({table[steps[0] + 1]:g}); each value must stand for more light than the one before"
         )
-    return np.asarray(table * (255.0 / table[-1]))
+    return np.asarray(255.0 * (table / table[-1]))
 
 
 def _srgb_light() -> NDArray[np.float64]:

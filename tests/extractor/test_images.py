@@ -26,6 +26,7 @@ from extractor import (
 )
 from tests.support.layouts import PATTERNS, small_layout, small_text
 from tests.support.pictures import STRANGE, Image, extractor, picture, recolored, scene_of
+from tests.support.srgb import srgb_light, srgb_values
 
 TRIANGULAR = PATTERNS[:3]
 STAGES = ["image", "color", "target", "segment", "seeds", "grow", "triangles", "cells", "mesh", "number"]
@@ -143,9 +144,10 @@ SAME = {
 
 @pytest.mark.parametrize("kind", SAME)
 def test_other_ways_to_hold_the_same_picture(kind: str) -> None:
-    image = picture().image
-    expected = extractor().extract(image)
-    markers = extractor().extract(SAME[kind](image))
+    """The response is stated: without, 16 bits are linear."""
+    image, by = picture().image, Extractor(extractor().layout, response="srgb")
+    expected = by.extract(image)
+    markers = by.extract(SAME[kind](image))
     np.testing.assert_array_equal(markers.xy_px, expected.xy_px)
     np.testing.assert_array_equal(markers.status, expected.status)
 
@@ -307,8 +309,9 @@ def test_a_flipped_image_is_recognised_as_mirrored(pattern: str) -> None:
     "change", [lambda x: x * 0.35, lambda x: x * 0.6 + 40, lambda x: x * (0.6, 1.0, 0.8)]
 )
 def test_exposure_haze_and_white_balance(change: Callable[[Any], Any]) -> None:
+    """They act on light, before the encoding."""
     seen = picture()
-    image = np.clip(np.rint(change(seen.image.astype(np.float64))), 0, 255).astype(np.uint8)
+    image = np.rint(srgb_values(change(srgb_light(seen.image)))).astype(np.uint8)
     markers = extractor().extract(image)
     assert (markers.status == Status.MEASURED).all()
     assert errors_px(markers, seen.truth).max() < 0.3

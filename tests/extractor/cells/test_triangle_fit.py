@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import fit_triangles
+from extractor.image.pyramid import PyramidLevel
+from tests.support.pictures import extractor
+from tests.support.srgb import srgb_light, srgb_values
 
 Points = NDArray[np.float64]
 FINE = 8  # small pixels to a pixel and axis
-BLACK, RED = np.array([20.0, 20.0, 20.0]), np.array([45.0, 50.0, 200.0])
+BLACK, RED = srgb_light(np.array([20, 20, 20])), srgb_light(np.array([45, 50, 200]))
 
 
 def half_planes(xy: Points, corners: Points) -> NDArray[np.bool_]:
@@ -52,9 +55,14 @@ def region_of(mask: NDArray[np.bool_]) -> Regions:
     )
 
 
-def picture_of(cover: Points, blur_px: float) -> NDArray[np.uint8]:
+def view_of(image: NDArray[np.uint8]) -> PyramidLevel:
+    return extractor().pyramid(image, image.dtype).level(1)
+
+
+def picture_of(cover: Points, blur_px: float) -> PyramidLevel:
+    """The encoded picture of a triangle whose light is blurred."""
     smooth = cv2.GaussianBlur(cover, (0, 0), blur_px) if blur_px else cover
-    return np.rint(BLACK + smooth[..., None] * (RED - BLACK)).astype(np.uint8)
+    return view_of(np.rint(srgb_values(BLACK + smooth[..., None] * (RED - BLACK))).astype(np.uint8))
 
 
 def distance_px(found: Points, corners: Points) -> float:
@@ -130,7 +138,7 @@ def test_a_triangle_without_contrast_is_dropped() -> None:
     """Its pixels say triangle, the image shows nothing there."""
     corners = np.array([[12.0, 40.0], [32.0, 10.0], [50.0, 42.0]])
     flat = np.full((64, 64, 3), 60, np.uint8)
-    assert len(fit_triangles(flat, region_of(coverage(corners, 64) > 0.5)).ink) == 0
+    assert len(fit_triangles(view_of(flat), region_of(coverage(corners, 64) > 0.5)).ink) == 0
 
 
 def test_no_regions_no_triangles() -> None:
@@ -138,5 +146,5 @@ def test_no_regions_no_triangles() -> None:
         np.zeros((20, 20), np.int32), np.zeros(0, np.uint8), np.zeros((0, 2), np.int32), np.zeros((0, 10)),
         np.zeros(0, np.int64),
     )  # fmt: skip
-    found = fit_triangles(np.zeros((20, 20, 3), np.uint8), none)
+    found = fit_triangles(view_of(np.zeros((20, 20, 3), np.uint8)), none)
     assert found.corner_px.shape == (0, 3, 2) and len(found.region) == 0

@@ -138,7 +138,10 @@ def test_a_view_of_a_part_keeps_its_markers() -> None:
 def test_the_exact_bound_meets_the_closed_form_for_long_gridlines(pitch: float) -> None:
     """Gridlines share pixels at their ends only: the longer they are, the less that matters."""
     wanted = replace(
-        scene(), layout=standard_layout(layers=2), camera=Camera(pitch_px=pitch), sensor=Sensor(noise=2.0)
+        scene(),
+        layout=standard_layout(layers=2),
+        camera=Camera(pitch_px=pitch),
+        sensor=Sensor(noise=2.0, response="linear"),
     )
     exact, closed = (
         np.einsum("mii->m", f(wanted, size=(320, 300))).mean() for f in (exact_bound, cramer_rao)
