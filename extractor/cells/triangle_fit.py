@@ -23,6 +23,9 @@ MIN_ROUGH_TRIANGULARITY = 0.1  # the same for domains of few pixels
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4.0  # px^2
 MAX_GROWTH = 3.0  # of a domain's area to its region's
+# Of the size of a triangle by its moments: with it the measuring of edges starts. Domains of encoded light are too
+# large. Profiles near the corners of a triangle that is too large cross other cells; those of a small one do not.
+START_SIZE = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +134,17 @@ def _triangle_arrays(view, moments, seed, domain_px, ink, scale):  # type: ignor
     """The fields of ``Triangles``."""
     corners, good = _fit_to_moments(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
+    _update_to_start_size(corners)
     update_triangle_corners(view, corners, good)
     region = np.flatnonzero(good)
     return corners[region], ink[region], region.astype(np.int32)
+
+
+@compiled
+def _update_to_start_size(corners):  # type: ignore[no-untyped-def]
+    """Shrink triangles (N, 3, 2) about their centers to ``START_SIZE``."""
+    for i in range(corners.shape[0]):
+        for axis in range(2):
+            center = (corners[i, 0, axis] + corners[i, 1, axis] + corners[i, 2, axis]) / 3
+            for k in range(3):
+                corners[i, k, axis] = center + START_SIZE * (corners[i, k, axis] - center)
