@@ -280,6 +280,25 @@ def _light_noise(own, encoded, noise):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def value_change(before, now, encoded):  # type: ignore[no-untyped-def]
+    """The median change of the values of cells and of the black beside them, in units of their median contrast.
+
+    ``before``, ``now``: ``InkLevels``. ``encoded``: as in ``ResponseTables``. The black is that of the image's middle.
+    """
+    count = before.cell.shape[0]
+    sizes, changes = np.zeros(count), np.zeros(count)
+    for i in range(count):
+        for channel in range(3):
+            old_black, new_black = before.black[channel, 0], now.black[channel, 0]
+            old_foot, new_foot = encoded[table_place(old_black)], encoded[table_place(new_black)]
+            old = encoded[table_place(old_black + before.cell[i, channel])]
+            new = encoded[table_place(new_black + now.cell[i, channel])]
+            sizes[i] = max(sizes[i], abs(old - old_foot))
+            changes[i] = max(changes[i], max(abs(new - old), abs(new_foot - old_foot)))
+    return np.median(changes) / max(np.median(sizes), 1e-9)
+
+
+@compiled
 def level_change(before, now):  # type: ignore[no-untyped-def]
     """The median change of the cells' levels (K, 3), in units of their median level."""
     sizes, changes = np.zeros(before.shape[0]), np.zeros(before.shape[0])
