@@ -61,7 +61,7 @@ class Synthesis(NamedTuple):
         sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
         added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
         bleed: (E, 6) light, the change of the levels on both sides where the blur grows by its own width.
-        sums: (E, 22), as ``accumulate_residual_sums`` gives them.
+        sums: (E, 24), as ``accumulate_residual_sums`` gives them.
         levels: of the inks, as drawn.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.
         box: (4,) the part of the image that is drawn: x from, y from, x to, y to.

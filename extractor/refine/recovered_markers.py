@@ -54,7 +54,7 @@ class WeighedProfiles(NamedTuple):
 
     Attributes:
         lines: (n, 8).
-        sums: (n, 22), bending and dot gain eliminated.
+        sums: (n, 24), bending and dot gain eliminated.
         gradients: likewise.
         weight: (n,) 0 to 1, how well each gridline looks like the pattern.
         bend_variance: (n,) px^2.

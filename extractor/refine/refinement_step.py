@@ -153,7 +153,7 @@ def update_for_bending(sums, gradients, prior, lines, edges, noise, rule):  # ty
     """Eliminate the bending of gridlines from the sums and gradients, in place.
 
     Args:
-        sums: (E, 22), written.
+        sums: (E, 24), written.
         gradients: ``ShiftGradients``, ``start`` and ``end`` written.
         prior: ``BendingPrior``.
         lines, edges: (E, 8) and (E, 2).

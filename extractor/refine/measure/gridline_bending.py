@@ -217,7 +217,7 @@ def estimate_bend_variance(sums, gradients, bend, roughness, weight, lines, edge
     """The variance of b and s, from the bending of the gridlines around and from the roughness of the ends.
 
     Args:
-        sums: (E, 22), as ``accumulate_residual_sums`` gives them. gradients: ``ShiftGradients``.
+        sums: (E, 24), as ``accumulate_residual_sums`` gives them. gradients: ``ShiftGradients``.
         bend: (E, 2) px, b and s as drawn. roughness: (M,) px^2. weight: (E,) 0 to 1.
         lines: (E, 8), as ``gridlines`` gives them. edges: (E, 2) marker ids.
         variance: gray levels^2, of the noise.
@@ -257,7 +257,7 @@ def estimate_bend_variance(sums, gradients, bend, roughness, weight, lines, edge
 
 @compiled
 def update_without_bending(sums, gradients, bend, bend_variance, variance):  # type: ignore[no-untyped-def]
-    """Eliminate the bending from the gridlines' sums (E, 22) and ``ShiftGradients``, in place.
+    """Eliminate the bending from the gridlines' sums (E, 24) and ``ShiftGradients``, in place.
 
     Args:
         bend: (E, 2) px, b and s as drawn. bend_variance: (E,) px^2.

@@ -17,12 +17,16 @@ from extractor.refine.synthesis.residual_kernel import (
     BB,
     BLUR,
     BLUR_CURVATURE,
+    C_BLUR,
+    D_BLUR,
     MISFIT,
     PIXELS,
     READ_AA,
     READ_BB,
     A,
     B,
+    C,
+    D,
 )
 
 SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
@@ -69,7 +73,7 @@ def gridline_misfits(sums, gradients, values, min_places):  # type: ignore[no-un
     """The misfit of the gridlines: the mean squared residual once their ends are moved.
 
     Args:
-        sums: (E, 22). gradients: ``ShiftGradients``.
+        sums: (E, 24). gradients: ``ShiftGradients``.
         values: of each place, 3 for a pixel and 1 for a sample along the contrast.
         min_places: a gridline with no more places has no misfit.
 
@@ -93,7 +97,7 @@ def misfit_weights(sums, misfit, median_misfit, tolerance, values, default_weigh
     """The weights of gridlines by their misfit.
 
     Args:
-        sums: (E, 22). misfit: (E,) gray levels^2, NaN for none.
+        sums: (E, 24). misfit: (E,) gray levels^2, NaN for none.
         median_misfit: gray levels^2, of gridlines that look like the pattern.
         tolerance: (E,) gray levels^2, a misfit that does not lower the weight.
         values: of each place.
@@ -197,7 +201,7 @@ def median_edge(xy, edges):  # type: ignore[no-untyped-def]
 def blur_change(sums, gridline_weight):  # type: ignore[no-untyped-def]
     """The change of the blur, px, that the gridlines' pixels ask for, once the ends of each gridline are moved.
 
-    ``sums`` (E, 22); ``gridline_weight`` (E,) 0 to 1.
+    ``sums`` (E, 24); ``gridline_weight`` (E,) 0 to 1.
     """
     curvature, pull = 0.0, 0.0
     for e in range(sums.shape[0]):
@@ -219,10 +223,12 @@ def blur_after_step(sigma, change):  # type: ignore[no-untyped-def]
 
 @compiled
 def update_for_blur(sums, gradients, change):  # type: ignore[no-untyped-def]
-    """Take a change of the blur, px, out of the sums (E, 22) and the ``ShiftGradients``, in place."""
+    """Take a change of the blur, px, out of the sums (E, 24) and the ``ShiftGradients``, in place."""
     for e in range(sums.shape[0]):
         gradients.start[e] -= change * sums[e, A_BLUR]
         gradients.end[e] -= change * sums[e, B_BLUR]
+        sums[e, C] -= change * sums[e, C_BLUR]
+        sums[e, D] -= change * sums[e, D_BLUR]
         sums[e, MISFIT] -= change * (2.0 * sums[e, BLUR] - change * sums[e, BLUR_CURVATURE])
 
 
@@ -230,7 +236,7 @@ def update_for_blur(sums, gradients, change):  # type: ignore[no-untyped-def]
 def least_information(sums, weight, lines, edges, variance, count):  # type: ignore[no-untyped-def]
     """(M,) 1/px^2, the information about each of ``count`` markers in its worst direction, with bending taken as known.
 
-    ``sums`` (E, 22), ``weight`` (E,), ``lines`` (E, 8), ``edges`` (E, 2); ``variance`` of the noise, gray levels^2.
+    ``sums`` (E, 24), ``weight`` (E,), ``lines`` (E, 8), ``edges`` (E, 2); ``variance`` of the noise, gray levels^2.
     """
     xx, cross, yy = np.zeros(count), np.zeros(count), np.zeros(count)
     for e in range(edges.shape[0]):

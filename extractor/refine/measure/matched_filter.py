@@ -86,7 +86,7 @@ class FilterBuffers(NamedTuple):
     Attributes:
         place: three columns of the rows, places in the flat image. rows: fifteen columns of the rows.
         pixels: one pixel of every row.
-        double_sums: (5, n) float64, flat. sums: (22, n) float32, flat.
+        double_sums: (5, n) float64, flat. sums: (24, n) float32, flat.
         owner: (n,) the gridlines. begin: (n + 1,) their first rows.
     """
 
@@ -268,7 +268,7 @@ def _fill_bending_sums(sums, own, sigma, out, e):  # type: ignore[no-untyped-def
 
 @compiled
 def _fill_filtered_sums(view, buffers, held, lines, sigma, is_bending, out):  # type: ignore[no-untyped-def]
-    """Fill in the sums (E, 22) of the gridlines in the buffers, ``held`` of them."""
+    """Fill in the sums (E, 24) of the gridlines in the buffers, ``held`` of them."""
     owner, begin, rows = buffers.owner, buffers.begin, buffers.rows
     double_sums, sums = buffers.double_sums, buffers.sums
     count, wide = (begin[held] + LANES - 1) // LANES * LANES, 0
@@ -323,7 +323,7 @@ def read_profiles(view, lines, across, sigma, is_bending, most):  # type: ignore
         most: rows across one gridline, at most.
 
     Returns:
-        (E, 22) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
+        (E, 24) sums, with the columns and units of ``accumulate_residual_sums``; 0 where nothing was read.
     """
     sides, clearance = across.sides, across.clearance
     height, width = view.image.shape[0], view.image.shape[1]

@@ -49,7 +49,7 @@ class GridlineSystem(NamedTuple):
     """Gridlines with the measurements along them, and the markers that they join.
 
     Attributes:
-        sums: (E, 22) sums over the pixels, columns of ``residual_kernel``.
+        sums: (E, 24) sums over the pixels, columns of ``residual_kernel``.
         weight: (E,) 0 to 1. A gridline that is not drawn counts as 0.
         lines: (E, 8), as ``gridlines`` gives them.
         contrasts: (E, 3) gray levels.

@@ -21,7 +21,7 @@ def measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma):  # type: ig
     """The dot gain: the median shift outward of the sides of cells at the pattern's rim.
 
     Args:
-        sums: (E, 22), as ``accumulate_residual_sums`` gives them.
+        sums: (E, 24), as ``accumulate_residual_sums`` gives them.
         gradients: ``ShiftGradients``.
         contrasts: (E, 3) gray levels.
         edge_cells: (E, 2) the drawn cells on both sides, -1 for none.
@@ -45,7 +45,7 @@ def measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma):  # type: ig
 
 @compiled
 def update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain):  # type: ignore[no-untyped-def]
-    """Remove a dot gain, px, from the gridlines' sums (E, 22) and gradients, in place.
+    """Remove a dot gain, px, from the gridlines' sums (E, 24) and gradients, in place.
 
     Returns:
         (E,) px, the shift of each gridline along its normal by the dot gain.

@@ -42,9 +42,9 @@ from extractor.refine.synthesis.pixel_weights import (
 
 # columns of the sums over a gridline's pixels
 AA, AB, BB, A, B, MISFIT, PIXELS, BLUR, BLUR_CURVATURE, A_BLUR, B_BLUR = range(11)
-AC, AD, BC, BD, CC, CD, DD, C, D = range(11, 20)
-READ_AA, READ_BB = 20, 21  # AA and BB as read, where bending is eliminated from them
-SUMS = 22
+AC, AD, BC, BD, CC, CD, DD, C, D, C_BLUR, D_BLUR = range(11, 22)
+READ_AA, READ_BB = 22, 23  # AA and BB as read, where bending is eliminated from them
+SUMS = 24
 FULL_DENSITY = np.float32(np.sqrt(2.0 * np.pi))  # by which the normal density is 1 on the gridline
 
 
@@ -82,7 +82,7 @@ class RowBuffers(NamedTuple):
 
 @vectorized_no_refcount
 def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untyped-def]
-    """Add ``count`` pixels to a gridline's sums (22,)."""
+    """Add ``count`` pixels to a gridline's sums (24,)."""
     projection, information, square = residuals.projection, residuals.information, residuals.square
     bleed_projection, bleed_cross = residuals.bleed_projection, residuals.bleed_cross
     bleed_square, zero = residuals.bleed_square, np.float32(0.0)
@@ -128,11 +128,13 @@ def _accumulate_sums(residuals, weights, count, sums):  # type: ignore[no-untype
 def _accumulate_bending_sums(residuals, weights, count, sums):  # type: ignore[no-untyped-def]
     """The same for the gridline's bending, with the weights t (1 - t) and t (1 - t) (1 - 2 t)."""
     projection, information, zero = residuals.projection, residuals.information, np.float32(0.0)
+    bleed_cross = residuals.bleed_cross
     ac, ad, bc, bd, cc, cd = zero, zero, zero, zero, zero, zero
-    dd, sc, sd = zero, zero, zero
+    dd, sc, sd, cz, dz = zero, zero, zero, zero, zero
     for k in range(count):
         ga, gb, gc, gd = weights[TO_A + k], weights[TO_B + k], weights[TO_C + k], weights[TO_D + k]
         by_c, by_d = information[k] * gc, information[k] * gd
+        blur_cross = information[k] * weights[TO_BLUR + k] + FULL_DENSITY * (ga + gb) * bleed_cross[k]
         ac += ga * by_c
         ad += ga * by_d
         bc += gb * by_c
@@ -142,6 +144,8 @@ def _accumulate_bending_sums(residuals, weights, count, sums):  # type: ignore[n
         dd += gd * by_d
         sc += gc * projection[k]
         sd += gd * projection[k]
+        cz += gc * blur_cross
+        dz += gd * blur_cross
     sums[AC] += ac
     sums[AD] += ad
     sums[BC] += bc
@@ -151,6 +155,8 @@ def _accumulate_bending_sums(residuals, weights, count, sums):  # type: ignore[n
     sums[DD] += dd
     sums[C] += sc
     sums[D] += sd
+    sums[C_BLUR] += cz
+    sums[D_BLUR] += dz
 
 
 @compiled
@@ -172,7 +178,7 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
         box: (4,) px, x from, y from, x to, y to: the drawn part of the image.
 
     Returns:
-        (E, 22), the columns are named above. AA, AB, BB: squared derivatives of the drawing's values by the gridline's
+        (E, 24), the columns are named above. AA, AB, BB: squared derivatives of the drawing's values by the gridline's
         offset at both ends; A, B: derivative times residual (image less drawing, both as values); MISFIT: squared
         residual of PIXELS; BLUR: residual times the derivative by sigma; BLUR_CURVATURE,
         A_BLUR, B_BLUR: that derivative squared, and times those by the offsets. C and D are the same for the bending of
@@ -191,7 +197,7 @@ def accumulate_residual_sums(view, model, drawn, sigma, box):  # type: ignore[no
 
 @inlined_no_refcount
 def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, out):  # type: ignore[no-untyped-def]
-    """Add the pixels of the box to the sums (E, 22) of all gridlines; image and model are flat and begin there."""
+    """Add the pixels of the box to the sums (E, 24) of all gridlines; image and model are flat and begin there."""
     lines, reach = drawn.lines, BAND * sigma
     width, encoded = view.image.shape[1], view.response.encoded
     rows, weights, residuals = buffers.rows, buffers.weights, buffers.residuals
@@ -224,8 +230,8 @@ def _accumulate_gridline_sums(view, image, model, drawn, sigma, box, buffers, ou
 
 @inlined_no_refcount
 def _update_units(sums, inverse):  # type: ignore[no-untyped-def]
-    """Multiply a gridline's sums (22,) by the powers of 1 / blur that they lack."""
-    for k in (AA, AB, BB, BLUR_CURVATURE, A_BLUR, B_BLUR, AC, AD, BC, BD, CC, CD, DD):
+    """Multiply a gridline's sums (24,) by the powers of 1 / blur that they lack."""
+    for k in (AA, AB, BB, BLUR_CURVATURE, A_BLUR, B_BLUR, C_BLUR, D_BLUR, AC, AD, BC, BD, CC, CD, DD):
         sums[k] *= inverse * inverse
     for k in (A, B, BLUR, C, D):
         sums[k] *= inverse
