@@ -25,8 +25,16 @@ from extractor import (
     parse_layout,
 )
 from tests.support.layouts import PATTERNS, small_layout, small_text
-from tests.support.pictures import STRANGE, Image, extractor, picture, recolored, scene_of
-from tests.support.srgb import srgb_light, srgb_values
+from tests.support.pictures import (
+    STRANGE,
+    Image,
+    extractor,
+    picture,
+    recolored,
+    scene_of,
+    srgb_light,
+    srgb_values,
+)
 
 TRIANGULAR = PATTERNS[:3]
 STAGES = ["image", "color", "target", "segment", "seeds", "grow", "triangles", "cells", "mesh", "number"]

@@ -1,10 +1,11 @@
-"""Pictures for the extractor's tests: scenes of small layouts, and pictures that show no pattern at all."""
+"""Pictures for the extractor's tests: scenes of small layouts, pictures that show no pattern at all, and the sRGB curve."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -127,3 +128,15 @@ STRANGE: Mapping[str, Callable[[np.random.Generator], Image]] = {
     "mosaic": _mosaic,
     "shapes": _shapes,
 }
+
+
+def srgb_light(values: NDArray[Any]) -> NDArray[np.float64]:
+    """The light, 0 to 255, of values 0 to 255."""
+    value = np.asarray(values, np.float64) / 255
+    return 255 * np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_values(light: NDArray[Any]) -> NDArray[np.float64]:
+    """The values, 0 to 255 and not rounded, of light 0 to 255."""
+    share = np.clip(np.asarray(light, np.float64) / 255, 0, 1)
+    return 255 * np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)

@@ -51,6 +51,7 @@ COLORS = {
     "cornerSubPix on our ids": "#777777",
     "OpenCV findChessboardCornersSB": "#c0392b",
     "OpenCV findChessboardCorners + cornerSubPix": "#e58a3a",
+    "chess-corners, saddle point, on ours": "#c5e1a5",
     "chess-corners, its default": "#8bc34a",
     "chess-corners, saddle point": "#2e7d32",
 }

@@ -88,18 +88,19 @@ def _isolated_gridlines(lines, clearance):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _light_sample(flat, light, height, width, x, y, u0, u1, u2):  # type: ignore[no-untyped-def]
-    """The light at (x, y), interpolated between four pixels, the channels multiplied by u0, u1 and u2; NaN outside the
-    image (flat, height x width px)."""
+def _light_sample(image, light, x, y, weights):  # type: ignore[no-untyped-def]
+    """The light at (x, y), interpolated between four pixels, the channels multiplied by the ``weights``
+    (three numbers); NaN outside the image (H, W, 3)."""
+    height, width = image.shape[0], image.shape[1]
     if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
         return np.nan
     ix, iy = min(int(x), width - 2), min(int(y), height - 2)
     total = 0.0
     for dy in range(2):
         for dx in range(2):
-            k = 3 * ((iy + dy) * width + ix + dx)
             share = (1.0 - abs(x - ix - dx)) * (1.0 - abs(y - iy - dy))
-            total += share * (u0 * light[flat[k]] + u1 * light[flat[k + 1]] + u2 * light[flat[k + 2]])
+            for channel in range(3):
+                total += share * weights[channel] * light[image[iy + dy, ix + dx, channel]]
     return total
 
 
@@ -122,7 +123,6 @@ def profile_blur(view, lines, across, most):  # type: ignore[no-untyped-def]
     which, are_isolated = _isolated_gridlines(lines, clearance)
     every = max(which.shape[0] // most, 1)
     blurs, count = np.empty(which.shape[0] // every + 1), 0
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
     for e in which[::every]:
         u0, u1, u2 = sides[e, 0] - sides[e, 3], sides[e, 1] - sides[e, 4], sides[e, 2] - sides[e, 5]
         strength = u0 * u0 + u1 * u1 + u2 * u2
@@ -138,7 +138,7 @@ def profile_blur(view, lines, across, most):  # type: ignore[no-untyped-def]
             y = lines[e, Y] + t * length * lines[e, UY] + off * ny
             for m in range(-BLUR_SAMPLES, BLUR_SAMPLES + 1):
                 at_x, at_y = x + m * step * nx, y + m * step * ny
-                f = _light_sample(flat, light, height, width, at_x, at_y, u0, u1, u2) - foot
+                f = _light_sample(image, light, at_x, at_y, (u0, u1, u2)) - foot
                 total += f * (1.0 - f) * step / 3.0
         if np.isfinite(total):
             apparent = total * np.sqrt(np.pi)

@@ -142,12 +142,12 @@ def measure_offsets(view, model, reading, count):  # type: ignore[no-untyped-def
     residuals = allocate_residuals()
     buffers = OffsetBuffers(first, rows, residuals, np.empty(3 * CHUNK, np.float32), np.zeros((count, 2)))
     flat_model, image, encoded = model.reshape(-1), view.image.reshape(-1), view.response.encoded
-    size = view.image.shape[0], view.image.shape[1]
+    height, width = view.image.shape[0], view.image.shape[1]
     for e in range(lines.shape[0]):
         strength = contrasts[e, 0] ** 2 + contrasts[e, 1] ** 2 + contrasts[e, 2] ** 2
         if lines[e, KNOWN] == 0.0 or strength == 0.0 or reading.weight[e] < MIN_OFFSET_WEIGHT:
             continue
-        _fill_station_sums(image, size, encoded, flat_model, reading, e, buffers)
+        _fill_station_sums(image, encoded, flat_model, width, height, reading, e, buffers)
         for j in range(count):
             information = buffers.sums[j, 1]
             clear = reading.drawn or _is_clear(reading, e, j, count)
@@ -167,10 +167,9 @@ def _is_clear(reading, e, station, count):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _fill_station_sums(image, size, encoded, model, reading, e, buffers):  # type: ignore[no-untyped-def]
-    """Fill in the sums (m, 2) at the stations of gridline e; image and model are flat, ``size`` is (height, width)."""
+def _fill_station_sums(image, encoded, model, width, height, reading, e, buffers):  # type: ignore[no-untyped-def]
+    """Fill in the sums (m, 2) at the stations of gridline e; image and model are flat."""
     sigma, sums, rows, weighted = reading.sigma, buffers.sums, buffers.rows, buffers.weighted
-    height, width = size
     light = side_light(reading.sides, reading.added, e)
     frame = row_frame(reading.lines, e, (0, 0, width, height), width)
     line, reach, intervals = pixel_geometry(frame, sigma), BAND * sigma, sums.shape[0] + 1.0

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import fit_triangles
 from extractor.image.pyramid import PyramidLevel
-from tests.support.pictures import extractor
-from tests.support.srgb import srgb_light, srgb_values
+from tests.support.pictures import extractor, srgb_light, srgb_values
 
 Points = NDArray[np.float64]
 FINE = 8  # small pixels to a pixel and axis

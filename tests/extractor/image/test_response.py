@@ -21,7 +21,7 @@ from extractor.image.response import (
     response_tables,
 )
 from tests.support.layouts import small_text
-from tests.support.srgb import srgb_light
+from tests.support.pictures import srgb_light
 
 ALL = np.arange(256) / 255
 

@@ -18,7 +18,7 @@ from cmpdesign.scene import Optics, Press, Scene, Sensor, composed, render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
 from cmpdesign.scene.standard import standard_layout, standard_scene
 from extractor import Extractor, Markers, parse_layout
-from tests.support.srgb import srgb_light
+from tests.support.pictures import srgb_light
 
 LAYERS, SIZE, NOISE, SEEDS = 5, (300, 260), 2.0, 4
 LAYOUT = standard_layout("honeycomb", LAYERS)
