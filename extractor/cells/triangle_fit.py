@@ -25,7 +25,7 @@ MIN_AREA_PX = 4.0  # px^2
 MAX_GROWTH = 3.0  # of a domain's area to its region's
 # Of the size of a triangle by its moments: with it the measuring of edges starts. Domains of encoded light are too
 # large. Profiles near the corners of a triangle that is too large cross other cells; those of a small one do not.
-START_SIZE = 0.8
+START_SIZE = 0.9
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Pictures for the extractor's tests: scenes of small layouts, pictures that show no pattern at all, and the sRGB curve."""
+"""Pictures for the extractor's tests: scenes of small layouts, pictures without any pattern, and the sRGB curve."""
 
 from __future__ import annotations
 
