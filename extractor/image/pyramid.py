@@ -61,6 +61,11 @@ class Pyramid:
         """Width and height at full scale, px."""
         return self._image.shape[1], self._image.shape[0]
 
+    @property
+    def response(self) -> ResponseTables:
+        """From values to light."""
+        return self._response
+
     def level(self, scale: int) -> PyramidLevel:
         """The image reduced by averaging the light of ``scale`` x ``scale`` pixels."""
         if scale not in self._levels:

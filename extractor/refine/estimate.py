@@ -39,7 +39,7 @@ class Appearance(NamedTuple):
         """The appearance in another light.
 
         Args:
-            before, now: (2, C, 3) gray levels of some cells over black, and of their black, in the light then and now.
+            before, now: (2, C, 3) light of some cells over black, and of their black, then and now.
         """
         gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
         black = self.levels.black.copy()

@@ -50,7 +50,7 @@ from extractor.refine.solve.convergence import (
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.ink_levels import value_change
+from extractor.refine.synthesis.ink_levels import level_change
 from extractor.refine.synthesis.residual_kernel import A, B
 
 BLUR_TOLERANCE = 0.03  # relative error of the blur of a drawing that is kept
@@ -174,7 +174,7 @@ class SynthesisSolver:
             if (begun or step > 0) and spent + step_effort(drawn_edge_px, 0.0) > allowed:
                 break
             redrawn, moving, dirty = self._unconverged(corrected, drawing, schedule, wide_blur)
-            changed = _has_appearance_changed(view, estimate, drawing, schedule.converged_deviations) and (
+            changed = _has_appearance_changed(estimate, drawing, schedule.converged_deviations) and (
                 wide_blur or not dirty
             )
             count = np.count_nonzero(redrawn)
@@ -319,13 +319,11 @@ def _converges_slowly(estimate: Estimate, edge_px: float) -> bool:
     return bool(bent_share(estimate.bend, MIN_BEND * edge_px) > MAX_BENT_SHARE)
 
 
-def _has_appearance_changed(
-    view: PyramidLevel, estimate: Estimate, drawing: Synthesis, converged_deviations: float
-) -> bool:
+def _has_appearance_changed(estimate: Estimate, drawing: Synthesis, converged_deviations: float) -> bool:
     """Whether blur or levels of the estimate differ from those drawn, by more than the noise that
     ``converged_deviations`` standard deviations of a marker make."""
     blur = abs(estimate.sigma - drawing.sigma) / drawing.sigma
-    levels = value_change(drawing.levels, estimate.levels, view.response.encoded)
+    levels = level_change(drawing.levels.cell, estimate.levels.cell)
     if blur < BLUR_TOLERANCE and levels < LEVEL_TOLERANCE:
         return False
     noise = converged_deviations * median_deviation(estimate.information.diagonal) / drawing.sigma

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.image.response import ResponseTables, decode_values
 from extractor.numeric.bilinear import fill_patch_mean, weighted_sample
 from extractor.numeric.compilation import compiled
 from extractor.numeric.dense_systems import dot3
@@ -131,3 +132,10 @@ def check_cells(
         image, corner_px, tables.ink, tables.across_edge, tables.nearest, before, compare
     )
     return check
+
+
+def light_levels(cell_levels: NDArray[np.float64], response: ResponseTables) -> NDArray[np.float64]:
+    """(2, C, 3) the light of cells over black, and of their black, from ``CellCheck.cell_levels``."""
+    light = response.light.astype(np.float64)
+    black = decode_values(cell_levels[1], light)
+    return np.stack([decode_values(cell_levels[0] + cell_levels[1], light) - black, black])

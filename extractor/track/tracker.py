@@ -20,7 +20,7 @@ from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
 from extractor.result import Markers, Origin, Reason, Status
 from extractor.track.displacement import Rest, fit_rest
-from extractor.track.image_check import check_cells
+from extractor.track.image_check import check_cells, light_levels
 from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
 from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
@@ -223,7 +223,8 @@ class Tracker:
         numbered = NumberedMarkers(
             start.places, state.mirrored, Origin.PREVIOUS if start.by_rim else Origin.WHITE
         )
-        before = state.appearance and state.appearance.with_lighting(state.cell_levels, start.cell_levels)
+        levels = (light_levels(own, pyramid.response) for own in (state.cell_levels, start.cell_levels))
+        before = state.appearance and state.appearance.with_lighting(*levels)
         markers, appearance = self._extractor.finish(pyramid, numbered, stages, before)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT_SHARE * state.expected_count:

@@ -200,22 +200,13 @@ def _ink_samples(values, centroids, color, ink):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def cell_centroids(xy, cells):  # type: ignore[no-untyped-def]
-    """(K, 2) px, the centroids of cells, NaN where a corner is unknown."""
+def _cell_centroids(xy, cells, frame):  # type: ignore[no-untyped-def]
+    """(K, 2) the centroids of cells in the frame of the polynomials, NaN where a corner is unknown."""
     out = np.empty((cells.shape[0], 2))
     for i in range(cells.shape[0]):
         a, b, c = cells[i, 0], cells[i, 1], cells[i, 2]
-        for axis in range(2):
-            out[i, axis] = (xy[a, axis] + xy[b, axis] + xy[c, axis]) / 3
-    return out
-
-
-@compiled
-def _centroids_in_frame(xy, cells, frame):  # type: ignore[no-untyped-def]
-    """(K, 2) the centroids in the frame of the polynomials."""
-    out = cell_centroids(xy, cells)
-    for i in range(out.shape[0]):
-        out[i, 0], out[i, 1] = (out[i, 0] - frame.x) / frame.scale, (out[i, 1] - frame.y) / frame.scale
+        out[i, 0] = ((xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3 - frame.x) / frame.scale
+        out[i, 1] = ((xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3 - frame.y) / frame.scale
     return out
 
 
@@ -237,8 +228,8 @@ def smoothed_levels(drawn, black, xy, pattern, noise, view):  # type: ignore[no-
     frame, encoded = view.frame, view.response.encoded
     coefficients, variance, light_noise = np.zeros((INKS, 3, TERMS)), np.zeros(INKS), np.ones(INKS)
     is_outlier, color = np.zeros(drawn.shape[0], np.bool_), pattern.color
-    centroids = _centroids_in_frame(xy, pattern.cells, frame)
-    black_centroids = _centroids_in_frame(xy, pattern.black_cells, frame)
+    centroids = _cell_centroids(xy, pattern.cells, frame)
+    black_centroids = _cell_centroids(xy, pattern.black_cells, frame)
     for ink in range(INKS):
         if ink == BLACK:
             terms, own, number = _ink_samples(black, black_centroids, color, ink)
@@ -277,25 +268,6 @@ def _light_noise(own, encoded, noise):  # type: ignore[no-untyped-def]
     for channel in range(3):
         total += (noise / encoded[table_place(np.median(own[channel])) + 1]) ** 2
     return np.sqrt(total / 3.0)
-
-
-@compiled
-def value_change(before, now, encoded):  # type: ignore[no-untyped-def]
-    """The median change of the values of cells and of the black beside them, in units of their median contrast.
-
-    ``before``, ``now``: ``InkLevels``. ``encoded``: as in ``ResponseTables``. The black is that of the image's middle.
-    """
-    count = before.cell.shape[0]
-    sizes, changes = np.zeros(count), np.zeros(count)
-    for i in range(count):
-        for channel in range(3):
-            old_black, new_black = before.black[channel, 0], now.black[channel, 0]
-            old_foot, new_foot = encoded[table_place(old_black)], encoded[table_place(new_black)]
-            old = encoded[table_place(old_black + before.cell[i, channel])]
-            new = encoded[table_place(new_black + now.cell[i, channel])]
-            sizes[i] = max(sizes[i], abs(old - old_foot))
-            changes[i] = max(changes[i], max(abs(new - old), abs(new_foot - old_foot)))
-    return np.median(changes) / max(np.median(sizes), 1e-9)
 
 
 @compiled
