@@ -25,14 +25,12 @@ class Regions:
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         seed: (N, 2) int32, x and y of the pixel about which the moments are taken.
         moments: (N, 10) float64, sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
-        domain_px: (N,) int64, the area of the seed's domain, px^2.
     """
 
     region_map: NDArray[np.int32]
     ink: NDArray[np.uint8]
     seed: NDArray[np.int32]
     moments: NDArray[np.float64]
-    domain_px: NDArray[np.int64]
 
 
 @vectorized_no_refcount
@@ -143,4 +141,4 @@ def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
         segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, GROW_THRESHOLD
     )
     owner = owner[1:-1, 1:-1]
-    return Regions(region_map=owner, ink=seeds.ink, seed=seeds.xy, moments=moments, domain_px=seeds.area_px)
+    return Regions(region_map=owner, ink=seeds.ink, seed=seeds.xy, moments=moments)

@@ -32,7 +32,7 @@ from extractor.numeric.compilation import compiled
 FIRST_PROFILE = 0.25  # of an edge, from its start to the first profile, and from the second one to its end
 HALF_PROFILE = 4  # samples on each side of an edge
 BORDER_MARGIN_PX = 0.01  # from profiles to the last row and column; more than half a sub-pixel step
-PROFILE_REACH = 0.8  # half length of a profile, in vectors from the cell's center to the edge's middle
+PROFILE_REACH = 0.5  # half length of a profile, in vectors from the cell's center to the edge's middle
 FINE_REACH_PX = 8.0  # longer profiles are followed by shorter ones,
 MAX_PASSES = 3  # in so many passes at most
 MIN_DEPTH_PX = 0.3  # distance of an edge from the cell's center

@@ -22,10 +22,6 @@ MIN_TRIANGULARITY = 0.45  # |E[z^3]| relative to a triangle's; a disc, an ellips
 MIN_ROUGH_TRIANGULARITY = 0.1  # the same for domains of few pixels
 MAX_ELONGATION = 30.0  # (trace of the covariance)^2 / determinant; 4 is equilateral
 MIN_AREA_PX = 4.0  # px^2
-MAX_GROWTH = 3.0  # of a domain's area to its region's
-# Of the size of a triangle by its moments: with it the measuring of edges starts. Domains of encoded light are too
-# large. Profiles near the corners of a triangle that is too large cross other cells; those of a small one do not.
-START_SIZE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +47,11 @@ class Triangles:
 
 
 @compiled
-def _fit_to_moments(moments, seed, domain_px, min_area, min_triangularity):  # type: ignore[no-untyped-def]
+def _fit_to_moments(moments, seed, min_area, min_triangularity):  # type: ignore[no-untyped-def]
     """(N, 3, 2) the triangles with the regions' moments up to the third order; (N,) bool, regions that are triangles.
 
     Args:
         moments: (N, 10) about ``seed`` (N, 2), as in ``Regions``.
-        domain_px: (N,) px^2, the areas of the seeds' domains.
         min_area: px^2; min_triangularity: of |E[z^3]|, relative to a triangle's.
     """
     count = moments.shape[0]
@@ -92,9 +87,7 @@ def _fit_to_moments(moments, seed, domain_px, min_area, min_triangularity):  # t
         if np.hypot(real, imaginary) < min_triangularity * THIRD_MOMENT:
             continue
         angle = np.arctan2(imaginary, real) / 3.0
-        # growing stops in the blurred rim; the domain ends nearer to the half level and gives the size
-        radius = CORNER_RADIUS * np.sqrt(min(max(domain_px[i] / n, 1.0), MAX_GROWTH))
-        u, v = radius * np.cos(angle), radius * np.sin(angle)
+        u, v = CORNER_RADIUS * np.cos(angle), CORNER_RADIUS * np.sin(angle)
         for k in range(3):
             corners[i, k, 0] = seed[i, 0] + mx + a * u
             corners[i, k, 1] = seed[i, 1] + my + b * u + c * v
@@ -111,7 +104,7 @@ def triangles_from_moments(seeds: Seeds, scale: int) -> Triangles:
         scale: full-scale pixels per pixel of the seeds.
     """
     moments = domain_moments(seeds.runs, seeds.domain, seeds.xy)
-    corners, good = _fit_to_moments(moments, seeds.xy, seeds.area_px, MIN_AREA_PX, MIN_ROUGH_TRIANGULARITY)
+    corners, good = _fit_to_moments(moments, seeds.xy, MIN_AREA_PX, MIN_ROUGH_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
     return Triangles(corners[good], seeds.ink[good], np.flatnonzero(good).astype(np.int32))
 
@@ -124,27 +117,14 @@ def fit_triangles(view: PyramidLevel, regions: Regions, scale: int = 1) -> Trian
         regions: grown at 1/``scale`` of the image's scale.
         scale: full-scale pixels per pixel of the regions.
     """
-    return Triangles(
-        *_triangle_arrays(view, regions.moments, regions.seed, regions.domain_px, regions.ink, scale)
-    )
+    return Triangles(*_triangle_arrays(view, regions.moments, regions.seed, regions.ink, scale))
 
 
 @compiled
-def _triangle_arrays(view, moments, seed, domain_px, ink, scale):  # type: ignore[no-untyped-def]
+def _triangle_arrays(view, moments, seed, ink, scale):  # type: ignore[no-untyped-def]
     """The fields of ``Triangles``."""
-    corners, good = _fit_to_moments(moments, seed, domain_px, MIN_AREA_PX, MIN_TRIANGULARITY)
+    corners, good = _fit_to_moments(moments, seed, MIN_AREA_PX, MIN_TRIANGULARITY)
     corners = (corners + 0.5) * scale - 0.5
-    _update_to_start_size(corners)
     update_triangle_corners(view, corners, good)
     region = np.flatnonzero(good)
     return corners[region], ink[region], region.astype(np.int32)
-
-
-@compiled
-def _update_to_start_size(corners):  # type: ignore[no-untyped-def]
-    """Shrink triangles (N, 3, 2) about their centers to ``START_SIZE``."""
-    for i in range(corners.shape[0]):
-        for axis in range(2):
-            center = (corners[i, 0, axis] + corners[i, 1, axis] + corners[i, 2, axis]) / 3
-            for k in range(3):
-                corners[i, k, axis] = center + START_SIZE * (corners[i, k, axis] - center)

@@ -44,5 +44,6 @@ def test_plain_python_gives_the_same_markers(pattern: str, mirrored: bool, tmp_p
     with np.load(out) as plain:
         np.testing.assert_array_equal(plain["status"], markers.status)
         assert bool(plain["mirrored"]) is mirrored
-        np.testing.assert_allclose(plain["xy"], markers.xy_px, rtol=0, atol=1e-7)
+        # light is encoded by the nearest entry of a table: rounding of 1e-16 may choose the entry beside it
+        np.testing.assert_allclose(plain["xy"], markers.xy_px, rtol=0, atol=2e-6)
         np.testing.assert_allclose(plain["cov"], markers.cov_px2, rtol=1e-5, atol=1e-9)

@@ -24,7 +24,6 @@ DISC_SHARE = 0.55  # of the inscribed circle's radius, the disc of a cell's leve
 FIRST_DISC_SHARE = 0.47  # the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc
 CLEAR_SIGMA = 2.2  # in units of the blur, the distance of the disc from the cell's sides
 MIN_RADIUS_PX = 0.75  # of the disc
-FIT_ROUNDS = 2  # of the robust fit
 
 
 class InkLevels(NamedTuple):
@@ -244,9 +243,7 @@ def smoothed_levels(drawn, black, xy, pattern, noise, view):  # type: ignore[no-
                 count = CELLS_FOR_TERMS[k][1]
                 break
         light_noise[ink] = _light_noise(own, encoded, noise)
-        polynomial, own_variance, own_outlier = robust_polynomial(
-            terms, own, light_noise[ink], count, FIT_ROUNDS
-        )
+        polynomial, own_variance, own_outlier = robust_polynomial(terms, own, light_noise[ink], count)
         coefficients[ink], variance[ink] = polynomial, own_variance
         if ink == WHITE:  # one cell only, which keeps its own level
             variance[ink] = 1e9

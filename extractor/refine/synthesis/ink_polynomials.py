@@ -7,8 +7,11 @@ import numpy as np
 from extractor.numeric.compilation import compiled, vectorized
 from extractor.numeric.dense_systems import update_to_cholesky_solution
 
+MEDIAN_CHI2 = 0.79  # median of a chi-square of 3 degrees over 3
 TERMS = 10  # 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy
 OUTLIER_TOLERANCE = 4.0  # deviations of the scatter, beyond which a cell is an outlier
+MAX_FIT_ROUNDS = 10  # of weighting
+FALLING_VARIANCE = 0.9  # rounds end when the scatter falls to no less than this share
 
 
 @compiled
@@ -69,12 +72,14 @@ def _fill_misfits(terms, values, polynomial, out):  # type: ignore[no-untyped-de
 
 
 @compiled
-def robust_polynomial(terms, values, noise, count, rounds):  # type: ignore[no-untyped-def]
+def robust_polynomial(terms, values, noise, count):  # type: ignore[no-untyped-def]
     """A robust polynomial of one ink.
+
+    The rounds of weighting begin at the medians of the channels, which many outliers on one side do not move.
 
     Args:
         terms: (10, n). values: (4, n) gray levels in three channels, and the number of pixels.
-        noise: gray levels. count: terms to fit. rounds: of weighting.
+        noise: gray levels. count: terms to fit.
 
     Returns:
         (3, 10) the polynomial; the variance of the cells about it beyond noise, gray levels^2; (n,) bool, outliers.
@@ -83,17 +88,18 @@ def robust_polynomial(terms, values, noise, count, rounds):  # type: ignore[no-u
     weight, misfit = np.empty(n), np.zeros(n)
     for i in range(n):
         weight[i] = values[3, i] / (1.0 + 0.1 * values[3, i])
-    start, gram, polynomial = weight.copy(), np.empty((TERMS, TERMS)), np.empty((3, TERMS))
-    _fill_polynomial_fit(terms, values, weight, count, gram, polynomial)
-    for _ in range(rounds):
+    start, gram, polynomial = weight.copy(), np.empty((TERMS, TERMS)), np.zeros((3, TERMS))
+    for channel in range(3):
+        polynomial[channel, 0] = np.median(values[channel])
+    variance = np.inf
+    for _ in range(MAX_FIT_ROUNDS):
         _fill_misfits(terms, values, polynomial, misfit)
-        # 0.79 is the median of a chi-square of 3 degrees over 3
-        variance = np.median(misfit) / 0.79
+        before, variance = variance, np.median(misfit) / MEDIAN_CHI2
+        if variance > FALLING_VARIANCE * before:
+            break
         for i in range(n):
             weight[i] = start[i] / (1.0 + misfit[i] / (6.0 * variance + 1e-9)) ** 2
         _fill_polynomial_fit(terms, values, weight, count, gram, polynomial)
-    _fill_misfits(terms, values, polynomial, misfit)
-    variance = np.median(misfit) / 0.79
     expected = noise * noise / np.median(values[3])
     is_outlier = np.zeros(n, np.bool_)
     for i in range(n):

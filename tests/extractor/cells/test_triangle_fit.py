@@ -50,7 +50,6 @@ def region_of(mask: NDArray[np.bool_]) -> Regions:
         ink=np.array([1], np.uint8),
         seed=seed[None].astype(np.int32),
         moments=np.array([[term.sum() for term in terms]]),
-        domain_px=np.array([len(x)]),
     )
 
 
@@ -143,7 +142,6 @@ def test_a_triangle_without_contrast_is_dropped() -> None:
 def test_no_regions_no_triangles() -> None:
     none = Regions(
         np.zeros((20, 20), np.int32), np.zeros(0, np.uint8), np.zeros((0, 2), np.int32), np.zeros((0, 10)),
-        np.zeros(0, np.int64),
     )  # fmt: skip
     found = fit_triangles(view_of(np.zeros((20, 20, 3), np.uint8)), none)
     assert found.corner_px.shape == (0, 3, 2) and len(found.region) == 0

@@ -13,7 +13,6 @@ import pytest
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Light, render, standard_layout, standard_scene
 from extractor import Extractor, parse_layout
-from extractor.image.response import light_of_values, response_tables
 from extractor.track.image_check import check_cells, light_levels
 from extractor.track.warm_tables import build_warm_tables
 
@@ -23,7 +22,6 @@ def test_levels_follow_the_light(gain: float) -> None:
     layout = standard_layout("honeycomb", 6)
     reference = parse_layout(layout_to_json(layout))
     extractor, tables = Extractor(reference), build_warm_tables(reference)
-    response = response_tables(light_of_values("srgb"))
     looks, levels = [], []
     for factor in (1.0, gain):
         scene = replace(standard_scene(layout), light=Light(rgb=(factor, factor, factor)))
@@ -31,7 +29,7 @@ def test_levels_follow_the_light(gain: float) -> None:
         read = extractor.read(image)
         looks.append(read.appearance)
         found = check_cells(image, read.markers.xy_px[tables.corners], tables, None)
-        levels.append(light_levels(found.cell_levels, response))
+        levels.append(light_levels(found.cell_levels, extractor.pyramid(image, image.dtype).response))
     before, now = looks
     assert before is not None and now is not None
     relit = before.with_lighting(*levels)
