@@ -40,7 +40,9 @@ class LaserOptions(BaseModel):
     hatch_turn_deg: Angle = Field(67.0, description="Pocket: turn of the lines from pass to pass.")
     depth_mm: Length | None = Field(None, description="Depth of the cavities; else the material's thickness.")
 
-    kerf_mm: Length | None = Field(None, description="Kerf at the front, both ways; instead of x and y.")
+    kerf_mm: LengthOrZero | None = Field(
+        None, description="Kerf at the front, both ways; instead of x and y. 0: paths are not compensated."
+    )
     kerf_x_mm: Length | None = Field(None, description="Width of a cut that runs in y, at the front.")
     kerf_y_mm: Length | None = Field(None, description="Width of a cut that runs in x, at the front.")
     taper_deg: Angle | None = Field(None, description="Lean of each wall; positive narrows towards the back.")

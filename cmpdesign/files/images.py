@@ -19,17 +19,21 @@ class ImageFileError(CmpDesignError, ValueError):
     """A file that is not a color image of sufficient size."""
 
 
-def read_image(path: str | Path) -> Image:
+def read_image(path: str | Path, *, gray: bool = False) -> Image:
     """Read the pixels of an image file.
 
     An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured.
+
+    Args:
+        path: the file.
+        gray: grayscale images are read, too; their three channels are equal.
 
     Returns:
         (H, W, 3) uint8 or uint16, BGR.
 
     Raises:
-        ImageFileError: the file cannot be read, is no image, has one channel, has other than 8 or 16 bits, or is
-            smaller than 16 x 16 pixels.
+        ImageFileError: the file cannot be read, is no image, has one channel (unless ``gray``), has other than 8
+            or 16 bits, or is smaller than 16 x 16 pixels.
     """
     import cv2
 
@@ -50,10 +54,10 @@ def read_image(path: str | Path) -> Image:
         raise ImageFileError(
             f"{path}: is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
         )
-    return _to_bgr(pixels, path)
+    return _to_bgr(pixels, path, gray)
 
 
-def _to_bgr(pixels: NDArray[Any], path: Path) -> Image:
+def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
     height, width = pixels.shape[:2]
     channels = pixels.shape[2] if pixels.ndim == 3 else 1
     if height < SMALLEST_PX or width < SMALLEST_PX:
@@ -64,6 +68,8 @@ def _to_bgr(pixels: NDArray[Any], path: Path) -> Image:
         raise ImageFileError(
             f"{path}: has pixels of type {pixels.dtype}; expected 8 or 16 bits, save it as PNG"
         )
+    if channels == 1 and gray:
+        return np.ascontiguousarray(np.repeat(pixels.reshape(height, width, 1), 3, axis=2))
     if channels < 3:
         raise ImageFileError(f"{path}: is a grayscale image; a multicolor pattern needs color (3 channels)")
     return np.ascontiguousarray(pixels[:, :, :3])

@@ -1,25 +1,23 @@
-"""Independent of the code under test: a small GRBL, a raster sweep of the beam, a camera for coupons."""
+"""Independent of the code under test: a small GRBL, a raster sweep of the beam; a camera for coupons."""
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.coupons.photograph import CouponView, photograph_coupon
 from cmpdesign.design.design import load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.laser.coupon.design import Coupon
 from cmpdesign.products.laser.job import LaserJob, make_job
 from cmpdesign.products.laser.setup import complete_setup
-from cmpdesign.scene.drawing.coverage import draw_coverage
-from cmpdesign.scene.drawing.paths import PolygonSegments
-from cmpdesign.scene.parts.optics import make_point_spread
 
 Points = NDArray[np.float64]
 PIXEL_MM = 0.002
@@ -147,60 +145,6 @@ def groups_of(burn: Burn) -> list[Points]:
     return [part for part in parts if len(part)]
 
 
-def coupon_photo(
-    coupon: Coupon,
-    kerf_mm: dict[str, tuple[float, float]],
-    *,
-    scale_px_mm: float = 23.6,
-    turn_deg: float = 4.0,
-    tilt: float = 0.02,
-    blur_px: float = 1.2,
-    noise: float = 2.0,
-    sheet: float = 40.0,
-    ground: float = 200.0,
-    mirrored: bool = False,
-) -> NDArray[np.uint8]:
-    """A picture of a coupon cut with known kerfs, by exact coverage; ``kerf_mm``: patch name -> kerf x, y."""
-    import shapely
-
-    openings = []
-    for patch in coupon.patches:
-        half = np.array(kerf_mm[patch.name]) / 2
-        for o in patch.openings:
-            box = shapely.box(
-                -o.width_mm / 2 / half[0],
-                -o.height_mm / 2 / half[1],
-                o.width_mm / 2 / half[0],
-                o.height_mm / 2 / half[1],
-            )
-            outline = shapely.get_coordinates(shapely.buffer(box, 1.0, quad_segs=64))[:-1] * half
-            openings.append(outline + (o.x_mm, o.y_mm))
-    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
-    radius = coupon.fiducial_diameter_mm / 2 + 0.08
-    openings += [
-        np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
-        for x, y in coupon.fiducials_mm
-    ]
-    marks = np.array(coupon.fiducials_mm)
-    low, high = marks.min(axis=0) - 5, marks.max(axis=0) + 5
-    size = (int(np.hypot(*(high - low)) * scale_px_mm),) * 2
-    turn = math.radians(turn_deg)
-    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    flip = np.array([-1.0 if mirrored else 1.0, 1.0])
-
-    def to_image(xy: Points) -> Points:
-        centred = ((xy - (low + high) / 2) * flip) @ rotation.T
-        depth = 1 + tilt * centred[:, 1] / (high - low)[1]
-        return centred / depth[:, None] * (scale_px_mm, -scale_px_mm) + (np.array(size) - 1) / 2
-
-    segments, owner = [], []
-    for number, outline in enumerate(openings):
-        points = to_image(outline)
-        segments.append(np.hstack([points, np.roll(points, -1, axis=0)]))
-        owner.append(np.full(len(points), number))
-    paths = PolygonSegments(np.concatenate(segments), np.concatenate(owner))
-    values = np.full((len(openings), 1), ground - sheet)
-    plane = sheet + draw_coverage(paths, values, size, make_point_spread(blur_px))[0]
-    light = 1 + 0.08 * np.linspace(-1, 1, size[0])[None, :]
-    noisy = plane * light + np.random.default_rng(3).normal(0, noise, plane.shape)
-    return np.repeat(np.clip(np.rint(noisy), 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+def coupon_photo(coupon: Coupon, kerf_mm: dict[str, tuple[float, float]], **conditions: Any) -> NDArray[Any]:
+    """A picture of a coupon cut with known kerfs (patch name -> x, y); conditions of ``CouponView``."""
+    return photograph_coupon(coupon, kerf_mm, CouponView(**conditions))

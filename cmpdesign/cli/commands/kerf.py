@@ -3,78 +3,125 @@
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmpdesign.cli.response import METAVAR, parse_reading_response
 from cmpdesign.cli.terminal import console
 
 if TYPE_CHECKING:
-    from cmpdesign.products.laser.coupon.photo import CouponReading, PatchKerf
+    from cmpdesign.products.laser.coupon.design import Coupon
+    from cmpdesign.products.laser.coupon.photo import CouponReading, MeasuredWidth, PatchKerf
+
+
+class SeenFace(StrEnum):
+    """The face of the sheet whose openings a picture shows."""
+
+    front = "front"
+    back = "back"
 
 
 def kerf(
     coupon: Annotated[Path, typer.Argument(metavar="COUPON", help="The coupon.json that build wrote.")],
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo or scan of the cut piece.")],
+    face: Annotated[
+        SeenFace | None,
+        typer.Option(help="The face whose openings are seen. [default: the narrower one by the taper]"),
+    ] = None,
+    response: Annotated[
+        str | None,
+        typer.Option(
+            metavar=METAVAR,
+            help="How light became values. [default: as the file states, else sRGB, corrected by the edges]",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead.")] = False,
 ) -> None:
     """Measure the kerf on a coupon, ready for the material's file."""
     from cmpdesign.errors import CmpDesignError
     from cmpdesign.files.images import read_image
+    from cmpdesign.files.stated_response import stated_response
     from cmpdesign.products.laser.coupon.design import load_coupon
-    from cmpdesign.products.laser.coupon.photo import PhotoError, read_coupon
+    from cmpdesign.products.laser.coupon.photo import read_coupon
+    from cmpdesign.products.laser.coupon.picture import PhotoError
 
+    known = parse_reading_response(response)
     cut_coupon = load_coupon(coupon)
-    image = read_image(photo)
+    image = read_image(photo, gray=True)
     try:
-        reading = read_coupon(cut_coupon, image)
+        reading = read_coupon(
+            cut_coupon,
+            image,
+            response=known,
+            stated=stated_response(photo),
+            face=None if face is None else face.value,
+        )
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
     if as_json:
-        print(json.dumps(_reading_to_json(reading), indent=2))
+        print(json.dumps(_reading_to_json(cut_coupon, reading), indent=2))
         return
-    _print_kerf_table(reading)
+    _print_kerf_table(cut_coupon, reading)
     console().print(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:
-        console().print(_material_file_lines(patch_kerf, photo.name))
+        console().print(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
 
 
-def _print_kerf_table(reading: CouponReading) -> None:
+def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
     from rich.table import Table
 
     side = "back" if reading.from_back else "front"
     console().print(
-        f"seen from the {side}, {reading.scale_px_mm:.1f} px in a mm, marks fit to {1000 * reading.fit_mm:.1f} um"
+        f"seen from the {side}, {reading.scale_px_mm:.1f} px in a mm, marks fit to {1000 * reading.fit_mm:.1f} um, "
+        f"light: {reading.response}"
+    )
+    assumed = ", which is assumed" if coupon.taper_assumed else ""
+    console().print(
+        f"seen are the openings of the {reading.face}; the other face by a taper of {coupon.taper_deg:g} degrees"
+        f"{assumed}, through {coupon.thickness_mm:g} mm"
     )
     table = Table(box=None, pad_edge=False)
-    for heading in ("patch", "power", "speed", "times over", "kerf x", "kerf y"):
+    for heading in ("patch", "power", "speed", "times over", "+-", "front x", "front y", "back x", "back y"):
         table.add_column(heading, justify="left" if heading == "patch" else "right")
-    for patch_kerf in reading.patches:
-        patch = patch_kerf.patch
-        widths = [
-            f"{width.value_mm:.4f} +- {width.sigma_mm:.4f} mm" for width in (patch_kerf.x, patch_kerf.y)
-        ]
-        power, speed = f"{patch.power_percent:g} %", f"{patch.speed_mm_s:g} mm/s"
-        table.add_row(patch.name, power, speed, str(patch.passes), *widths)
+    for one in reading.patches:
+        patch = one.patch
+        faces = [reading.at_face(face, width) for face in ("front", "back") for width in (one.x, one.y)]
+        sigma_mm = max(one.x.sigma_mm, one.y.sigma_mm)
+        settings = (f"{patch.power_percent:g} %", f"{patch.speed_mm_s:g} mm/s", str(patch.passes))
+        widths = [f"{width.value_mm:.4f}" for width in faces]
+        table.add_row(patch.name, *settings, f"{sigma_mm:.4f}", *widths)
     console().print(table)
+    console().print("kerfs in mm; x of cuts along y, y of cuts along x")
 
 
-def _material_file_lines(patch_kerf: PatchKerf, photo: str) -> str:
-    """The lines of the material's file for one patch."""
+def _material_file_lines(reading: CouponReading, patch_kerf: PatchKerf, photo: str) -> str:
+    """The lines of the material's file for one patch: the kerf at the front, and both faces in its source."""
     patch = patch_kerf.patch
     lines = [f"# {patch.name}: {patch.power_percent:g} %, {patch.speed_mm_s:g} mm/s, {patch.passes} times"]
     for axis, width in (("x", patch_kerf.x), ("y", patch_kerf.y)):
-        source = json.dumps(f"coupon {patch.name}, {photo}, +- {width.sigma_mm:.4f} mm", ensure_ascii=False)
-        lines.append(f"kerf_{axis}_mm = {{ value = {width.value_mm:.4f}, source = {source} }}")
+        front, back = reading.at_face("front", width), reading.at_face("back", width)
+        text = (
+            f"coupon {patch.name}, {photo}: front {front.value_mm:.4f} mm, back {back.value_mm:.4f} mm, "
+            f"{reading.face} seen, +- {width.sigma_mm:.4f} mm"
+        )
+        source = json.dumps(text, ensure_ascii=False)
+        lines.append(f"kerf_{axis}_mm = {{ value = {front.value_mm:.4f}, source = {source} }}")
     return "\n".join(lines)
 
 
-def _reading_to_json(reading: CouponReading) -> dict[str, object]:
+def _reading_to_json(coupon: Coupon, reading: CouponReading) -> dict[str, object]:
     return {
         "format": "cmp-kerf",
-        "version": 1,
+        "version": 2,
         "from_back": reading.from_back,
+        "face": reading.face,
+        "taper_deg": coupon.taper_deg,
+        "taper_assumed": coupon.taper_assumed,
+        "thickness_mm": coupon.thickness_mm,
+        "response": reading.response,
         "scale_px_mm": round(reading.scale_px_mm, 4),
         "fit_mm": round(reading.fit_mm, 6),
         "patches": [
@@ -83,11 +130,18 @@ def _reading_to_json(reading: CouponReading) -> dict[str, object]:
                 "power_percent": one.patch.power_percent,
                 "speed_mm_s": one.patch.speed_mm_s,
                 "passes": one.patch.passes,
-                "kerf_x_mm": round(one.x.value_mm, 5),
-                "kerf_x_sigma_mm": round(one.x.sigma_mm, 5),
-                "kerf_y_mm": round(one.y.value_mm, 5),
-                "kerf_y_sigma_mm": round(one.y.sigma_mm, 5),
+                **_axis_to_json("x", reading, one.x),
+                **_axis_to_json("y", reading, one.y),
             }
             for one in reading.patches
         ],
+    }
+
+
+def _axis_to_json(axis: str, reading: CouponReading, seen: MeasuredWidth) -> dict[str, float]:
+    """Kerfs at the front (as in a material's file) and at the back, and their deviation."""
+    return {
+        f"kerf_{axis}_mm": round(reading.at_face("front", seen).value_mm, 5),
+        f"kerf_{axis}_back_mm": round(reading.at_face("back", seen).value_mm, 5),
+        f"kerf_{axis}_sigma_mm": round(seen.sigma_mm, 5),
     }

@@ -27,7 +27,8 @@ def as_made_svg(job: LaserJob) -> str:
     ]
     for laser_pass in job.cell_passes:
         assert laser_pass.color is not None
-        outlines = list(burnt_cell_outlines_mm(laser_pass, job.front)[:, ::POINT_STRIDE])
+        burnt = burnt_cell_outlines_mm(laser_pass, job.front)
+        outlines = list(burnt[:, ::POINT_STRIDE] if job.setup.compensated else burnt)
         lines.append(
             _pass_group(
                 laser_pass.name, job.layout.palette[COLORS[laser_pass.color]], outlines, low[0], high[1]

@@ -51,7 +51,10 @@ def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
         yield _error_finding(
             "depth of the cavities in this material", setup.depth_mm, thickness, "mm", remedy
         )
-    if min(job.back.x_mm, job.back.y_mm) <= 0:
+    yield from _hole_findings(job)
+    if not setup.compensated:
+        yield from _uncompensated_findings(job)
+    elif min(job.back.x_mm, job.back.y_mm) <= 0:
         remedy = "lower laser.taper_deg or laser.depth_mm, or widen the kerf: the beam closes before the back"
         yield _error_finding("kerf at the back", 2 * min(job.back.x_mm, job.back.y_mm), 0, "mm", remedy)
     yield from _spacing_findings(job)
@@ -140,9 +143,33 @@ def count_open_paths(strokes: Strokes) -> int:
     return int(np.count_nonzero(np.abs(area) < SAME_MM**2))
 
 
+def _hole_findings(job: LaserJob) -> Iterator[Finding]:
+    """A beam cannot burn a round hole that is more sharply curved than its footprint: the path turns inside out."""
+    diameter, limit = job.layout.fiducial_diameter_mm, job.front.smallest_hole_mm
+    if job.setup.options.holes and len(job.fiducials_mm) and diameter <= limit:
+        remedy = "make fiducials.diameter_mm larger, the kerf smaller, or leave the holes out (laser.holes = false)"
+        yield _error_finding(
+            "diameter of the fiducial holes, against the kerf", diameter, limit, "mm", remedy
+        )
+
+
+def _uncompensated_findings(job: LaserJob) -> Iterator[Finding]:
+    options = job.setup.options
+    if options.mode == "pocket":
+        remedy = (
+            'give the kerf, or choose laser.mode = "cut": lines of a pocket keep half a kerf from its walls'
+        )
+        yield _error_finding("kerf of a pocket", 0, 0, "mm", remedy)
+    idle = sorted({"corner", "face", "taper_deg"} & options.model_fields_set)
+    if idle:
+        names = " and ".join(f"laser.{name}" for name in idle)
+        remedy = f"leave {names} out: without compensation (laser.kerf_mm = 0) paths are the outlines"
+        yield Finding("options without effect", len(idle), 0, "", remedy, "warning")
+
+
 def _spacing_findings(job: LaserJob) -> Iterator[Finding]:
     options = job.setup.options
-    if options.mode != "pocket":
+    if options.mode != "pocket" or not job.setup.compensated:
         return
     share = 1.0 if options.fill == "hatch" else 0.5
     limit = share * job.back.narrow_mm

@@ -262,6 +262,8 @@ def _hole_strokes(centres_mm: Points, diameter_mm: float, beam: BeamFootprint) -
     """Paths along which an elliptic beam burns round holes: the circle less the footprint's extent, exact."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    if beam.is_point:
+        return loop_strokes(centres_mm[:, None] + diameter_mm / 2 * normal, np.arange(len(centres_mm)))
     squares = np.array([beam.x_mm**2, beam.y_mm**2])
     contact = normal * squares / np.sqrt((normal**2 * squares).sum(axis=1))[:, None]
     circle = diameter_mm / 2 * normal - contact

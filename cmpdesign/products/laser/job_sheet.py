@@ -46,6 +46,7 @@ def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tup
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(job.name)}: laser job</title>',
         f"<style>{_STYLE}</style></head><body>",
         f"<h1>{escape(job.name)}: laser job</h1>",
+        _uncompensated_html(job),
         _warning_html(job),
         _facts_html(job, timings),
         "<h2>Order of work</h2>",
@@ -53,7 +54,7 @@ def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tup
         "<h2>Passes</h2>",
         _pictures_html(job),
         "<h2>As made</h2>",
-        f"<p>{_CORNERS[job.setup.options.corner]}</p>",
+        _corners_html(job),
         _as_made_html(figures),
         "<h2>Registration</h2>",
         _registration_html(job),
@@ -84,6 +85,22 @@ def _warning_html(job: LaserJob) -> str:
     )
 
 
+def _uncompensated_html(job: LaserJob) -> str:
+    if job.setup.compensated:
+        return ""
+    return (
+        '<div class="warn"><b>Not compensated for the kerf</b> (laser.kerf_mm = 0): paths are the nominal outlines. '
+        "Set the compensation in the laser's program: half the kerf inward for cells and holes, outward for the pad's "
+        "outline. Burnt as they are, cells and holes come out one kerf too wide.</div>"
+    )
+
+
+def _corners_html(job: LaserJob) -> str:
+    if job.setup.compensated:
+        return f"<p>{_CORNERS[job.setup.options.corner]}</p>"
+    return "<p>The nominal outlines, which the laser's program has to compensate.</p>"
+
+
 def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
     setup, extent = job.setup, job.extent_mm
     bed = f"{setup.machine.bed_width_mm.value:g} x {setup.machine.bed_height_mm.value:g} mm"
@@ -91,10 +108,14 @@ def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
         "Machine": f"{setup.machine.name}, bed {bed}, full power S{setup.machine.s_max.value:g}",
         "Material": f"{setup.material.name}, {setup.material.thickness_mm.value:g} mm",
         "Cavities": f"{setup.options.mode}, {setup.depth_mm:g} mm deep, {setup.options.corner} corners, "
-        f"nominal size at the {setup.options.face}",
+        f"nominal size at the {setup.options.face}"
+        if setup.compensated
+        else f"{setup.options.mode}, {setup.depth_mm:g} mm deep",
         "Kerf": f"front {_format_kerf(job.front.kerf_mm)}, back {_format_kerf(job.back.kerf_mm)} (cuts "
         f"along y, along x); "
-        f"walls lean by {setup.taper_deg:g}°",
+        f"walls lean by {setup.taper_deg:g}°"
+        if setup.compensated
+        else "not compensated: paths are the nominal outlines",
         "On the bed": f"{extent.right - extent.left:.2f} x {extent.top - extent.bottom:.2f} mm, "
         f"lower left corner at X{extent.left:.2f} Y{extent.bottom:.2f}",
         "Laser time": format_duration(sum(timing.time_s for timing in timings))

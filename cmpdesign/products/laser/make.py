@@ -37,10 +37,10 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
         DesignError: the machine or material is unknown, or a check of the job fails; every reason in one line.
     """
     job = make_job(design.name, layout, complete_setup(design.laser))
-    require_no_errors(setup_findings(design, job))
+    warnings = require_no_errors(setup_findings(design, job))
     require_no_errors(path_findings(job))
     figures = measure_as_made(job)
-    warnings = require_no_errors(as_made_findings(job, figures))
+    warnings += require_no_errors(as_made_findings(job, figures))
     timings = tuple(pass_timing(job, laser_pass) for laser_pass in job.passes)
     files: dict[str, str | bytes] = {}
     all_passes = job_drawing(job)

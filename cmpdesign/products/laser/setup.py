@@ -28,7 +28,7 @@ class LaserSetup:
     Attributes:
         options: options of the design.
         machine, material: contents of their files.
-        kerf_x_mm, kerf_y_mm: kerf at the front, of cuts along y and along x.
+        kerf_x_mm, kerf_y_mm: kerf at the front, of cuts along y and along x; both 0: paths are not compensated.
         taper_deg: angle of each wall against the beam.
         depth_mm: depth of the cavities.
         power_percent, speed_mm_s, repeats: settings of the passes of cells.
@@ -55,6 +55,11 @@ class LaserSetup:
     minimum_web_mm: float
     assumed: tuple[str, ...]
 
+    @property
+    def compensated(self) -> bool:
+        """Paths keep their distance from the outlines; else they are the outlines."""
+        return self.kerf_x_mm > 0
+
 
 def complete_setup(options: LaserOptions) -> LaserSetup:
     """Complete the options from the files of machine and material.
@@ -64,8 +69,9 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
     """
     machine, material = load_machine(options.machine), load_material(options.material)
     settings = settings_on(material, options.machine)
-    kerf_x_mm = options.kerf_mm or options.kerf_x_mm or settings.kerf_x_mm.value
-    kerf_y_mm = options.kerf_mm or options.kerf_y_mm or settings.kerf_y_mm.value
+    both_mm = options.kerf_mm
+    kerf_x_mm = both_mm if both_mm is not None else options.kerf_x_mm or settings.kerf_x_mm.value
+    kerf_y_mm = both_mm if both_mm is not None else options.kerf_y_mm or settings.kerf_y_mm.value
     depth_mm = options.depth_mm or material.thickness_mm.value
     taper_deg = settings.taper_deg.value if options.taper_deg is None else options.taper_deg
     bottom_mm = min(kerf_x_mm, kerf_y_mm) - 2 * depth_mm * math.tan(math.radians(taper_deg))
@@ -99,8 +105,8 @@ def _assumed_values(options: LaserOptions, material: Material, settings: Setting
     kind = "pocket" if options.mode == "pocket" else "cut"
     passes = "pocket_depth_per_pass_mm" if options.mode == "pocket" else "cut_passes"
     given = {
-        "kerf_x_mm": options.kerf_mm or options.kerf_x_mm,
-        "kerf_y_mm": options.kerf_mm or options.kerf_y_mm,
+        "kerf_x_mm": options.kerf_x_mm if options.kerf_mm is None else options.kerf_mm,
+        "kerf_y_mm": options.kerf_y_mm if options.kerf_mm is None else options.kerf_mm,
         "taper_deg": options.taper_deg,
         f"{kind}_power_percent": options.power_percent,
         f"{kind}_speed_mm_s": options.speed_mm_s,

@@ -12,9 +12,10 @@ o o               o        the fifth fiducial shows the orientation of the piece
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -31,6 +32,8 @@ PATCH_MM, MARGIN_MM = (11.0, 10.0), 5.0
 FIDUCIAL_MM, KEY_MM = 3.0, 7.0
 TRIANGLE_MM = 1.5
 _MAX_BYTES = 1 << 20
+
+Face = Literal["front", "back"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,9 @@ class Coupon:
 
     Attributes:
         machine, material: names of machine and material.
+        thickness_mm: thickness of the sheet, which the openings go through.
+        taper_deg: angle of each wall against the beam; positive narrows towards the back.
+        taper_assumed: the taper is an assumption of the material's file.
         fiducial_diameter_mm: diameter of the fiducials.
         fiducials_mm: (x, y) of the lower left, lower right, upper left and upper right fiducial, and of the fifth,
             right of the first.
@@ -68,9 +74,22 @@ class Coupon:
 
     machine: str
     material: str
+    thickness_mm: float
+    taper_deg: float
+    taper_assumed: bool
     fiducial_diameter_mm: float
     fiducials_mm: tuple[tuple[float, float], ...]
     patches: tuple[Patch, ...]
+
+    @property
+    def narrowing_mm(self) -> float:
+        """How much narrower a cut is at the back than at the front, by the taper."""
+        return 2 * self.thickness_mm * math.tan(math.radians(self.taper_deg))
+
+    @property
+    def narrow_face(self) -> Face:
+        """The face through whose openings the ground is seen: the narrower one; the front without a taper."""
+        return "back" if self.taper_deg > 0 else "front"
 
 
 class CouponError(CmpDesignError, ValueError):
@@ -100,7 +119,16 @@ def design_coupon(setup: LaserSetup) -> Coupon:
                 )
             )
     corners = ((0.0, 0.0), (right, 0.0), (0.0, top), (right, top), (KEY_MM, 0.0))
-    return Coupon(setup.machine.name, setup.material.name, FIDUCIAL_MM, corners, tuple(patches))
+    return Coupon(
+        machine=setup.machine.name,
+        material=setup.material.name,
+        thickness_mm=setup.material.thickness_mm.value,
+        taper_deg=setup.taper_deg,
+        taper_assumed="taper_deg" in setup.assumed,
+        fiducial_diameter_mm=FIDUCIAL_MM,
+        fiducials_mm=corners,
+        patches=tuple(patches),
+    )
 
 
 def coupon_to_json(coupon: Coupon) -> str:
@@ -156,6 +184,9 @@ class _CouponFile(_StrictModel):
     units: str = Field(pattern="^mm$")
     machine: str
     material: str
+    thickness_mm: float = Field(gt=0, le=100)
+    taper_deg: float = Field(gt=-45, lt=45)
+    taper_assumed: bool
     fiducial_diameter_mm: float = Field(gt=0, le=100)
     fiducials_mm: list[tuple[float, float]] = Field(min_length=5, max_length=5)
     patches: list[_PatchFile] = Field(min_length=1, max_length=100)
@@ -173,4 +204,13 @@ def _parse_coupon(document: Any) -> Coupon:
         )
         for patch in data.patches
     )
-    return Coupon(data.machine, data.material, data.fiducial_diameter_mm, tuple(data.fiducials_mm), patches)
+    return Coupon(
+        machine=data.machine,
+        material=data.material,
+        thickness_mm=data.thickness_mm,
+        taper_deg=data.taper_deg,
+        taper_assumed=data.taper_assumed,
+        fiducial_diameter_mm=data.fiducial_diameter_mm,
+        fiducials_mm=tuple(data.fiducials_mm),
+        patches=patches,
+    )

@@ -6,24 +6,30 @@ M4 (dynamic power) scales S with the actual speed, so corners are not burnt deep
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 from cmpdesign import __version__
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
 from cmpdesign.products.laser.formats.laser_layers import format_mm
-from cmpdesign.products.laser.job import LaserPass
+from cmpdesign.products.laser.job import LaserPass, PassKind
 from cmpdesign.products.laser.paths.strokes import Strokes
 
-PAUSE = "M0 ; take the pad out, fill, cure, put it back on its pins"
+# Pauses after the kinds of passes that work by hand follows; the last pass has none.
+PAUSES: Mapping[PassKind, str] = {
+    "holes": "M0 ; put the pins into the holes, they stay to the end",
+    "cells": "M0 ; take the pad out, fill, cure, put it back on its pins",
+}
 
 
 def drawing_to_gcode(drawing: LaserDrawing) -> str:
-    """Format the program of the passes; the program pauses after each pass of cells but the last pass."""
+    """Format the program of the passes; the program pauses after holes and cells, but not after the last pass."""
     machine = drawing.setup.machine
     lines = [
         f"; cmpdesign {__version__}: {_plain_comment(drawing.name)}",
         f"; machine: {_plain_comment(machine.name)}, $30={machine.s_max.value:g}, $32=1",
         "; origin: lower left corner of the bed, mm",
+        *([] if drawing.setup.compensated else ["; paths are the outlines: not compensated for the kerf"]),
         "G21",
         "G90",
         "G94",
@@ -32,8 +38,8 @@ def drawing_to_gcode(drawing: LaserDrawing) -> str:
     ]
     for index, laser_pass in enumerate(drawing.passes):
         lines += _pass_program(laser_pass, machine.s_max.value)
-        if index + 1 < len(drawing.passes) and laser_pass.kind == "cells":
-            lines.append(PAUSE)
+        if index + 1 < len(drawing.passes) and laser_pass.kind in PAUSES:
+            lines.append(PAUSES[laser_pass.kind])
     return "\n".join([*lines, "G0 X0 Y0 S0", "M2", ""])
 
 

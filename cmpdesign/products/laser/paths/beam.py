@@ -18,7 +18,10 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BeamFootprint:
-    """Half-axes of the footprint, mm: ``x_mm`` is half the kerf of cuts along y, ``y_mm`` of cuts along x."""
+    """Half-axes of the footprint, mm: ``x_mm`` is half the kerf of cuts along y, ``y_mm`` of cuts along x.
+
+    Both are 0 for paths that are not compensated: such a beam has no beam units and leaves the path itself.
+    """
 
     x_mm: float
     y_mm: float
@@ -31,6 +34,17 @@ class BeamFootprint:
     def kerf_mm(self) -> tuple[float, float]:
         """Full widths of a cut along y and of a cut along x."""
         return 2 * self.x_mm, 2 * self.y_mm
+
+    @property
+    def is_point(self) -> bool:
+        """The beam has no width."""
+        return self.x_mm == 0 and self.y_mm == 0
+
+    @property
+    def smallest_hole_mm(self) -> float:
+        """The diameter of the smallest round hole: the largest radius of curvature of the footprint, twice."""
+        narrow, wide = sorted(self.kerf_mm)
+        return wide**2 / narrow if narrow > 0 else 0.0
 
     @property
     def narrow_mm(self) -> float:
@@ -53,7 +67,9 @@ class BeamFootprint:
     def at_depth(self, depth_mm: float, taper_deg: float) -> BeamFootprint:
         """The footprint at a depth below the front, if each wall leans inward by the taper.
 
-        Half-axes of zero or less mean that the cut does not reach this depth.
+        Half-axes of zero or less mean that the cut does not reach this depth; a beam without width stays as it is.
         """
+        if self.is_point:
+            return self
         narrowing = depth_mm * math.tan(math.radians(taper_deg))
         return BeamFootprint(self.x_mm - narrowing, self.y_mm - narrowing)

@@ -16,7 +16,7 @@ from cmpdesign.products.laser.paths.corners import (
     spur_start,
     with_spurs,
 )
-from cmpdesign.products.laser.paths.kerf import inset_polygons
+from cmpdesign.products.laser.paths.kerf import inset_polygons, polygon_areas
 
 CornerMode = Literal["plain", "overcut"]
 # Points of the arc around a corner or a spur's tip.
@@ -79,10 +79,12 @@ def make_cavities(
         cell: (N,) numbers of the cells.
         polygons_mm: (N, K, 2) convex cells, counter-clockwise.
         beam: the footprint at the face where the cells get their nominal size.
-        corner: "plain", or "overcut" for balanced spurs.
+        corner: "plain", or "overcut" for balanced spurs; a beam without width has none.
     """
     path_mm, exists = inset_polygons(polygons_mm, beam)
     tip_mm = path_mm
+    if beam.is_point:
+        corner = "plain"
     if corner == "overcut":
         outward = beam.to_beam_units(polygons_mm - path_mm)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -95,6 +97,8 @@ def make_cavities(
 
 def burnt_areas_mm2(cavities: Cavities, beam: BeamFootprint) -> NDArray[np.float64]:
     """(N,) areas of the holes, exact: in beam units area + perimeter + pi (Steiner's formula) + the spurs' gain."""
+    if beam.is_point:
+        return polygon_areas(cavities.path_mm)
     spurs = _spur_geometry(cavities, beam)
     path = spurs.path
     next_corner = np.roll(path, -1, axis=1)
@@ -107,7 +111,12 @@ def burnt_areas_mm2(cavities: Cavities, beam: BeamFootprint) -> NDArray[np.float
 
 
 def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
-    """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true curve."""
+    """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true curve.
+
+    For a beam without width (N, K, 2), the paths.
+    """
+    if beam.is_point:
+        return cavities.path_mm
     path, direction, length = _spur_geometry(cavities, beam)
     left = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
     after, before = half_angles(path, direction)

@@ -24,6 +24,8 @@ def inset_polygons(polygons_mm: Points, beam: BeamFootprint) -> tuple[Points, ND
     Returns:
         (N, K, 2) paths, and (N,) True where a path exists: no side has vanished or reversed.
     """
+    if beam.is_point:
+        return polygons_mm, np.ones(len(polygons_mm), dtype=np.bool_)
     corners = beam.to_beam_units(polygons_mm)
     side = np.roll(corners, -1, axis=1) - corners
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -61,6 +63,8 @@ def polygon_areas(polygons: Points) -> NDArray[np.float64]:
 def _offset_outline(outline_mm: Points, beam: BeamFootprint, distance: float) -> list[Points]:
     import shapely
 
+    if beam.is_point:
+        return [outline_mm]
     polygon = shapely.Polygon(beam.to_beam_units(outline_mm))
     moved = shapely.buffer(polygon, distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
     parts = [part for part in shapely.get_parts(moved) if not part.is_empty]

@@ -176,7 +176,9 @@ def test_gcode_waits_for_filling_between_passes() -> None:
     text = drawing_to_gcode(drawing)
     burn = run_gcode(text)
     counts = np.cumsum([one.repeats * len(one.walls.xy_mm) for one in job.passes])
-    assert burn.pauses == counts[1:-1].tolist()
+    assert burn.pauses == counts[:-1].tolist()
+    waits = [line for line in text.splitlines() if line.startswith("M0")]
+    assert "put the pins into the holes" in waits[0] and all("fill, cure" in line for line in waits[1:])
     head = text.splitlines()[:9]
     assert {"G21", "G90", "G94", "M5"} <= set(head)
     assert text.rstrip().endswith("M5\nG0 X0 Y0 S0\nM2")

@@ -25,6 +25,7 @@ from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
 from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.library import load_machine, load_material, machines, materials
+from cmpdesign.products.laser.paths.beam import BeamFootprint
 from cmpdesign.products.laser.paths.order import order_cells, shortest_pause
 from cmpdesign.products.laser.paths.strokes import ragged_strokes
 from cmpdesign.products.laser.paths.timing import move_times_s
@@ -80,7 +81,12 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings_", "expected"),
     [
-        (["laser.kerf_mm=1.2mm"], "that the kerf leaves nothing of: "),
+        (["laser.kerf_mm=1.2mm", "fiducials.diameter_mm=3"], "that the kerf leaves nothing of: "),
+        (
+            ["fiducials.diameter_mm=0.1"],
+            "diameter of the fiducial holes, against the kerf: 0.1 mm, limit 0.171 mm; make fiducials.diameter_mm",
+        ),
+        (["laser.kerf_mm=0", "laser.mode=pocket"], "kerf of a pocket: 0 mm"),
         (
             ["laser.minimum_web_mm=2mm"],
             "smallest web of 1-red at the front: 1.35 mm, limit 2 mm; make pitch_mm larger",
@@ -284,3 +290,47 @@ def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> N
         assert wrong == 0
         rms_mm = float(np.sqrt(((found - true) ** 2).sum(axis=1).mean())) / PX_PER_MM
         assert rms_mm < 0.02, f"corners move by {1000 * rms_mm:.1f} um"
+
+
+def test_paths_without_compensation_are_the_outlines(tmp_path: Path) -> None:
+    """For shops that compensate themselves; the job sheet, the program and the report say so."""
+    settings_ = ["layers=3", "laser.kerf_mm=0", "laser.outline=true", "laser.taper_deg=1"]
+    flags = [flag for text in settings_ for flag in ("--set", text)]
+    result = run("build", "honeycomb", "-o", tmp_path, "--only", "laser", *flags)
+    assert result.exit_code == 0, result.output
+    assert "leave laser.taper_deg out" in result.stderr
+    job = made_job(laser__kerf_mm="0", laser__outline="true")
+    for one in job.cell_passes:
+        assert one.cavities is not None
+        corners = job.layout.marker_xy_mm[job.layout.cell_corners[one.cavities.cell]] + job.origin_mm
+        for path, cell in zip(one.walls, corners, strict=True):
+            assert len(path) == 3
+            np.testing.assert_allclose(sorted(path.tolist()), sorted(cell.round(4).tolist()), atol=1.1e-4)
+    holes = [shapely.Polygon(path) for path in job.passes[0].walls]
+    diameter = job.layout.fiducial_diameter_mm
+    for hole, centre in zip(holes, job.fiducials_mm, strict=True):
+        ring = shapely.get_coordinates(hole)
+        np.testing.assert_allclose(np.hypot(*(ring - centre).T), diameter / 2, atol=2e-4)
+    np.testing.assert_allclose(next(iter(job.passes[-1].walls)), job.outline_mm, atol=1e-4)
+    figures = json.loads((tmp_path / "report.json").read_text())["laser"]
+    assert figures["compensated"] is False and figures["kerf_front_mm"] == [0, 0]
+    assert figures["passes"][1]["front"]["area_error_percent"] == 0
+    assert "not compensated" in (tmp_path / "laser" / "job.gcode").read_text()
+    assert "Not compensated for the kerf" in (tmp_path / "laser" / "job-sheet.html").read_text()
+
+
+@given(st.floats(0.05, 0.4), st.floats(0.05, 0.4), st.floats(1.001, 3.0))
+@settings(max_examples=20, deadline=None)
+def test_the_smallest_hole_can_be_burnt(kerf_x_mm: float, kerf_y_mm: float, factor: float) -> None:
+    """Above the limit of a fiducial's diameter a path's points lie on their own side of the centre, else not."""
+    beam = BeamFootprint.of_kerf(kerf_x_mm, kerf_y_mm)
+    for diameter, simple in ((factor * beam.smallest_hole_mm, True), (0.6 * min(beam.kerf_mm), False)):
+        job = made_job(
+            laser__kerf_x_mm=str(kerf_x_mm),
+            laser__kerf_y_mm=str(kerf_y_mm),
+            fiducials__diameter_mm=str(diameter),
+        )
+        path = next(iter(job.passes[0].walls)) - job.fiducials_mm[0]
+        angle = np.linspace(0, 2 * np.pi, len(path), endpoint=False)
+        outward = (path * np.column_stack([np.cos(angle), np.sin(angle)])).sum(axis=1)
+        assert (outward > -1e-4).all() == simple
