@@ -59,5 +59,6 @@ def _find_template(name_or_path: str | Path, known: dict[str, Path]) -> Path:
     if path.suffix or len(path.parts) > 1:
         raise DesignError(f"{name_or_path}: no such file")
     raise DesignError(
-        f"{name_or_path}: no such template{nearest_name(name_or_path, known)}; there are {', '.join(known)}, or give a TOML file"
+        f"{name_or_path}: no such template{nearest_name(name_or_path, known)}; there are {', '.join(known)}, "
+        "or give a TOML file"
     )

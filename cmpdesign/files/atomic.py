@@ -57,8 +57,11 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
 
 
 def _write_and_sync(path: Path, content: str | bytes) -> None:
-    """Write and sync, so that a full disk raises an error here and not after the rename."""
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    """Write and sync, so that a full disk raises an error here and not after the rename.
+
+    Half a surrogate pair, from a path whose bytes are not UTF-8, is written as in JSON: backslash, u, four digits.
+    """
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with path.open("wb") as file:
         file.write(data)
         file.flush()
@@ -76,7 +79,6 @@ def _as_output_error(path: Path) -> Iterator[None]:
         yield
     except OutputError:
         raise
-    except OSError as error:
-        raise OutputError(
-            f"{path}: cannot be written ({error.strerror or error}); nothing was changed"
-        ) from error
+    except (OSError, ValueError, RuntimeError) as error:  # also a NUL in the path, or a loop of links
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be written ({reason}); nothing was changed") from error

@@ -12,6 +12,10 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 
+from cmpdesign.errors import InputError
+from cmpdesign.inputs.documents import read_json
+from cmpdesign.inputs.files import read_file
+
 LIST_NAME = ".cmpdesign-files.json"
 
 
@@ -76,29 +80,30 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
 def _read_file_list(path: Path) -> dict[str, str]:
     """File name -> digest from an earlier list; empty without a valid list."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if (document["format"], document["version"]) != ("cmp-files", 1):
             return {}
         return {str(name): str(digest) for name, digest in document["sha256"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (InputError, KeyError, TypeError, AttributeError):
         return {}
 
 
 def _is_below(path: Path, folder: Path) -> bool:
     """True if the path lies below the folder without links; an edited list may name other paths."""
-    return (
-        path.resolve() == folder.resolve() / path.relative_to(folder)
-        if path.is_relative_to(folder)
-        else False
-    )
+    try:
+        return path.is_relative_to(folder) and path.resolve() == folder.resolve() / path.relative_to(folder)
+    except (OSError, ValueError, RuntimeError):  # too long, a NUL, a loop of links
+        return False
 
 
 def _is_unchanged(path: Path, digest: str) -> bool:
     try:
-        return path.is_file() and _content_digest(path.read_bytes()) == digest
-    except OSError:
+        return _content_digest(read_file(path)) == digest
+    except InputError:
         return False
 
 
 def _content_digest(content: str | bytes) -> str:
-    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+    return hashlib.sha256(
+        content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    ).hexdigest()

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.files.image_header import size_in_header
+from cmpdesign.inputs.files import read_file
 
 SMALLEST_PX = 16
+MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
+_NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -19,38 +23,54 @@ class ImageFileError(CmpDesignError, ValueError):
     """A file that is not a color image of sufficient size."""
 
 
-def read_image(path: str | Path) -> Image:
+def read_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> Image:
     """Read the pixels of an image file.
 
     An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured.
+
+    Args:
+        path: a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM file.
+        most_pixels: limit of width x height; the header is tested before memory is taken.
 
     Returns:
         (H, W, 3) uint8 or uint16, BGR.
 
     Raises:
         ImageFileError: the file cannot be read, is no image, has one channel, has other than 8 or 16 bits, or is
-            smaller than 16 x 16 pixels.
+            smaller than 16 x 16 or larger than ``most_pixels`` pixels.
+    """
+    return _to_bgr(decode_image(path, most_pixels), Path(path))
+
+
+def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+    """Read the pixels of an image file as they are stored: (H, W) or (H, W, C), of any depth.
+
+    Raises:
+        ImageFileError: the file cannot be read, is no image, or has more than ``most_pixels`` pixels.
     """
     import cv2
 
-    path = Path(path)
     try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise ImageFileError(
-            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
-        ) from None
+        data = read_file(path)
+    except InputError as error:
+        raise ImageFileError(str(error)) from None
     if not data:
         raise ImageFileError(f"{path}: is empty; expected an image")
+    size = size_in_header(data)
+    if size is None:
+        raise ImageFileError(f"{path}: {_NO_IMAGE}")
+    if size[0] * size[1] > most_pixels:
+        raise ImageFileError(
+            f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
+            f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+        )
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # OpenCV refuses to decode: too many pixels, or an unknown type
+    except (cv2.error, MemoryError):  # OpenCV refuses to decode: too many pixels, or an unknown type
         pixels = None
     if pixels is None:
-        raise ImageFileError(
-            f"{path}: is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
-        )
-    return _to_bgr(pixels, path)
+        raise ImageFileError(f"{path}: {_NO_IMAGE}")
+    return np.asarray(pixels)
 
 
 def _to_bgr(pixels: NDArray[Any], path: Path) -> Image:

@@ -66,7 +66,7 @@ def read_text(path: str | Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
 def is_regular_file(path: str | Path) -> bool:
     """True for a regular file; False also for paths that no file can have: too long, with NUL, a loop of links."""
     try:
-        return stat.S_ISREG(os.stat(path).st_mode)
+        return stat.S_ISREG(Path(path).stat().st_mode)
     except (OSError, ValueError):
         return False
 
@@ -74,7 +74,7 @@ def is_regular_file(path: str | Path) -> bool:
 def path_exists(path: str | Path) -> bool:
     """True if something is there; False also for paths that no file can have."""
     try:
-        os.stat(path)
+        Path(path).stat()
     except (OSError, ValueError):
         return False
     return True

@@ -31,7 +31,7 @@ def one_printable_line(value: str) -> str:
     """
     if not value.isprintable():
         raise ValueError(
-            f"{ascii(value[:40])} has line breaks or control characters; write it on one line of plain letters"
+            f"{value[:40]!a} has line breaks or control characters; write it on one line of plain letters"
         )
     return value
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import OutputError
+from cmpdesign.errors import InputError, OutputError
+from cmpdesign.inputs.files import read_file
 from cmpdesign.scene.errors import SceneError
 
 
@@ -106,15 +110,23 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
     if "time_s" not in columns:
         raise SceneError(f"{path} holds no sequence; read it with load_truth")
     time_s = columns.pop("time_s")
-    frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
+    try:
+        frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
+    except (TypeError, IndexError) as error:
+        raise SceneError(f"{path} is not a truth file ({error}); write one with save_truths") from error
     return [_truth_from_columns(frame, path) for frame in frames], time_s
 
 
 def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(read_file(path)), allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, ValueError, TypeError, AttributeError, EOFError) as error:
+    except InputError as error:
+        raise SceneError(str(error)) from None
+    except (
+        OSError, ValueError, TypeError, AttributeError, EOFError, MemoryError, RecursionError, zipfile.BadZipFile,
+        zlib.error, NotImplementedError, KeyError,
+    ) as error:  # fmt: skip
         raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error
 
 

@@ -14,11 +14,15 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.inputs.documents import parse_json
+from cmpdesign.inputs.files import read_text
+from cmpdesign.inputs.names import Name
+from cmpdesign.inputs.validation import validation_message
 from cmpdesign.products.laser.setup import LaserSetup
 
 # Powers (columns) and repeats (rows), relative to the settings of the job.
@@ -116,19 +120,12 @@ def load_coupon(path: str | Path) -> Coupon:
         CouponError: the file cannot be read or does not describe a coupon; one line that names the field.
     """
     try:
-        with Path(path).open("rb") as file:
-            text = file.read(_MAX_BYTES + 1).decode("utf-8")
-        return _parse_coupon(json.loads(text))
-    except OSError as error:
-        raise CouponError(f"{path}: cannot be read: {error.strerror}") from None
+        return _parse_coupon(parse_json(read_text(path, _MAX_BYTES), str(path)))
+    except InputError as error:
+        raise CouponError(f"{error}; expected a coupon.json as build writes it with --only laser") from None
     except ValidationError as error:
-        item = error.errors()[0]
-        where = ".".join(str(part) for part in item["loc"])
-        raise CouponError(
-            f"{path}: {where}: {item['msg']}; expected a coupon.json as build writes it"
-        ) from None
-    except (ValueError, RecursionError):
-        raise CouponError(f"{path}: is no coupon.json; build writes one with --only laser") from None
+        message = validation_message(error, _CouponFile)
+        raise CouponError(f"{path}: {message}; expected a coupon.json as build writes it") from None
 
 
 class _StrictModel(BaseModel):
@@ -143,7 +140,7 @@ class _OpeningFile(_StrictModel):
 
 
 class _PatchFile(_StrictModel):
-    name: str = Field(min_length=1, max_length=20)
+    name: Annotated[Name, Field(min_length=1, max_length=20)]
     power_percent: float = Field(gt=0, le=100)
     speed_mm_s: float = Field(gt=0, le=1e6)
     passes: int = Field(ge=1, le=1000)
@@ -154,8 +151,8 @@ class _CouponFile(_StrictModel):
     format: str = Field(pattern="^cmp-coupon$")
     version: int = Field(ge=1, le=1)
     units: str = Field(pattern="^mm$")
-    machine: str
-    material: str
+    machine: Name
+    material: Name
     fiducial_diameter_mm: float = Field(gt=0, le=100)
     fiducials_mm: list[tuple[float, float]] = Field(min_length=5, max_length=5)
     patches: list[_PatchFile] = Field(min_length=1, max_length=100)
