@@ -20,20 +20,42 @@ from cmpdesign.cli.commands import (
     track,
     verify,
 )
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, is_expected, print_error
+from cmpdesign.cli.terminal import (
+    EXIT_BAD_INPUT,
+    is_expected,
+    print_document,
+    print_error,
+    shortened,
+)
+from cmpdesign.inputs.texts import visible
 
 
 class OneLineErrors(TyperGroup):
     """Prints expected errors as one line on stderr, with exit code 2 and without a traceback."""
+
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        try:
+            return super().make_context(*arguments, **options)
+        except Exception as error:
+            _make_visible(error)
+            raise
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except Exception as error:
             if not is_expected(error):
+                _make_visible(error)
                 raise
             print_error(error)
             raise typer.Exit(EXIT_BAD_INPUT) from None
+
+
+def _make_visible(error: Exception) -> None:
+    """Replace the message of a usage error, which quotes the command line, by its printable form."""
+    if hasattr(error, "format_message"):
+        text = shortened(visible(error.format_message(), keep="\n"))
+        error.format_message = lambda: text
 
 
 app = typer.Typer(
@@ -57,7 +79,7 @@ app.command("schema")(schema.schema)
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"cmpdesign {__version__}")
+        print_document(f"cmpdesign {__version__}\n")
         raise typer.Exit()
 
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, InputError
 from cmpdesign.files.image_header import size_in_header
-from cmpdesign.inputs.files import read_file
+from cmpdesign.inputs.files import MOST_PIXELS, read_file
 
 SMALLEST_PX = 16
-MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]

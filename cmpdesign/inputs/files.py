@@ -9,6 +9,7 @@ from pathlib import Path
 from cmpdesign.errors import InputError
 
 MOST_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest that a command writes has some 3 MiB
+MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
 MOST_DATA_BYTES = 1 << 31  # 2 GiB: of an image or an array
 _KINDS = {
     stat.S_IFDIR: "a folder",

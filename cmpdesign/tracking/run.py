@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
+from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.overlay import OverlayWriter
 from cmpdesign.tracking.sinks import FrameSink
 from cmpdesign.tracking.sources import FrameSource, open_source
@@ -112,7 +113,12 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
 
 
 def read_rest_markers(
-    text: str, source: str, reference: Reference, fps: float | None, response: Response | None = None
+    text: str,
+    source: str,
+    reference: Reference,
+    fps: float | None,
+    response: Response | None = None,
+    most_pixels: int = MOST_PIXELS,
 ) -> Markers:
     """Extract the markers at rest.
 
@@ -122,34 +128,39 @@ def read_rest_markers(
         reference: the layout.
         fps: see ``open_source``.
         response: see ``Extractor``.
+        most_pixels: see ``open_source``.
 
     Raises:
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
     from extractor import Extractor
 
-    markers = Extractor(reference, response=response).extract(read_rest_image(text, source, fps))
+    markers = Extractor(reference, response=response).extract(read_rest_image(text, source, fps, most_pixels))
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
     return markers
 
 
-def read_rest_image(text: str, source: str, fps: float | None) -> Any:
+def read_rest_image(text: str, source: str, fps: float | None, most_pixels: int = MOST_PIXELS) -> Any:
     """Read the image at rest; arguments as for ``read_rest_markers``.
 
     Raises:
         CmpDesignError: no such frame or image.
     """
-    image = _read_frame(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
+    image = (
+        _read_frame(int(text), source, fps, most_pixels)
+        if text.isdecimal()
+        else read_image(Path(text), most_pixels)
+    )
     if image is None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: {name} cannot be read; choose another")
     return image
 
 
-def _read_frame(number: int, text: str, fps: float | None) -> Any:
-    source = open_source(text, fps)
+def _read_frame(number: int, text: str, fps: float | None, most_pixels: int) -> Any:
+    source = open_source(text, fps, most_pixels)
     if source.name.startswith("camera"):
         raise CmpDesignError(
             f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file"

@@ -22,6 +22,7 @@ from cmpdesign.tracking.table import table_long_form
 
 CHUNK_FRAMES = 256
 CHUNK_S = 5.0  # largest time between two chunks, lost in a crash
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # in spreadsheets
 KINDS = (".npz", ".parquet", ".csv")
 
 
@@ -148,7 +149,7 @@ class CsvSink:
 def _csv_lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
     """The rows of a frame; unknown values are empty fields."""
     reason = io.StringIO()
-    csv.writer(reason, lineterminator="").writerow([columns["reason"][0]])
+    csv.writer(reason, lineterminator="").writerow([_plain_cell(columns["reason"][0])])
     time_s, status = _format_number(columns["time_s"][0], 6), columns["frame_status"][0]
     head = f"{columns['frame'][0]},{time_s},{status},{reason.getvalue()},"
     if not columns["reason"][0]:
@@ -158,6 +159,11 @@ def _csv_lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
         for name, places in digits.items()
     ]
     return "".join(head + ",".join(row) + "\n" for row in zip(*fields, strict=True)).encode()
+
+
+def _plain_cell(text: str) -> str:
+    """The text of a cell; an apostrophe keeps spreadsheets from reading it as a formula."""
+    return f"'{text}" if text.startswith(FORMULA_STARTS) else text
 
 
 def _format_number(value: float, digits: int) -> str:

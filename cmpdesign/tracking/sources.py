@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, read_image
+from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
@@ -54,25 +55,26 @@ class FrameSource(Protocol):
     def frames(self) -> Iterator[SourceFrame]: ...
 
 
-def open_source(text: str, fps: float | None = None) -> FrameSource:
+def open_source(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
     """Open a source.
 
     Args:
         text: number of a camera, or path of a folder of images or of a video file.
         fps: frames per second of a folder (default 30), or in place of a video's own rate.
+        most_pixels: limit of width x height of an image or of a video's frame.
 
     Raises:
         SourceError: the source cannot be opened.
     """
     path = Path(text)
-    if text.isdecimal() and not path.exists():
+    if text.isdecimal() and not path_exists(path):
         return CameraSource(int(text))
     if path.is_dir():
-        return FolderSource(path, fps or DEFAULT_FPS)
-    return VideoSource(path, fps)
+        return FolderSource(path, fps or DEFAULT_FPS, most_pixels)
+    return VideoSource(path, fps, most_pixels)
 
 
-def open_sources(text: str, fps: float | None = None) -> FrameSource:
+def open_sources(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
     """Open a source, or of a list with commas one source for each view; see ``open_source``.
 
     Raises:
@@ -80,15 +82,15 @@ def open_sources(text: str, fps: float | None = None) -> FrameSource:
     """
     names = split_list(text)
     return (
-        MultiViewSource([open_source(name, fps) for name in names])
+        MultiViewSource([open_source(name, fps, most_pixels) for name in names])
         if len(names) > 1
-        else open_source(text, fps)
+        else open_source(text, fps, most_pixels)
     )
 
 
 def split_list(text: str) -> list[str]:
     """Split a list with commas; a text that is the path of a file is one name."""
-    return [text] if Path(text).exists() else text.split(",")
+    return [text] if path_exists(text) else text.split(",")
 
 
 class MultiViewSource:
@@ -123,7 +125,7 @@ class MultiViewSource:
 class FolderSource:
     """The images of a folder in the natural order of their names."""
 
-    def __init__(self, path: Path, fps: float) -> None:
+    def __init__(self, path: Path, fps: float, most_pixels: int = MOST_PIXELS) -> None:
         try:
             self.paths = sorted(
                 (p for p in path.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES), key=_natural_sort_key
@@ -137,13 +139,13 @@ class FolderSource:
         self.name, self.ended_early = str(path), ""
         self.total: int | None = len(self.paths)
         self.fps: float | None = fps
-        self._fps = fps
+        self._fps, self._most_pixels = fps, most_pixels
 
     def frames(self) -> Iterator[SourceFrame]:
         for index, path in enumerate(self.paths):
             time_s = index / self._fps
             try:
-                yield SourceFrame(time_s, read_image(path))
+                yield SourceFrame(time_s, read_image(path, self._most_pixels))
             except ImageFileError as error:
                 yield SourceFrame(time_s, None, str(error))
 
@@ -166,8 +168,8 @@ def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
 class VideoSource:
     """A video file, read by OpenCV; time stamps are those of the file, or counted at ``fps`` if given."""
 
-    def __init__(self, path: Path, fps: float | None) -> None:
-        if not path.is_file():
+    def __init__(self, path: Path, fps: float | None, most_pixels: int = MOST_PIXELS) -> None:
+        if not is_regular_file(path):
             raise SourceError(
                 f"{path}: no such file or folder; expected a video, a folder of images or a camera's number"
             )
@@ -179,6 +181,14 @@ class VideoSource:
         import cv2
 
         self.name, self.ended_early = str(path), ""
+        width, height = (
+            int(self._capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        )
+        if width * height > most_pixels:
+            raise SourceError(
+                f"{path}: its frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
+                "(--max-pixels)"
+            )
         declared = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         own = float(self._capture.get(cv2.CAP_PROP_FPS))
         self.total = declared if 0 < declared < 1 << 30 else None

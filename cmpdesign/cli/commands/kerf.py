@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.terminal import console
+from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.terminal import console, print_document
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.photo import CouponReading, PatchKerf
@@ -18,6 +20,7 @@ def kerf(
     coupon: Annotated[Path, typer.Argument(metavar="COUPON", help="The coupon.json that build wrote.")],
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo or scan of the cut piece.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead.")] = False,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Measure the kerf on a coupon, ready for the material's file."""
     from cmpdesign.errors import CmpDesignError
@@ -26,13 +29,13 @@ def kerf(
     from cmpdesign.products.laser.coupon.photo import PhotoError, read_coupon
 
     cut_coupon = load_coupon(coupon)
-    image = read_image(photo)
+    image = read_image(photo, max_pixels)
     try:
         reading = read_coupon(cut_coupon, image)
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
     if as_json:
-        print(json.dumps(_reading_to_json(reading), indent=2))
+        print_document(json.dumps(_reading_to_json(reading), indent=2) + "\n")
         return
     _print_kerf_table(reading)
     console().print(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")

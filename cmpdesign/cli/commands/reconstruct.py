@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
@@ -54,6 +56,7 @@ def reconstruct(
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -69,7 +72,9 @@ def reconstruct(
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
     known = parse_reading_response(response)
-    options = _Options(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known)
+    options = _Options(
+        layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known, max_pixels
+    )
     run = _prepare_run(options)
     run.limit = frames
     try:
@@ -96,6 +101,7 @@ class _Options(NamedTuple):
     fps: float | None
     cold: bool
     response: Response | None
+    max_pixels: int
 
 
 def _prepare_run(options: _Options) -> TrackingRun:
@@ -118,7 +124,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     )
     sink = open_sink(options.output, ShapeTable(reconstructor))
     tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
-    source = open_sources(options.source, options.fps)
+    source = open_sources(options.source, options.fps, options.max_pixels)
     return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor))
 
 
@@ -132,7 +138,10 @@ def _read_rest_image(options: _Options) -> Any:
         rests = rests * len(sources)
     if len(rests) != len(sources):
         raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
-    images = [read_rest_image(rest, name, options.fps) for rest, name in zip(rests, sources, strict=True)]
+    images = [
+        read_rest_image(rest, name, options.fps, options.max_pixels)
+        for rest, name in zip(rests, sources, strict=True)
+    ]
     return images if len(images) > 1 else images[0]
 
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
@@ -52,6 +54,7 @@ def track(
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -69,7 +72,9 @@ def track(
 
     reference = load_layout(layout)
     known = parse_reading_response(response)
-    run = _prepare_run(reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known))
+    run = _prepare_run(
+        reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known, max_pixels)
+    )
     run.limit = frames
     try:
         run_with_progress(run, "tracking")
@@ -92,6 +97,7 @@ class _Options(NamedTuple):
     overlay: Path | None
     cold: bool
     response: Response | None
+    max_pixels: int
 
 
 def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
@@ -105,11 +111,15 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     from extractor.track.tracker import Tracker
 
     rest, source, fps, response = options.rest, options.source, options.fps, options.response
-    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps, response)
+    at_rest = (
+        None
+        if rest is None
+        else read_rest_markers(rest, source, reference, fps, response, options.max_pixels)
+    )
     tracker = Tracker(
         reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=not options.cold, response=response
     )
-    frames = open_source(source, fps)
+    frames = open_source(source, fps, options.max_pixels)
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
     return TrackingRun(
