@@ -129,6 +129,7 @@ def _not_found_reason(markers: Markers) -> str | None:
         "no_pattern": "no triangles of the pattern were found",
         "reference_lost": "the white reference cell was not found",
         "ambiguous": "the numbering is ambiguous",
+        "several_pads": "several white cells agree with the cells around them; show one pad alone",
     }
     return words.get(str(markers.reason), "no marker was found")
 
@@ -203,9 +204,15 @@ def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float
     """(N, 3) mean R, G, B of (N, K, 2) cells, sampled at the centre and part of the way to each corner."""
     import cv2
 
+    from extractor.image.input import in_native_order
+
     centre = corners.mean(axis=1, keepdims=True)
     points = np.concatenate([centre, centre + _SAMPLE_REACH * (corners - centre)], axis=1).astype(np.float32)
     sampled = cv2.remap(
-        image, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        in_native_order(image),
+        points[..., 0],
+        points[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
     )
     return np.asarray(sampled.astype(np.float64).mean(axis=1)[:, ::-1])
