@@ -146,8 +146,8 @@ class Extractor:
         """The markers in one image, found without any knowledge of other frames.
 
         Args:
-            image: (H, W, 3) uint8 BGR; also uint16 of either byte order (scaled to 8 bits), BGRA (alpha dropped) and grayscale (without
-                color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
+            image: (H, W, 3) uint8 BGR; also uint16 of either byte order (scaled to 8 bits), BGRA (alpha dropped) and
+                grayscale (without color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
 
         Raises:
             ImageError: another dtype or shape, or a side below 16 px.

@@ -137,7 +137,8 @@ def _validate_table(model: type[Model], table: Mapping[str, Any], where: str) ->
 def _error_message(item: Any, model: type[BaseModel], where: str) -> str:
     path = ".".join([where, *(str(part) for part in item["loc"])])
     if item["type"] == "extra_forbidden":
-        return f"{path} is unknown{nearest_name(item['loc'][-1], model.model_fields)}"
+        known = [*model.model_fields, *(["kind"] if where == "contact.indenter" else [])]
+        return f"{path} is unknown{nearest_name(item['loc'][-1], known)}"
     if item["type"] == "missing":
         return f"{path} is missing"
     message = item["msg"].removeprefix("Value error, ").removeprefix("Input should be ")

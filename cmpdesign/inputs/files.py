@@ -72,6 +72,14 @@ def is_regular_file(path: str | Path) -> bool:
         return False
 
 
+def is_folder(path: str | Path) -> bool:
+    """True for a folder; False also for paths that no folder can have."""
+    try:
+        return stat.S_ISDIR(Path(path).stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
 def path_exists(path: str | Path) -> bool:
     """True if something is there; False also for paths that no file can have."""
     try:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, read_image
-from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
+from cmpdesign.inputs.files import MOST_PIXELS, is_folder, is_regular_file, path_exists
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
@@ -69,7 +69,7 @@ def open_source(text: str, fps: float | None = None, most_pixels: int = MOST_PIX
     path = Path(text)
     if text.isdecimal() and not path_exists(path):
         return CameraSource(int(text))
-    if path.is_dir():
+    if is_folder(path):
         return FolderSource(path, fps or DEFAULT_FPS, most_pixels)
     return VideoSource(path, fps, most_pixels)
 

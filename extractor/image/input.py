@@ -20,8 +20,8 @@ NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (
 def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
     """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
 
-    16-bit images of either byte order are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A grayscale image ((H, W)
-    or (H, W, 1)) has no color.
+    16-bit images of either byte order are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A
+    grayscale image ((H, W) or (H, W, 1)) has no color.
 
     Raises:
         ImageError: not an array, a float or signed type, another shape, or a side below 16 px.

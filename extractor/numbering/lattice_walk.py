@@ -274,7 +274,7 @@ def _doubt(best: _Candidate, rivals: list[_Candidate], min_cells: float) -> Reas
     """The reason why the best candidate is not certain.
 
     A rival with the surroundings of a reference is a second pad: of its layout no more cells are missing in the image
-    than of the best. A white place within a single pad misses the cells beyond the pad's outline, where that is in view.
+    than of the best. A white place within a single pad misses the cells beyond the pad's outline, if that is in view.
     """
     others = [one for one in rivals if one.component != best.component and one.fits]
     beside = [one for one in rivals if one.component == best.component]

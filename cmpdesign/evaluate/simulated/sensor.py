@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.design.design import Design
+from cmpdesign.errors import CmpDesignError, DesignError, InputError
 from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.files import path_exists, read_text
 from cmpdesign.inputs.names import Line, Name, nearest_name
@@ -108,6 +109,18 @@ class SensorTable(_StrictTable):
     response: str | float | tuple[float, ...] = "srgb"
     load: tuple[LoadTable, ...] = ()
     conditions: ConditionRanges = ConditionRanges()
+
+    @field_validator("patterns")
+    @classmethod
+    def _known_patterns(cls, value: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        for name, design in value.items():
+            if name not in METHODS:
+                raise ValueError(f"{name} is unknown{nearest_name(name, METHODS)}; there are {', '.join(METHODS)}")
+            try:
+                Design(**design)
+            except DesignError as error:
+                raise ValueError(f"{name}: {error}") from None
+        return value
 
     @field_validator("response")
     @classmethod
