@@ -36,10 +36,11 @@ def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a NUL, or characters that no path can hold
         raise _unreadable(path, error) from None
     try:
-        mode = os.fstat(descriptor).st_mode
-        kind = "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
+        found = os.fstat(descriptor)
+        kind = "" if stat.S_ISREG(found.st_mode) else _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
         with os.fdopen(descriptor, "rb", closefd=False) as file:
-            data = b"" if kind else file.read(most_bytes + 1)
+            # As many bytes as are asked for are allocated.
+            data = b"" if kind else file.read(min(found.st_size, most_bytes) + 1)
     except OSError as error:
         raise _unreadable(path, error) from None
     finally:

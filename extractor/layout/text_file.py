@@ -33,9 +33,11 @@ def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[Extra
         raise error(f"{name}: cannot be read: {problem}") from None
     try:
         with os.fdopen(descriptor, "rb", closefd=False) as file:
-            mode = os.fstat(descriptor).st_mode
+            found = os.fstat(descriptor)
+            mode = found.st_mode
             kind = None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "a device")
-            data = b"" if kind else file.read(most_bytes + 1)
+            # As many bytes as are asked for are allocated.
+            data = b"" if kind else file.read(min(found.st_size, most_bytes) + 1)
     except OSError as problem:
         raise error(f"{name}: cannot be read: {problem.strerror}") from None
     finally:

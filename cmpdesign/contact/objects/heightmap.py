@@ -6,6 +6,7 @@ import io
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, ClassVar
 
 import numpy as np
@@ -93,8 +94,9 @@ def _read_npy(path: Path) -> Array:
         heights = np.lib.format.read_array(file, allow_pickle=False) if _has_all_numbers(data) else None
     except InputError as error:
         raise ContactError(str(error)) from None
-    except (OSError, ValueError, EOFError, MemoryError, RecursionError) as error:
-        raise ContactError(f"{path}: cannot be read as an NPY file ({error})") from None
+    except (ValueError, TypeError, SyntaxError, TokenError, EOFError, MemoryError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise ContactError(f"{path}: cannot be read as an NPY file ({reason})") from None
     if heights is None:
         raise ContactError(
             f"{path}: its header claims more numbers than it holds, or more than {MOST_HEIGHTS}"

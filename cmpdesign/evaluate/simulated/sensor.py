@@ -115,7 +115,9 @@ class SensorTable(_StrictTable):
     def _known_patterns(cls, value: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
         for name, design in value.items():
             if name not in METHODS:
-                raise ValueError(f"{name} is unknown{nearest_name(name, METHODS)}; there are {', '.join(METHODS)}")
+                raise ValueError(
+                    f"{name} is unknown{nearest_name(name, METHODS)}; there are {', '.join(METHODS)}"
+                )
             try:
                 Design(**design)
             except DesignError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -99,3 +100,21 @@ def test_the_command_says_what_it_removed(tmp_path: Path) -> None:
     assert gone == {f"5-outline.{kind}" for kind in ("svg", "dxf", "lbrn2", "gcode")}
     assert all(f"{name}, of an earlier build" in text for name in gone) and LIST_NAME not in text
     assert (laser / "mine.svg").exists() and (tmp_path / "out" / "pattern.svg").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["a\0b", "x" * 300, "d/" * 3000, "\ud800", "loop", "loop/a", "pipe", ".", ""]
+)
+def test_odd_names_in_a_list_are_no_files_to_remove(name: str, tmp_path: Path) -> None:
+    build(tmp_path, FIRST)
+    (tmp_path / "mold" / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "mold" / "pipe")
+    path = tmp_path / "mold" / LIST_NAME
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["sha256"][name] = "0" * 64
+    path.write_text(json.dumps(document), encoding="utf-8")
+    before = sorted(tmp_path.rglob("*"))
+    assert [one for one in build(tmp_path, {"mold/base.step": b"6"}) if one != "mold/white.step"] == []
+    assert {one for one in before if one not in sorted(tmp_path.rglob("*"))} <= {
+        tmp_path / "mold" / "white.step"
+    }
