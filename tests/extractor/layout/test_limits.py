@@ -1,4 +1,4 @@
-"""What is loaded can be read with: the loader refuses layouts that the reader's tables cannot hold, by stated limits."""
+"""What is loaded can be read with: layouts that the reader's tables cannot hold are refused, by stated limits."""
 
 from __future__ import annotations
 
