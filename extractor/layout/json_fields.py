@@ -104,7 +104,7 @@ def _known(names: Sequence[str], optional: Sequence[str]) -> str:
 
 def nearest_name(word: str, known: Sequence[str]) -> str:
     """The part of a message that names the nearest known name; empty if none is near."""
-    found = difflib.get_close_matches(word[:60], known, n=1, cutoff=0.5)
+    found = difflib.get_close_matches(word[:60], known, n=1, cutoff=0.6)
     return f" (did you mean {found[0]}?)" if found else ""
 
 
