@@ -23,6 +23,15 @@ _READERS: Mapping[bytes, tuple[str, str]] = {
     b"P6": ("PpmImagePlugin", "PpmImageFile"),
 }
 _TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
+_ODD = (
+    OSError,
+    ValueError,
+    SyntaxError,
+    ArithmeticError,
+    KeyError,
+    TypeError,
+    IndexError,
+)  # of damaged headers
 
 
 def open_header(data: bytes) -> ImageFile | None:
@@ -32,10 +41,12 @@ def open_header(data: bytes) -> ImageFile | None:
     """
     from importlib import import_module
 
+    from PIL.Image import DecompressionBombError  # of WebP, beyond 179 megapixels
+
     for start, (module, name) in _READERS.items():
         if data.startswith(start):
             reader: Callable[[Any], ImageFile] = getattr(import_module(f"PIL.{module}"), name)
-            with suppress(OSError, ValueError, SyntaxError, OverflowError), warnings.catch_warnings():
+            with suppress(*_ODD, DecompressionBombError), warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of odd tags, which say nothing about the pixels
                 return reader(io.BytesIO(data))
     return None
@@ -53,7 +64,7 @@ def _tiff_size(data: bytes) -> tuple[int, int] | None:
     """The size of a TIFF file whose kind of pixels Pillow does not know."""
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
-    with suppress(OSError, ValueError, SyntaxError, KeyError, TypeError), warnings.catch_warnings():
+    with suppress(*_ODD), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         tags, file = ImageFileDirectory_v2(data[:8]), io.BytesIO(data)
         file.seek(tags.next)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -119,7 +120,9 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
 
 def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
-        with np.load(io.BytesIO(read_file(path)), allow_pickle=False) as file:
+        data = read_file(path)
+        with warnings.catch_warnings(), np.load(io.BytesIO(data), allow_pickle=False) as file:
+            warnings.simplefilter("ignore")  # of the headers' style
             return {name: file[name] for name in file.files}
     except InputError as error:
         raise SceneError(str(error)) from None

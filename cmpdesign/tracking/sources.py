@@ -265,7 +265,9 @@ def _open_capture(source: str | int) -> Any:
 
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    # OpenCV's own reader of AVI files prints letters of the file; it is not tried where there is FFmpeg.
+    has_ffmpeg = isinstance(source, str) and cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
     try:
-        return cv2.VideoCapture(source)
+        return cv2.VideoCapture(source, cv2.CAP_FFMPEG if has_ffmpeg else cv2.CAP_ANY)
     finally:
         cv2.utils.logging.setLogLevel(level)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from tokenize import TokenError
@@ -90,8 +91,10 @@ def _read_npy(path: Path) -> Array:
     """(rows, columns) float64 from an NPY file; its header is tested before memory is taken."""
     try:
         data = read_file(path)
-        file = io.BytesIO(data)
-        heights = np.lib.format.read_array(file, allow_pickle=False) if _has_all_numbers(data) else None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the header's style
+            has_all = _has_all_numbers(data)
+            heights = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) if has_all else None
     except InputError as error:
         raise ContactError(str(error)) from None
     except (ValueError, TypeError, SyntaxError, TokenError, EOFError, MemoryError, RecursionError) as error:

@@ -17,6 +17,7 @@ from cmpdesign.contact.objects.heightmap import HeightMap
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.image_header import size_in_header
 from cmpdesign.files.images import ImageFileError, read_image
+from cmpdesign.files.resolution import resolution_dpi
 from tests.support.command import run
 
 COLOR = np.arange(20 * 24 * 3, dtype=np.uint8).reshape(20, 24, 3)
@@ -199,3 +200,22 @@ def test_arrays_that_claim_another_size(shape: str, tmp_path: Path) -> None:
     path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(160))
     with pytest.raises(CmpDesignError):
         HeightMap.read(path, 0.1)
+
+
+@pytest.mark.parametrize("kind", ["png", "jpg", "tiff", "bmp", "webp", "ppm"])
+def test_damaged_files_are_read_or_refused(kind: str, tmp_path: Path) -> None:
+    """One byte of the first 60 at a time, and pieces cut out."""
+    good = cv2.imencode(f".{kind}", COLOR)[1].tobytes()
+    path = tmp_path / f"a.{kind}"
+    for place in range(60):
+        for data in (
+            good[:place] + b"\xff" + good[place + 1 :],
+            good[:place] + b"\0" + good[place + 1 :],
+            good[:place] + good[place + 4 :],
+        ):
+            path.write_bytes(data)
+            try:
+                assert read_image(path, most_pixels=100_000).shape[2] == 3
+            except ImageFileError as error:
+                assert str(error).startswith(str(path))
+            resolution_dpi(path)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 
 from cmpdesign.cli import app
 from cmpdesign.scene import Sensor, Twist, render
+from cmpdesign.tracking.sources import SourceError, open_source
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
 from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene
@@ -421,3 +423,20 @@ def test_parquet_without_pyarrow_says_how_to_get_it(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
     assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []
+
+
+def test_letters_of_a_damaged_video_are_not_printed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A name of four letters in an AVI file may be an escape sequence."""
+    path = tmp_path / "a.avi"
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, (32, 24))
+    for _ in range(3):
+        video.write(np.zeros((24, 32, 3), np.uint8))
+    video.release()
+    good = path.read_bytes()
+    for name in (b"RIFF", b"AVI ", b"LIST", b"hdrl", b"avih", b"strl", b"strh", b"movi"):
+        path.write_bytes(good.replace(name, b"\x1b[2J", 1))
+        with suppress(SourceError):
+            list(open_source(str(path)).frames())
+    assert "\x1b" not in "".join(capfd.readouterr())
