@@ -166,6 +166,38 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(name: str, tmp_pa
     assert tried >= 3
 
 
+KEYS = (
+    "a[b",
+    "tuple[a]",
+    "float",
+    "str",
+    "self",
+    "a.b",
+    "",
+    "0",
+    "x" * 300,
+    "a\x1b[31m",
+    "a\nb",
+    "__class__",
+    "é",
+)
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_odd_names_of_fields_are_refused(name: str, tmp_path: Path) -> None:
+    kind = DOCUMENTS[name]
+    document = loaded(kind, tmp_path)
+    path = tmp_path / kind.name
+    for place, table in tables(document):
+        if ".".join(place) in kind.free:
+            continue
+        for key in KEYS:
+            table[key] = 1
+            path.write_text(as_text(document, kind), encoding="utf-8")
+            refused(kind, path)
+            del table[key]
+
+
 def leaves(value: Any, holder: Any = None, key: Any = None) -> Iterator[tuple[Any, Any, Any]]:
     """Values that hold no others, with what holds them; of a list the first two entries."""
     if isinstance(value, dict):
