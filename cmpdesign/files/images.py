@@ -13,6 +13,7 @@ from cmpdesign.files.image_header import size_in_header
 from cmpdesign.inputs.files import MOST_PIXELS, read_file
 
 SMALLEST_PX = 16
+PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
@@ -62,6 +63,10 @@ def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[An
         raise ImageFileError(
             f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
             f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+        )
+    if data.startswith(b"\x89PNG") and size[0] * size[1] > PNG_PIXELS_PER_BYTE * len(data):
+        raise ImageFileError(
+            f"{path}: {_NO_IMAGE}; it claims {size[0]} x {size[1]} px, which {len(data)} bytes cannot hold"
         )
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)

@@ -219,3 +219,12 @@ def test_damaged_files_are_read_or_refused(kind: str, tmp_path: Path) -> None:
             except ImageFileError as error:
                 assert str(error).startswith(str(path))
             resolution_dpi(path)
+
+
+def test_a_png_of_few_bytes_claims_few_pixels(tmp_path: Path) -> None:
+    """Within the limit, but more than its bytes can hold; the most that deflate makes of a byte is read."""
+    (tmp_path / "claims.png").write_bytes(png(15_000, 15_000))
+    with pytest.raises(ImageFileError, match="claims 15000 x 15000 px"):
+        read_image(tmp_path / "claims.png")
+    Image.new("1", (4_000, 4_000)).convert("P").save(tmp_path / "dense.png", bits=1, compress_level=9)
+    assert read_image(tmp_path / "dense.png").shape == (4_000, 4_000, 3)
