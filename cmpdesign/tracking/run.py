@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
 from cmpdesign.tracking.overlay import OverlayWriter
-from cmpdesign.tracking.sinks import FrameSink
+from cmpdesign.tracking.sinks.tables import FrameSink
 from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:

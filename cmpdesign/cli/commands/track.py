@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
-from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
+from cmpdesign.cli.run_progress import (
+    exit_with_status,
+    print_written,
+    recover_and_report,
+    require_positive,
+    run_with_progress,
+    summary_path,
+)
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError, OutputError
 
@@ -58,9 +65,9 @@ def track(
 ) -> None:
     """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
     if recover:
-        from cmpdesign.tracking.sinks import recover_table as recover_file
+        from extractor import load_layout
 
-        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
+        recover_and_report(output, len(load_layout(layout).layer))
         return
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
@@ -75,9 +82,10 @@ def track(
         run_with_progress(run, "tracking")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            _write_summary(run, reference, source, output, quiver)
+            print_written(_write_summary(run, reference, source, output, quiver))
         raise
-    _write_summary(run, reference, source, output, quiver)
+    written = _write_summary(run, reference, source, output, quiver)
+    print_written([output, *written, *([overlay] if overlay is not None and written else [])])
     exit_with_status(run)
 
 
@@ -98,7 +106,7 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.overlay import OverlayWriter
     from cmpdesign.tracking.run import TrackingRun, read_rest_markers
-    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sinks.tables import open_sink
     from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
     from cmpdesign.tracking.summary import TrackStatistics
     from cmpdesign.tracking.table import TrackTable
@@ -119,25 +127,26 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
 
 def _write_summary(
     run: TrackingRun, reference: Reference, source: str, output: Path, quiver: Path | None
-) -> None:
-    """Write the summary next to the table and the quiver plot, and print the summary; also after a failure."""
+) -> list[Path]:
+    """Write the summary next to the table and the quiver plot, and print the summary; the written files."""
     if not run.statistics.frames:
-        return
+        return []
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.tracking.quiver import draw_quiver
 
     summary = run.statistics.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
     _print_summary(summary)
-    paths = {output.with_suffix(".summary.json"): json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
+    text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+    contents: dict[Path, str | bytes] = {summary_path(output): text}
     farthest, rest = run.statistics.farthest, run.tracker.rest
-    contents: dict[Path, str | bytes] = dict(paths)
     if quiver is not None and farthest is not None and rest is not None:
         contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
     elif quiver is not None:
         print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
     for path, content in contents.items():
         write_file(path, content)
+    return list(contents)
 
 
 def _print_summary(summary: dict[str, Any]) -> None:

@@ -73,7 +73,7 @@ def test_a_video_becomes_arrays(made: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(table["displacement_px"], table["xy_px"] - table["rest_xy_px"])
     np.testing.assert_array_equal(table["layout_xy_mm"], reference().xy_mm)
     assert str(table["digest"]) == reference().digest
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.npz.summary.json"]
 
 
 def test_frames_are_read_by_their_response(made: Path, tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_all_tables_and_sources_say_the_same(made: Path, tmp_path: Path) -> None
 
 def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     result = run("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.csv")
-    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((tmp_path / "a.csv.summary.json").read_text(encoding="utf-8"))
     assert summary["frames"] == {
         "declared": 24,
         "read": 24,
@@ -154,7 +154,7 @@ def test_jitter_at_rest_is_the_noise_of_resting_markers(made: Path, tmp_path: Pa
         cv2.imwrite(str(tmp_path / "rest" / f"{index}.png"), shot(seed=index).image)
     table = tracked(made, str(tmp_path / "rest"), tmp_path / "a.npz")
     found = table["xy_px"].std(axis=0, ddof=1)
-    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
     assert summary["jitter_px"] == pytest.approx(np.sqrt(np.mean(found**2)), rel=0.1)
 
 
@@ -205,7 +205,7 @@ def test_a_truncated_video_keeps_its_frames(made: Path, tmp_path: Path) -> None:
     good = table["frame_status"] == 1
     assert good.sum() >= read - 1  # the last one may be torn
     assert np.abs(table["xy_px"] - np.load(made / "truth.npy")[:read])[good].max() < 1.0
-    assert json.loads((tmp_path / "a.summary.json").read_text())["ended_early"]
+    assert json.loads((tmp_path / "a.npz.summary.json").read_text())["ended_early"]
 
 
 def test_a_damaged_folder_keeps_every_frame_in_its_place(made: Path, tmp_path: Path) -> None:
@@ -346,7 +346,7 @@ def test_ctrl_c_completes_the_file(number: int, made: Path, long_folder: Path, t
     assert code == 130 and "Traceback" not in errors
     rows = rows_of(tmp_path / "a.csv")
     assert len(rows) % MARKERS == 0 and 5 < len(rows) // MARKERS < 4000
-    assert json.loads((tmp_path / "a.summary.json").read_text())["frames"]["read"] == len(rows) // MARKERS
+    assert json.loads((tmp_path / "a.csv.summary.json").read_text())["frames"]["read"] == len(rows) // MARKERS
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])
