@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
 
 EXIT_NOT_TRACKED = 1
-EXIT_INTERRUPTED = 130
 
 
 def run_with_progress(run: TrackingRun, doing: str) -> None:
@@ -66,8 +65,7 @@ def exit_with_status(run: TrackingRun) -> None:
         CmpDesignError: no frame could be read.
     """
     if run.stop.is_requested:
-        is_camera = run.source.name.startswith("camera")  # a stop is the only way to end a camera's run
-        raise typer.Exit(0 if is_camera else EXIT_INTERRUPTED)
+        raise typer.Exit(0 if run.source.is_live else EXIT_INTERRUPTED)
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
 
 
 def console(stderr: bool = False) -> Console:
@@ -28,11 +29,11 @@ def is_expected(error: BaseException) -> bool:
     return isinstance(error, CmpDesignError)
 
 
-def error_on_one_line(error: BaseException) -> str:
+def error_on_one_line(error: BaseException | str) -> str:
     return " ".join(str(error).split())
 
 
-def print_error(error: BaseException) -> None:
+def print_error(error: BaseException | str) -> None:
     print(f"error: {error_on_one_line(error)}", file=sys.stderr)
 
 

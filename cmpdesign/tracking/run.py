@@ -150,11 +150,12 @@ def read_rest_image(text: str, source: str, fps: float | None) -> Any:
 
 def _read_frame(number: int, text: str, fps: float | None) -> Any:
     source = open_source(text, fps)
-    if source.name.startswith("camera"):
+    if source.is_live:
         raise CmpDesignError(
-            f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file"
+            f"at rest, frame {number}: a {source.name.partition(' ')[0]}'s frames cannot be read ahead; "
+            "give an image file"
         )
     for index, frame in enumerate(source.frames()):
         if index == number:
             return frame.image
-    raise CmpDesignError(f"at rest, frame {number}: {text} has fewer frames")
+    raise CmpDesignError(f"at rest, frame {number}: {source.name} has fewer frames")

@@ -38,7 +38,7 @@ def reconstruct(
         str,
         typer.Argument(
             metavar="SOURCE",
-            help="A video, a folder of images, or a camera's number; one for each view with commas between.",
+            help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
         ),
     ],
     output: Annotated[
@@ -57,7 +57,7 @@ def reconstruct(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+        float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
@@ -154,8 +154,9 @@ def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
     if not run.statistics.frames:
         return []
     from cmpdesign.files.atomic import write_file
+    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(source, run.source.total, run.ended_early)
+    summary = run.statistics.to_json(without_password(source), run.source.total, run.ended_early)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
     write_file(summary_path(output), text)

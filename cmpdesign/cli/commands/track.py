@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.paths import require_suffix
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_with_status,
@@ -19,7 +20,7 @@ from cmpdesign.cli.run_progress import (
     summary_path,
 )
 from cmpdesign.cli.terminal import console, print_warning, printable_path
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import OutputError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
@@ -30,7 +31,10 @@ if TYPE_CHECKING:
 def track(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
     source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="A video, a folder of images, or a camera's number.")
+        str,
+        typer.Argument(
+            metavar="SOURCE", help="A video, a folder of images, a camera's number, or rtsp://..."
+        ),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
@@ -48,7 +52,7 @@ def track(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+        float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     overlay: Annotated[
@@ -71,7 +75,7 @@ def track(
         return
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
-    _require_png(quiver)
+    require_suffix("--quiver", quiver, [".png"])
     from extractor import load_layout
 
     reference = load_layout(layout)
@@ -134,8 +138,11 @@ def _write_summary(
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.tracking.quiver import draw_quiver
+    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
+    summary = run.statistics.to_json(
+        without_password(source), run.source.total, run.ended_early, run.tracker.rest
+    )
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
     contents: dict[Path, str | bytes] = {summary_path(output): text}
@@ -153,6 +160,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
     frames, shares, rate = summary["frames"], summary["marker_shares"], summary["frames_per_s"]
+    times = ", ".join(f"{name} {value:.1f} ms" for name, value in summary["time_ms"].items())
     others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
     not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
     jitter, largest = summary["jitter_px"], summary["largest_displacement"]
@@ -160,7 +168,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         "frames": f"{frames['read']} read, {frames['tracked']} tracked{not_tracked}",
         "starts": ", ".join(f"{count} {start}" for start, count in summary["starts"].items()) or "none",
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in shares.items()),
-        "frames per second": ", ".join(f"{name} {value:.0f}" for name, value in rate.items() if value),
+        "time a frame": times + (f"; on the whole {rate:.3g} frames per second" if rate else ""),
         "jitter at rest": "too few resting frames" if jitter is None else f"{jitter:.4f} px per axis",
     }
     if summary["reasons"]:
@@ -174,8 +182,3 @@ def _print_summary(summary: dict[str, Any]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console().print(table)
-
-
-def _require_png(path: Path | None) -> None:
-    if path is not None and path.suffix != ".png":
-        raise CmpDesignError(f"--quiver {path}: unknown ending; expected .png")

@@ -51,7 +51,10 @@ class Outcome:
 
 def verify(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits.")],
+    images: Annotated[
+        list[Path],
+        typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits, or folders of pictures."),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
     ] = None,
@@ -74,6 +77,7 @@ def verify(
     reference, known = load_layout(layout), parse_reading_response(response)
     extractor = cache(lambda: Extractor(reference, response=known))
     verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug)
+    images = _without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
         verifier.verify_image(path, name)
@@ -166,6 +170,17 @@ def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: 
         "images": [outcome.to_json() for outcome in outcomes],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _without_folders(paths: list[Path]) -> list[Path]:
+    """The paths, with every folder replaced by its images.
+
+    Raises:
+        ImageFileError: a folder holds no image.
+    """
+    from cmpdesign.files.image_folders import find_images
+
+    return [image for path in paths for image in (find_images(path) if path.is_dir() else [path])]
 
 
 def _unique_names(stems: list[str]) -> list[str]:

@@ -74,12 +74,12 @@ def test_render_takes_a_response(made: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("option", "value", "expected"),
     [
-        ("--pitch", "0", "pitch_px is 0"),
+        ("--pitch", "0", "--pitch is 0; it must be above 0 px"),
         ("--pitch", "nan", "--pitch is nan; expected a finite number"),
         ("--rotation", "inf", "--rotation is inf"),
-        ("--tilt", "89", "tilt_deg is 89"),
-        ("--blur", "-1", "blur_px is -1"),
-        ("--noise", "-1", "noise is -1"),
+        ("--tilt", "89", "--tilt is 89"),
+        ("--blur", "-1", "--blur is -1"),
+        ("--noise", "-1", "--noise is -1"),
         ("--press", "50", "fold"),
         ("--response", "rec709", "--response rec709: expected srgb, linear or an exponent from 0.2 to 5"),
         ("--response", "9", "response is the exponent 9; it must lie between 0.2 and 5"),
