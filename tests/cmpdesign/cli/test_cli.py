@@ -80,6 +80,11 @@ def test_check() -> None:
     assert "smallest cell" in result.stdout and "mm" in result.stdout
     assert run("check", "honeycomb", "--set", "pitch_mm=0.3").exit_code == 0
     assert "px" in run("check", "tac3d", "--camera", "160x120").stdout
+    for same in ("160X120", " 160 x 120 ", "160×120"):
+        assert (
+            run("check", "tac3d", "--camera", same).stdout
+            == run("check", "tac3d", "--camera", "160x120").stdout
+        )
 
 
 def test_schema_is_one() -> None:

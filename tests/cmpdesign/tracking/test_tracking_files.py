@@ -9,7 +9,10 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import cv2
@@ -421,3 +424,45 @@ def test_parquet_without_pyarrow_says_how_to_get_it(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
     assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []
+
+
+def test_a_stream_is_read_by_its_address(made: Path, tmp_path: Path) -> None:
+    """A video that a server sends, as a network camera does; a password is not shown or stored."""
+    handler = partial(QuietHandler, directory=str(made))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://me:secret@127.0.0.1:{server.server_port}/video.avi"
+        result = run("track", made / "layout.json", address, "-o", tmp_path / "a.npz")
+        missing = f"http://me:secret@127.0.0.1:{server.server_port}/none.avi"
+        line = refused("track", made / "layout.json", missing, "-o", tmp_path / "b.npz")
+        server.shutdown()
+    assert result.exit_code == 1 and f"stream http://127.0.0.1:{server.server_port}" not in result.stdout
+    assert f"the stream stopped after {FRAMES} frames" in result.stderr
+    assert (loaded(tmp_path / "a.npz")["frame_status"][:FRAMES] == 1).all()
+    texts = [line, result.output, (tmp_path / "a.npz.summary.json").read_text()]
+    assert not any("secret" in text for text in texts)
+    assert f"stream {missing.replace('me:secret@', '')} cannot be opened" in line
+
+
+def test_an_address_is_said_as_it_was_given(made: Path, tmp_path: Path) -> None:
+    address = "rtsp://127.0.0.1:9/live"
+    assert f"stream {address} cannot be opened; is the address right" in refused(
+        "track", made / "layout.json", address, "-o", tmp_path / "a.npz"
+    )
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None: ...
+
+
+def test_tables_of_one_name_have_their_own_summaries(made: Path, tmp_path: Path) -> None:
+    written = []
+    for frames, kind in enumerate(("npz", "csv", "parquet"), start=1):
+        table, options = tmp_path / f"a.{kind}", ("--frames", frames, "--quiver", tmp_path / "q.png")
+        result = run("track", made / "layout.json", made / "video.avi", "-o", table, *options)
+        written.append(result.stdout)
+        assert f"wrote {table}\nwrote {table}.summary.json\nwrote {tmp_path / 'q.png'}\n" in result.stdout
+    for frames, kind in enumerate(("npz", "csv", "parquet"), start=1):
+        summary = json.loads((tmp_path / f"a.{kind}.summary.json").read_text())
+        assert summary["frames"]["read"] == frames
+        assert summary["frames_per_s"] > 0 and "frames per second" in written[0]
