@@ -16,8 +16,7 @@ from cmpdesign.tracking.sinks.tables import FrameSink
 from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:
-    from extractor import Markers, Reference
-    from extractor.image.response import Response
+    from extractor import Markers, Tracker
 
 
 @dataclass(eq=False)
@@ -111,24 +110,19 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def read_rest_markers(
-    text: str, source: str, reference: Reference, fps: float | None, response: Response | None = None
-) -> Markers:
+def read_rest_markers(text: str, source: str, fps: float | None, tracker: Tracker) -> Markers:
     """Extract the markers at rest.
 
     Args:
         text: number of a frame of the source, or path of an image file.
         source: the source, see ``open_source``.
-        reference: the layout.
         fps: see ``open_source``.
-        response: see ``Extractor``.
+        tracker: a new tracker; it reads the image as a tracker like it reads the frames.
 
     Raises:
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
-    from extractor import Extractor
-
-    markers = Extractor(reference, response=response).extract(read_rest_image(text, source, fps))
+    markers = tracker.track(read_rest_image(text, source, fps)).markers
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")

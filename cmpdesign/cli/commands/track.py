@@ -117,10 +117,11 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     from extractor.track.tracker import Tracker
 
     rest, source, fps, response = options.rest, options.source, options.fps, options.response
-    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps, response)
-    tracker = Tracker(
-        reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=not options.cold, response=response
-    )
+    warm = not options.cold
+    at_rest = None
+    if rest is not None:
+        at_rest = read_rest_markers(rest, source, fps, Tracker(reference, warm=warm, response=response))
+    tracker = Tracker(reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=warm, response=response)
     frames = open_source(source, fps)
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)

@@ -24,7 +24,7 @@ from cmpdesign.cli import app
 from cmpdesign.scene import Sensor, Twist, render
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
-from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene
+from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene, shot
 
 FRAMES = 24
 MARKERS = 91
@@ -149,8 +149,6 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
 
 
 def test_jitter_at_rest_is_the_noise_of_resting_markers(made: Path, tmp_path: Path) -> None:
-    from tests.support.tracking_scenes import shot
-
     (tmp_path / "rest").mkdir()
     found = []
     for index in range(15):
@@ -466,3 +464,19 @@ def test_tables_of_one_name_have_their_own_summaries(made: Path, tmp_path: Path)
         summary = json.loads((tmp_path / f"a.{kind}.summary.json").read_text())
         assert summary["frames"]["read"] == frames
         assert summary["frames_per_s"] > 0 and "frames per second" in written[0]
+
+
+def test_arrows_of_noise_are_not_shown_as_motion(made: Path, tmp_path: Path) -> None:
+    """Arrows of a resting pattern stay near the circle that shows the noise; those of a motion do not."""
+    (tmp_path / "rest").mkdir()
+    for index in range(4):
+        cv2.imwrite(str(tmp_path / "rest" / f"{index}.png"), shot(seed=index).image)
+
+    def colored(source: str) -> int:
+        tracked(made, source, tmp_path / "a.npz", "--quiver", tmp_path / "q.png")
+        picture = np.asarray(cv2.imread(str(tmp_path / "q.png")), dtype=int)[:-80]
+        (tmp_path / "a.npz").unlink()
+        return int((picture.max(axis=2) - picture.min(axis=2) > 60).sum())
+
+    resting, moved = colored(str(tmp_path / "rest")), colored("video.avi")
+    assert 0 < resting < 0.6 * moved
