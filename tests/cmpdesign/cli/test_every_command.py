@@ -17,8 +17,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from tests.support.command import run
-from tests.support.commands import commands, words_for
+from tests.support.command import commands, run, words_for
 
 ROOT = Path(__file__).parents[3]
 COMMANDS = dict(commands())

@@ -192,8 +192,14 @@ def test_what_cannot_be_made_is_refused_before_any_solid(
 
 def nothing_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every way to a solid or a mesh fails."""
-    for where, way in ((shells.ShellBuilder, "__init__"), (caps, "cap_solid"), (pad, "frusta_mesh")):
-        monkeypatch.setattr(where, way, lambda *arguments: pytest.fail("geometry was built"))
+    ways = (
+        (shells.ShellBuilder, "__init__"),
+        (caps, "cap_solid"),
+        (pad, "frusta_mesh"),
+        (processes.subprocess, "Popen"),
+    )
+    for where, way in ways:
+        monkeypatch.setattr(where, way, lambda *_, **__: pytest.fail("geometry was built"))
 
 
 @pytest.mark.parametrize("product", [make.make_mold, make_meshes])
