@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
 MOST_LINE_LETTERS = 300  # of an error or a warning
 _HEAD_LETTERS = 200  # of them before the cut; the remedy stands at the end of a line
 
@@ -49,12 +50,12 @@ def is_expected(error: BaseException) -> bool:
     return isinstance(error, CmpDesignError)
 
 
-def error_on_one_line(error: BaseException) -> str:
+def error_on_one_line(error: BaseException | str) -> str:
     """The error's message: one line of printable characters, at most ``MOST_LINE_LETTERS``."""
     return shortened(visible(" ".join(str(error).split())))
 
 
-def print_error(error: BaseException) -> None:
+def print_error(error: BaseException | str) -> None:
     """Print an error on stderr."""
     print(f"error: {error_on_one_line(error)}", file=sys.stderr)
 

@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from cmpdesign.errors import CmpDesignError, InputError, OutputError
+from cmpdesign.files.locks import Lock, try_lock
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import is_regular_file, path_exists, read_file
 
@@ -179,15 +180,5 @@ def _lock_journal(file: TextIO, path: Path) -> None:
     Raises:
         CmpDesignError: another process has locked it.
     """
-    try:
-        import fcntl
-    except ModuleNotFoundError:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise CmpDesignError(
-            f"{path} is in use by another run; wait until it ends, or give another folder"
-        ) from error
-    except OSError:  # a file system that has no locks
-        return
+    if try_lock(file.fileno()) is Lock.TAKEN:
+        raise CmpDesignError(f"{path} is in use by another run; wait until it ends, or give another folder")

@@ -1,4 +1,4 @@
-"""Reading of image files as arrays, and writing of PNG."""
+"""Reading of image files as arrays, and encoding of images by the ending of a file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ from cmpdesign.inputs.files import MOST_PIXELS, read_file
 SMALLEST_PX = 16
 PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
+# Endings of images that are written -> largest number of bits.
+IMAGE_BITS = {".png": 16, ".tif": 16, ".tiff": 16, ".bmp": 8, ".webp": 8, ".jpg": 8, ".jpeg": 8}
+JPEG_QUALITY = 95
+LOSSLESS_WEBP = 101
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -98,3 +102,33 @@ def to_png(pixels: Image) -> bytes:
     import cv2
 
     return bytes(cv2.imencode(".png", pixels)[1])
+
+
+def require_image_kind(path: Path, bits: int) -> None:
+    """Check that the ending of a file names an image format for the bits of a channel.
+
+    Raises:
+        CmpDesignError: another ending, or a format of fewer bits.
+    """
+    kinds = [suffix for suffix, most in IMAGE_BITS.items() if most >= bits]
+    if path.suffix.lower() not in IMAGE_BITS:
+        raise CmpDesignError(f"{path}: unknown ending; expected one of {', '.join(kinds)}")
+    if path.suffix.lower() not in kinds:
+        raise CmpDesignError(
+            f"{path}: this format has 8 bits, the image {bits}; expected one of {', '.join(kinds)}"
+        )
+
+
+def encode_image(pixels: Image, path: Path) -> bytes:
+    """Encode a (H, W, 3) BGR image by the ending of a file; all formats but JPEG are lossless.
+
+    Raises:
+        CmpDesignError: see ``require_image_kind``.
+    """
+    import cv2
+
+    require_image_kind(path, 8 * pixels.itemsize)
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, cv2.IMWRITE_WEBP_QUALITY, LOSSLESS_WEBP]
+    suffix = path.suffix.lower()
+    options = {".jpg": quality[:2], ".jpeg": quality[:2], ".webp": quality[2:]}.get(suffix, [])
+    return bytes(cv2.imencode(suffix, pixels, options)[1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from cmpdesign.errors import InputError
 
@@ -20,6 +21,28 @@ _KINDS = {
 }
 
 
+def open_file(path: str | Path) -> BinaryIO:
+    """Open a regular file for reading, in parts and at any place. A pipe is not waited for.
+
+    Raises:
+        InputError: the file cannot be opened, or is no regular file.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe waits until another process writes into it.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except (OSError, ValueError) as error:  # ValueError: a NUL, or characters that no path can hold
+        raise _unreadable(path, error) from None
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if not stat.S_ISREG(mode):
+            kind = _KINDS.get(stat.S_IFMT(mode), "no file")
+            raise InputError(f"{path}: cannot be read (it is {kind}); expected a regular file")
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
 def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
     """Read a regular file. A pipe is not waited for.
 
@@ -30,26 +53,25 @@ def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
     Raises:
         InputError: the file cannot be opened, is no regular file, or is larger than the limit.
     """
-    try:
-        # Without O_NONBLOCK, opening a pipe waits until another process writes into it.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    except (OSError, ValueError) as error:  # ValueError: a NUL, or characters that no path can hold
-        raise _unreadable(path, error) from None
-    try:
-        found = os.fstat(descriptor)
-        kind = "" if stat.S_ISREG(found.st_mode) else _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
-        with os.fdopen(descriptor, "rb", closefd=False) as file:
+    with open_file(path) as file:
+        try:
             # As many bytes as are asked for are allocated.
-            data = b"" if kind else file.read(min(found.st_size, most_bytes) + 1)
-    except OSError as error:
-        raise _unreadable(path, error) from None
-    finally:
-        os.close(descriptor)
-    if kind:
-        raise InputError(f"{path}: cannot be read (it is {kind}); expected a regular file")
+            data = file.read(min(os.fstat(file.fileno()).st_size, most_bytes) + 1)
+        except OSError as error:
+            raise _unreadable(path, error) from None
     if len(data) > most_bytes:
-        raise InputError(f"{path}: is larger than {_size_text(most_bytes)}, the limit for such a file")
+        raise _too_large(path, most_bytes)
     return data
+
+
+def require_size(file: BinaryIO, path: str | Path, most_bytes: int) -> None:
+    """Check the size of an open file.
+
+    Raises:
+        InputError: the file is larger than the limit.
+    """
+    if os.fstat(file.fileno()).st_size > most_bytes:
+        raise _too_large(path, most_bytes)
 
 
 def read_text(path: str | Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
@@ -93,6 +115,10 @@ def path_exists(path: str | Path) -> bool:
 def _unreadable(path: str | Path, error: OSError | ValueError) -> InputError:
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
     return InputError(f"{path}: cannot be read ({reason})")
+
+
+def _too_large(path: str | Path, most_bytes: int) -> InputError:
+    return InputError(f"{path}: is larger than {_size_text(most_bytes)}, the limit for such a file")
 
 
 def _size_text(count: int) -> str:

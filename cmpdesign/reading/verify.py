@@ -5,7 +5,7 @@ The colors are checked from image and layout alone, independently of the extract
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
+from cmpdesign.reading.other_pattern import other_pattern_reason
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -89,7 +90,11 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
     """
     if not 0 <= min_share <= 1:
         raise CmpDesignError(f"min_share is {min_share:g}; expected a share from 0 to 1")
-    return judge_markers(reference, image, extractor.extract(image), min_share)
+    verdict = judge_markers(reference, image, extractor.extract(image), min_share)
+    if verdict.verified:
+        return verdict
+    misfit = other_pattern_reason(reference, image, verdict.markers)
+    return verdict if misfit is None else replace(verdict, reason=misfit)
 
 
 def judge_markers(

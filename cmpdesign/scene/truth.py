@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -15,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import InputError, OutputError
-from cmpdesign.inputs.files import read_file
+from cmpdesign.files.atomic import staged_file
+from cmpdesign.files.npz import NpzError, read_npz
+from cmpdesign.inputs.files import MOST_DATA_BYTES
 from cmpdesign.scene.errors import SceneError
 
 
@@ -78,13 +76,10 @@ def _truth_columns(truth: Truth) -> dict[str, Any]:
 
 def _save_npz(columns: dict[str, Any], path: str | Path) -> Path:
     path = Path(path)
-    partial = path.with_name(path.name + ".part")
     try:
-        with partial.open("wb") as file:
+        with staged_file(path) as staged, staged.open("xb") as file:
             np.savez_compressed(file, **columns)
-        partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror or error}; choose another place") from error
     return path
 
@@ -120,16 +115,10 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
 
 def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
-        data = read_file(path)
-        with warnings.catch_warnings(), np.load(io.BytesIO(data), allow_pickle=False) as file:
-            warnings.simplefilter("ignore")  # of the headers' style
-            return {name: file[name] for name in file.files}
+        return read_npz(path, most_bytes=MOST_DATA_BYTES)
     except InputError as error:
         raise SceneError(str(error)) from None
-    except (
-        OSError, ValueError, TypeError, AttributeError, EOFError, MemoryError, RecursionError, zipfile.BadZipFile,
-        zlib.error, NotImplementedError, KeyError,
-    ) as error:  # fmt: skip
+    except NpzError as error:
         raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error
 
 

@@ -29,15 +29,17 @@ READS = {
     "extractor/space/rig.py": {"tomllib.loads"},
     "cmpdesign/files/images.py": {"cv2.imdecode"},  # of bytes that inputs/files.py read
     "cmpdesign/scene/parts/sensor.py": {"cv2.imdecode"},  # of a JPEG that it just made
-    "cmpdesign/scene/truth.py": {"np.load"},  # of bytes that inputs/files.py read
+    "cmpdesign/files/npz.py": {"np.load"},  # of a file that inputs/files.py opened
+    "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read
+    "cmpdesign/files/atomic.py": {"os.open", "open 'rb+'"},  # to flush to disk what it wrote
     "cmpdesign/tracking/sources.py": {"cv2.VideoCapture"},
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
-    "cmpdesign/tracking/sinks.py": {"np.load", "open 'r+b'"},  # of the parts that it wrote
+    "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame
     "cmpdesign/evaluate/journal.py": {
         "read_bytes",
         "open 'r+b'",
     },  # the installed code's digest; its own last line
-    "cmpdesign/products/mold/finish.py": {"os.fdopen"},  # to write to a process
+    "cmpdesign/products/mold/processes.py": {"os.fdopen"},  # to write to a process
     "cmpdesign/evaluate/runner.py": {"json.loads"},  # of a text that it just made
 }
 READING = {

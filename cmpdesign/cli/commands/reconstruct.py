@@ -11,14 +11,22 @@ import typer
 
 from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
-from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
-from cmpdesign.cli.terminal import console, printable_path
+from cmpdesign.cli.run_progress import (
+    exit_with_status,
+    print_written,
+    recover_and_report,
+    require_positive,
+    run_with_progress,
+    summary_path,
+)
+from cmpdesign.cli.terminal import console
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
     from extractor.image.response import Response
+    from extractor.layout.reference import Reference
 
 
 def reconstruct(
@@ -32,7 +40,7 @@ def reconstruct(
         str,
         typer.Argument(
             metavar="SOURCE",
-            help="A video, a folder of images, or a camera's number; one for each view with commas between.",
+            help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
         ),
     ],
     output: Annotated[
@@ -51,7 +59,7 @@ def reconstruct(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+        float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
@@ -63,9 +71,9 @@ def reconstruct(
 ) -> None:
     """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
     if recover:
-        from cmpdesign.tracking.sinks import recover_table as recover_file
+        from extractor import load_layout
 
-        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
+        recover_and_report(output, _points_in(load_layout(layout)))
         return
     require_positive("--fps", fps)
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
@@ -81,9 +89,9 @@ def reconstruct(
         run_with_progress(run, "reconstructing")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            _write_summary(run, source, output)
+            print_written(_write_summary(run, source, output))
         raise
-    _write_summary(run, source, output)
+    print_written([output, *_write_summary(run, source, output)])
     exit_with_status(run)
 
 
@@ -104,12 +112,17 @@ class _Options(NamedTuple):
     max_pixels: int
 
 
+def _points_in(layout: Reference) -> int:
+    """The number of points of a frame: markers and virtual markers."""
+    return len(layout.layer) + len(layout.edges) * layout.virtual_per_edge
+
+
 def _prepare_run(options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
-    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sinks.tables import open_sink
     from cmpdesign.tracking.sources import open_sources
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
@@ -145,16 +158,18 @@ def _read_rest_image(options: _Options) -> Any:
     return images if len(images) > 1 else images[0]
 
 
-def _write_summary(run: TrackingRun, source: str, output: Path) -> None:
-    """Write the summary next to the table and print it; also after a failure."""
+def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
+    """Write the summary next to the table and print it; the written files."""
     if not run.statistics.frames:
-        return
+        return []
     from cmpdesign.files.atomic import write_file
+    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(source, run.source.total, run.ended_early)
+    summary = run.statistics.to_json(without_password(source), run.source.total, run.ended_early)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
-    write_file(output.with_suffix(".summary.json"), text)
+    write_file(summary_path(output), text)
+    return [summary_path(output)]
 
 
 def _print_summary(summary: dict[str, Any]) -> None:

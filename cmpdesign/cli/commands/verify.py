@@ -24,7 +24,7 @@ from cmpdesign.cli.terminal import (
     print_error,
     printable_path,
 )
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MOST_PIXELS, is_folder
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -59,7 +59,10 @@ class Outcome:
 
 def verify(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits.")],
+    images: Annotated[
+        list[Path],
+        typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits, or folders of pictures."),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
     ] = None,
@@ -83,6 +86,7 @@ def verify(
     reference, known = load_layout(layout), parse_reading_response(response)
     extractor = cache(lambda: Extractor(reference, response=known))
     verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, max_pixels)
+    images = _without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
         verifier.verify_image(path, name)
@@ -176,6 +180,17 @@ def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: 
         "images": [outcome.to_json() for outcome in outcomes],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _without_folders(paths: list[Path]) -> list[Path]:
+    """The paths, with every folder replaced by its images.
+
+    Raises:
+        ImageFileError: a folder holds no image.
+    """
+    from cmpdesign.files.image_folders import find_images
+
+    return [image for path in paths for image in (find_images(path) if is_folder(path) else [path])]
 
 
 def _unique_names(stems: list[str]) -> list[str]:

@@ -95,7 +95,7 @@ def missing(path: Path) -> None:
         (missing, "No such file"),
         (text, "is not an image"),
         (empty, "is empty"),
-        (folder, "Is a directory"),
+        (folder, "it is a folder"),
         (cut, "is not an image"),
         (tiny, "is 1 x 1 px; expected at least 16 x 16 px"),
         (narrow, "is 15 x 20 px"),
