@@ -37,6 +37,7 @@ from benchmarks.suites.stress.frames import PATTERNS, CaseImage
 from benchmarks.suites.stress.kinds import StressCase
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from benchmarks.support.machine import null_for_nan
+from cmpdesign.files.atomic import write_file
 from extractor import Markers
 
 IMAGES, SEED = 2100, 5000
@@ -228,11 +229,7 @@ def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
 
 def write_json(rows: Sequence[DamageTotal], path: Path) -> None:
     """Write every row as an object."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(
-        json.dumps([null_for_nan(asdict(row)) for row in rows], indent=1) + "\n", encoding="utf-8"
-    )
-    partial.replace(path)
+    write_file(path, json.dumps([null_for_nan(asdict(row)) for row in rows], indent=1) + "\n")
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -11,5 +11,9 @@ class DesignError(CmpDesignError, ValueError):
     """A design whose parameters are unknown, out of range or contradict each other."""
 
 
+class InputError(CmpDesignError, ValueError):
+    """A file that cannot be read, is no document of its format, or exceeds a limit."""
+
+
 class OutputError(CmpDesignError, OSError):
     """A file or folder that could not be written. Its previous content is unchanged."""

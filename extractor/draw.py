@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.input import convert_to_bgr
+from extractor.image.input import convert_to_bgr, in_native_order
 from extractor.layout.reference import Reference
 from extractor.result import Markers, Status
 
@@ -99,7 +99,7 @@ def _bgr_picture(image: NDArray[Any]) -> Picture:
     bgr = convert_to_bgr(image)
     if bgr is not None:
         return bgr
-    gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(image, alpha=1 / 257)
+    gray = image if image.dtype == np.uint8 else cv2.convertScaleAbs(in_native_order(image), alpha=1 / 257)
     return cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)  # type: ignore[return-value]
 
 

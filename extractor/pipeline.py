@@ -146,8 +146,8 @@ class Extractor:
         """The markers in one image, found without any knowledge of other frames.
 
         Args:
-            image: (H, W, 3) uint8 BGR; also uint16 (scaled to 8 bits), BGRA (alpha dropped) and grayscale (without
-                color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
+            image: (H, W, 3) uint8 BGR; also uint16 of either byte order (scaled to 8 bits), BGRA (alpha dropped) and
+                grayscale (without color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
 
         Raises:
             ImageError: another dtype or shape, or a side below 16 px.
@@ -170,7 +170,7 @@ class Extractor:
 
     def pyramid(self, bgr: NDArray[np.uint8], depth: np.dtype[Any]) -> Pyramid:
         """The image (H, W, 3) at several scales, with the response of images of a ``depth``, uint8 or uint16."""
-        return Pyramid(bgr, self._tables[depth])
+        return Pyramid(bgr, self._tables[depth.newbyteorder("=")])
 
     def finish(
         self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None
@@ -256,9 +256,9 @@ class Extractor:
         numbering = stages.record("number", number_cells(bgr, cells, mesh, self._lattice))
         if numbering is None:
             return Reason.REFERENCE_LOST
-        if not numbering.ambiguous:
+        if numbering.doubt is None:
             numbering = stages.record("attach", number_detached_cells(cells, numbering, self._lattice))
-        return Reason.AMBIGUOUS if numbering.ambiguous else NumberedCells(cells, numbering)
+        return NumberedCells(cells, numbering) if numbering.doubt is None else numbering.doubt
 
     def _is_complete(self, pyramid: Pyramid, found: NumberedCells, scale: int, stages: Stages) -> bool:
         """Whether a finer scale would number hardly more cells than have been numbered."""

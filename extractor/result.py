@@ -45,6 +45,7 @@ class Reason(StrEnum):
     NO_PATTERN = "no_pattern"  # no triangles that meet as in a pattern
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
+    SEVERAL_PADS = "several_pads"  # several white cells, each with the cells around it that a pattern has
 
 
 @dataclass(frozen=True, eq=False)

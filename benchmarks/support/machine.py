@@ -11,6 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.files.atomic import write_file
+
 PACKAGES = ("numpy", "opencv-contrib-python-headless", "numba", "scipy")
 
 
@@ -54,9 +56,6 @@ def null_for_nan(value: Any) -> Any:
 
 def write_json(path: Path, results: Mapping[str, Any]) -> None:
     """Write conditions and results to a file, completely or not at all; NaN as null."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(
-        json.dumps({"conditions": machine_conditions(), **null_for_nan(results)}, indent=1) + "\n",
-        encoding="utf-8",
+    write_file(
+        path, json.dumps({"conditions": machine_conditions(), **null_for_nan(results)}, indent=1) + "\n"
     )
-    partial.replace(path)

@@ -1,13 +1,14 @@
-"""The application: its commands, and the conversion of errors into a line and an exit code."""
+"""The application: its commands."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import sys
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from cmpdesign import __version__
+from cmpdesign.cli.command import INTERRUPTED, Command, OneLineErrors
 from cmpdesign.cli.commands import (
     build,
     check,
@@ -20,44 +21,34 @@ from cmpdesign.cli.commands import (
     track,
     verify,
 )
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, is_expected, print_error
-
-
-class OneLineErrors(TyperGroup):
-    """Prints expected errors as one line on stderr, with exit code 2 and without a traceback."""
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except Exception as error:
-            if not is_expected(error):
-                raise
-            print_error(error)
-            raise typer.Exit(EXIT_BAD_INPUT) from None
-
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
 
 app = typer.Typer(
     cls=OneLineErrors,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
     help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.",
 )
-app.command("templates")(templates.templates)
-app.command("build")(build.build)
-app.command("check")(check.check)
-app.command("render")(render.render)
-app.command("verify")(verify.verify)
-app.command("track")(track.track)
-app.command("reconstruct")(reconstruct.reconstruct)
+for function in (
+    templates.templates,
+    build.build,
+    check.check,
+    render.render,
+    verify.verify,
+    track.track,
+    reconstruct.reconstruct,
+    kerf.kerf,
+    schema.schema,
+):
+    app.command(function.__name__, cls=Command)(function)
 app.add_typer(evaluate.app, name="evaluate")
-app.command("kerf")(kerf.kerf)
-app.command("schema")(schema.schema)
 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"cmpdesign {__version__}")
+        print_document(f"cmpdesign {__version__}\n")
         raise typer.Exit()
 
 
@@ -72,4 +63,8 @@ def options(
 
 def main() -> None:
     """Entry point of the ``cmpdesign`` program."""
-    app()
+    try:
+        app()
+    except KeyboardInterrupt:  # before or after a command
+        print_error(INTERRUPTED)
+        sys.exit(EXIT_INTERRUPTED)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cmpdesign.cli.terminal import console, print_warning
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
 
 EXIT_NOT_TRACKED = 1
-EXIT_INTERRUPTED = 130
 
 
 def run_with_progress(run: TrackingRun, doing: str) -> None:
@@ -65,14 +65,44 @@ def exit_with_status(run: TrackingRun) -> None:
         CmpDesignError: no frame could be read.
     """
     if run.stop.is_requested:
-        is_camera = run.source.name.startswith("camera")  # a stop is the only way to end a camera's run
-        raise typer.Exit(0 if is_camera else EXIT_INTERRUPTED)
+        raise typer.Exit(0 if run.source.is_live else EXIT_INTERRUPTED)
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:
         print_warning(f"{run.ended_early}; these are written")
     if run.ended_early or not run.statistics.tracked:
         raise typer.Exit(EXIT_NOT_TRACKED)
+
+
+def recover_and_report(output: Path, rows_per_frame: int) -> None:
+    """Complete the table of a killed run, and print what was recovered and what was not; exit with 1 for nothing.
+
+    Raises:
+        CmpDesignError: there is nothing to recover, or no whole frame is left.
+        OutputError: the table cannot be written.
+    """
+    from cmpdesign.tracking.sinks.tables import recover_table
+
+    recovered = recover_table(output, rows_per_frame)
+    for problem in recovered.problems:
+        print_warning(problem)
+    if not recovered.frames:
+        print_warning(
+            f"{printable_path(output)}: the run was ended before its first frame was written; what it left is removed"
+        )
+        raise typer.Exit(EXIT_NOT_TRACKED)
+    console().print(f"wrote {printable_path(output)}: {recovered.frames} frames recovered")
+
+
+def summary_path(table: Path) -> Path:
+    """The place of a table's summary; tables of several formats in one folder have one each."""
+    return table.with_name(table.name + ".summary.json")
+
+
+def print_written(paths: Iterable[Path]) -> None:
+    """Print one line for every written file."""
+    for path in paths:
+        console().print(f"wrote {printable_path(path)}")
 
 
 def require_positive(option: str, value: float | None) -> None:

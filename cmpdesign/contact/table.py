@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,8 @@ from cmpdesign.contact.objects.heightmap import HeightMap
 from cmpdesign.contact.objects.indenters import Ball, Cube, Cylinder, Indenter, Punch, Rib, Ring, Wedge
 from cmpdesign.contact.result import Contact
 from cmpdesign.contact.solve import solve
+from cmpdesign.inputs.names import nearest_name
+from cmpdesign.inputs.validation import MOST_ERRORS, shown_value
 from cmpdesign.units import parse_angle_deg, parse_length_mm
 
 INDENTER_KINDS: Mapping[str, type[Indenter]] = {
@@ -90,9 +91,9 @@ def contact_from(table: Mapping[str, Any], folder: str | Path = ".") -> ContactS
 def _make_indenter(table: Mapping[str, Any], folder: Path) -> Indenter:
     rest = dict(table)
     kind = rest.pop("kind", None)
-    if kind not in INDENTER_KINDS:
+    if not isinstance(kind, str) or kind not in INDENTER_KINDS:
         raise ContactError(
-            f"contact.indenter.kind is {kind!r}{_suggest_name(str(kind), INDENTER_KINDS)}; there are "
+            f"contact.indenter.kind is {shown_value(kind)}{nearest_name(kind, INDENTER_KINDS)}; there are "
             f"{', '.join(INDENTER_KINDS)}"
         )
     if INDENTER_KINDS[kind] is not HeightMap:
@@ -129,19 +130,16 @@ def _validate_table(model: type[Model], table: Mapping[str, Any], where: str) ->
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        raise ContactError("; ".join(_error_message(item, model, where) for item in error.errors())) from None
+        items = error.errors()[:MOST_ERRORS]
+        raise ContactError("; ".join(_error_message(item, model, where) for item in items)) from None
 
 
 def _error_message(item: Any, model: type[BaseModel], where: str) -> str:
     path = ".".join([where, *(str(part) for part in item["loc"])])
     if item["type"] == "extra_forbidden":
-        return f"{path} is unknown{_suggest_name(str(item['loc'][-1]), model.model_fields)}"
+        known = [*model.model_fields, *(["kind"] if where == "contact.indenter" else [])]
+        return f"{path} is unknown{nearest_name(item['loc'][-1], known)}"
     if item["type"] == "missing":
         return f"{path} is missing"
     message = item["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    return f"{path} = {item['input']!r}: {message}"
-
-
-def _suggest_name(word: str, known: Mapping[str, object]) -> str:
-    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f" (did you mean {found[0]}?)" if found else ""
+    return f"{path} = {shown_value(item['input'])}: {message}"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -16,7 +14,10 @@ from cmpdesign.design.laser_options import LaserOptions
 from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.quantities import Angle, Color, Length, LengthOrZero
 from cmpdesign.design.sheet_options import SheetOptions
-from cmpdesign.errors import DesignError
+from cmpdesign.errors import DesignError, InputError
+from cmpdesign.inputs.documents import parse_toml, read_toml
+from cmpdesign.inputs.names import MOST_NAME_LETTERS, Line, Name, nearest_name
+from cmpdesign.inputs.validation import validation_message
 from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS
 
@@ -29,11 +30,11 @@ MAX_VIRTUAL_PER_EDGE = 100
 class _StrictModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    def __init__(self, **data: Any) -> None:
+    def __init__(self, /, **data: Any) -> None:
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise DesignError(_validation_message(error, type(self))) from None
+            raise DesignError(validation_message(error, type(self))) from None
 
 
 class Palette(BaseModel):
@@ -62,9 +63,9 @@ class Design(_StrictModel):
         DesignError: an unknown, missing, impossible or contradictory parameter.
     """
 
-    name: str = Field("", description="The design's name, for captions and reports.")
-    description: str = Field("", description="One sentence about the design.")
-    source: str = Field(
+    name: Name = Field("", description="The design's name, for captions and reports.")
+    description: Line = Field("", description="One sentence about the design.")
+    source: Line = Field(
         "", description='Where the dimensions come from; "assumed" where nobody published them.'
     )
 
@@ -131,17 +132,9 @@ class Design(_StrictModel):
     def _known_pattern(cls, value: str) -> str:
         if value not in registered_patterns():
             raise ValueError(
-                f"{value!r} is no pattern{_suggest_name(value, registered_patterns())}; there are "
+                f"{value!r} is no pattern{nearest_name(value, registered_patterns())}; there are "
                 f"{', '.join(registered_patterns())}"
             )
-        return value
-
-    @field_validator("name")
-    @classmethod
-    def _one_printable_line(cls, value: str) -> str:
-        # The name appears in captions and XML, and XML cannot hold control characters.
-        if not value.isprintable():
-            raise ValueError(f"{value!r} has line breaks or control characters; write it on one line")
         return value
 
     @model_validator(mode="after")
@@ -219,16 +212,12 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = 
 
     path = find_design(name_or_path)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise DesignError(f"{path}: is no UTF-8 text, so no TOML design") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DesignError(f"{path}: is no valid TOML: {error}") from None
+        data = read_toml(path)
+    except InputError as error:
+        raise DesignError(str(error)) from None
     try:
         _update_overrides(data, overrides or {})
-        data.setdefault("name", path.stem)
+        data.setdefault("name", path.stem[:MOST_NAME_LETTERS])
         return Design(**data)
     except DesignError as error:
         raise DesignError(f"{name_or_path}: {error}") from None
@@ -257,7 +246,7 @@ def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> Non
             target = target.setdefault(table, {})
             if not isinstance(target, dict):
                 raise DesignError(
-                    f"{dotted}: {table} is not a table{_suggest_name(dotted, Design.model_fields)}"
+                    f"{dotted}: {table} is not a table{nearest_name(dotted, Design.model_fields)}"
                 )
         if text == "none":
             target.pop(field, None)
@@ -268,42 +257,7 @@ def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> Non
 def _parse_toml_value(text: str) -> object:
     """The TOML value of a text, or the text itself: "3" becomes a number, "60mil" stays a text."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        document = parse_toml(f"value = {text}", "")
+    except InputError:
         return text
-
-
-def _suggest_name(word: str, known: Mapping[str, object]) -> str:
-    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f" (did you mean {found[0]}?)" if found else ""
-
-
-def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
-    """The errors of pydantic in one line that names each field, its value and the allowed values."""
-    parts = []
-    for item in error.errors():
-        path = ".".join(str(part) for part in item["loc"])
-        message = item["msg"].removeprefix("Value error, ")
-        if item["type"] == "extra_forbidden":
-            fields = _table_fields(model, item["loc"][:-1])
-            parts.append(f"{path} is unknown{_suggest_name(str(item['loc'][-1]), fields)}")
-        elif item["type"] == "missing":
-            parts.append(f"{path} is missing")
-        elif item["type"] == "value_error":
-            parts.append(f"{path}: {message}" if path else message)
-        elif item["type"] == "string_pattern_mismatch":
-            parts.append(f'{path} = {item["input"]!r} is no color; write it as "#c8322d"')
-        else:
-            unit = next((f" {unit}" for unit in ("mm", "deg") if path.endswith(f"_{unit}")), "")
-            message = message.removeprefix("Input should be ")
-            parts.append(f"{path} = {item['input']!r} must be {message}{unit}")
-    return "; ".join(parts)
-
-
-def _table_fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Mapping[str, object]:
-    """The fields of the table at a path of names."""
-    for name in path:
-        table = model.model_fields[str(name)].annotation
-        assert isinstance(table, type) and issubclass(table, BaseModel)
-        model = table
-    return model.model_fields
+    return document["value"] if document.keys() == {"value"} else text

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cmpdesign.design.quantities import Angle, Length, LengthOrZero
+from cmpdesign.inputs.names import Line
 
 Share = Annotated[float, Field(gt=0, le=100)]
 Speed = Annotated[float, Field(gt=0, le=20_000)]
@@ -18,8 +19,8 @@ class LaserOptions(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    machine: str = Field("co2-40w", min_length=1, description="A machine's name or TOML file.")
-    material: str = Field("silicone-black", min_length=1, description="A material's name or TOML file.")
+    machine: Line = Field("co2-40w", min_length=1, description="A machine's name or TOML file.")
+    material: Line = Field("silicone-black", min_length=1, description="A material's name or TOML file.")
 
     mode: Literal["cut", "pocket"] = Field(
         "cut", description='"cut": outlines, through the sheet. "pocket": filled, to a depth.'

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from cmpdesign.design.quantities import Angle, Length, LengthOrZero
+from cmpdesign.inputs.names import Line
 
 Tool = Literal["sla-resin", "fdm-pla", "fdm-petg", "aluminium", "steel"]
 Count = Annotated[int, Field(ge=0, le=64, strict=True)]
@@ -18,9 +19,9 @@ class MoldOptions(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     tool: Tool = Field("sla-resin", description="What the parts are made of.")
-    base_silicone: str = Field("solaris", min_length=1, description="Clear base layer: name or TOML file.")
-    marker_silicone: str = Field("dragon-skin-10", min_length=1, description="Black layer and its fillings.")
-    cover_silicone: str = Field("dragon-skin-10", min_length=1, description="Protective layer.")
+    base_silicone: Line = Field("solaris", min_length=1, description="Clear base layer: name or TOML file.")
+    marker_silicone: Line = Field("dragon-skin-10", min_length=1, description="Black layer and its fillings.")
+    cover_silicone: Line = Field("dragon-skin-10", min_length=1, description="Protective layer.")
 
     base_mm: Length = Field(4.0, description="Thickness of the clear base layer.")
     marker_mm: Length = Field(0.5, description="Thickness of the black layer with the pattern.")

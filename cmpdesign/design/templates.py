@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from cmpdesign.errors import DesignError
+from cmpdesign.inputs.files import path_exists
+from cmpdesign.inputs.names import nearest_name
 
 
 def templates_folder() -> Path:
@@ -53,12 +54,11 @@ def _find_template(name_or_path: str | Path, known: dict[str, Path]) -> Path:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     path = Path(name_or_path)
-    if path.is_file():
+    if path_exists(path):
         return path
     if path.suffix or len(path.parts) > 1:
         raise DesignError(f"{name_or_path}: no such file")
-    similar = difflib.get_close_matches(str(name_or_path), known, n=1, cutoff=0.5)
-    hint = f" (did you mean {similar[0]}?)" if similar else ""
     raise DesignError(
-        f"{name_or_path}: no such template{hint}; there are {', '.join(known)}, or give a TOML file"
+        f"{name_or_path}: no such template{nearest_name(name_or_path, known)}; there are {', '.join(known)}, "
+        "or give a TOML file"
     )

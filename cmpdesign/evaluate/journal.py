@@ -14,7 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
 
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, InputError, OutputError
+from cmpdesign.files.locks import Lock, try_lock
+from cmpdesign.inputs.documents import parse_json
+from cmpdesign.inputs.files import is_regular_file, path_exists, read_file
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_VERSION = 2
@@ -86,9 +89,14 @@ class Journal:
         }
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            if path_exists(self.path) and not is_regular_file(self.path):
+                raise OutputError(f"{self.path}: is no regular file; remove it, or give another folder")
             self._file = self.path.open("a", encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
+        except (OSError, ValueError) as error:
+            if isinstance(error, OutputError):
+                raise
+            reason = getattr(error, "strerror", None) or error
+            raise OutputError(f"{self.path}: cannot be written ({reason})") from error
         try:
             _lock_journal(self._file, self.path)
             self.results: dict[str, Any] = self._read()
@@ -131,7 +139,7 @@ class Journal:
 
     def _read(self) -> dict[str, Any]:
         """The results on disk. The file is truncated after its last complete line."""
-        data = self.path.read_bytes()
+        data = read_file(self.path)
         complete = data[: data.rfind(b"\n") + 1]
         if len(complete) < len(data):
             with self.path.open("r+b") as file:
@@ -139,9 +147,12 @@ class Journal:
         if not complete:
             return {}
         try:
-            head, *documents = [json.loads(line) for line in complete.decode("utf-8").splitlines()]
-            results = {document["trial"]: document["result"] for document in documents}
-        except (ValueError, KeyError, TypeError) as error:
+            lines = complete.decode("utf-8").split("\n")[:-1]
+            head, *documents = [
+                parse_json(line, f"line {number}") for number, line in enumerate(lines, start=1)
+            ]
+            results = {str(document["trial"]): document["result"] for document in documents}
+        except (InputError, ValueError, KeyError, TypeError) as error:
             raise CmpDesignError(
                 f"{self.path} is not the journal of a run ({error}); give another folder"
             ) from error
@@ -169,15 +180,5 @@ def _lock_journal(file: TextIO, path: Path) -> None:
     Raises:
         CmpDesignError: another process has locked it.
     """
-    try:
-        import fcntl
-    except ModuleNotFoundError:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise CmpDesignError(
-            f"{path} is in use by another run; wait until it ends, or give another folder"
-        ) from error
-    except OSError:  # a file system that has no locks
-        return
+    if try_lock(file.fileno()) is Lock.TAKEN:
+        raise CmpDesignError(f"{path} is in use by another run; wait until it ends, or give another folder")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import signal
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,29 +91,39 @@ def run_trials(
     if len({trial.key for trial in trials}) < len(trials):
         raise CmpDesignError("two trials have the same name")
     open_trials = [trial for trial in trials if trial.key not in journal.results]
-    with _progress_bar(title, len(trials), len(trials) - len(open_trials), show) as advance:
-        for key, result in _iterate_results(work, open_trials, workers):
+    done = len(trials) - len(open_trials)
+    with (
+        _progress_bar(title, len(trials), done, show) as advance,
+        closing(_iterate_results(work, open_trials, workers)) as results,
+    ):
+        for key, result in results:
             journal.add(key, result)
             advance()
     return [journal.results[trial.key] for trial in trials]
 
 
-def _iterate_results(work: Work, trials: Sequence[Trial], workers: int) -> Iterator[tuple[str, Any]]:
+def _iterate_results(
+    work: Work, trials: Sequence[Trial], workers: int
+) -> Generator[tuple[str, Any], None, None]:
     """(key, result) in the order of completion."""
     if workers == 1 or len(trials) < 2:
         for trial in trials:
             yield trial.key, _run_trial(work, trial.values)
         return
     from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import get_context
+    from multiprocessing import active_children, get_context
 
+    others = set(active_children())
     with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_ignore_interrupts) as pool:
         keys = {pool.submit(_run_trial, work, dict(trial.values)): trial.key for trial in trials}
         try:
             for done in as_completed(keys):
                 yield keys[done], done.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
+        except BaseException:  # trials in work would take up to a minute, and their results are not kept
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(active_children()) - others:
+                process.kill()
+            raise
 
 
 def _ignore_interrupts() -> None:

@@ -1,14 +1,116 @@
-"""Atomic writing of files: a complete file is written next to its place, then renamed."""
+"""Atomic writing: files are complete on disk, in a folder of a random name, before they are renamed into place."""
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cmpdesign.errors import OutputError
+from cmpdesign.files.locks import Lock, open_for_lock, try_lock
+
+_STAGE_PREFIX = ".cmpdesign-"
+# Names that ``tempfile.mkdtemp`` makes of the prefix.
+_STAGE_NAME = re.compile(re.escape(_STAGE_PREFIX) + "[a-z0-9_]{8}")
+
+
+class Stage:
+    """A folder of a random name for files that are not complete; locked while its process lives.
+
+    Stages that killed processes left in the same place are removed first. Nothing in a stage can be a link that
+    somebody else made, because only the own user may write into it.
+
+    Attributes:
+        folder: the folder.
+
+    Args:
+        parent: folder of the files to come; it exists.
+
+    Raises:
+        OSError: the folder cannot be made.
+    """
+
+    def __init__(self, parent: Path) -> None:
+        remove_abandoned_stages(parent)
+        while True:
+            self.folder = Path(tempfile.mkdtemp(prefix=_STAGE_PREFIX, dir=parent))
+            self._descriptor = open_for_lock(self.folder)
+            if self._descriptor is None:
+                return
+            try_lock(self._descriptor)
+            # Before the lock, another process may have taken the folder for abandoned.
+            if self.folder.exists():
+                return
+            os.close(self._descriptor)
+
+    def commit(self, staged: Path, path: Path) -> None:
+        """Flush a staged file or folder to disk, and rename it to its place.
+
+        Raises:
+            OSError: a full disk, for example; what is at the place is unchanged.
+        """
+        sync_file(staged)
+        staged.replace(path)
+        sync_folder(path.parent)
+
+    def close(self) -> None:
+        """Remove the folder and what is in it."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __enter__(self) -> Stage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def remove_abandoned_stages(parent: Path) -> None:
+    """Remove the stages of killed processes from a folder: those of the own user that no process has locked."""
+    for path in _stages_in(parent):
+        descriptor = open_for_lock(path)
+        if descriptor is None:
+            continue
+        try:
+            if try_lock(descriptor) is Lock.HELD and os.fstat(descriptor).st_uid == os.geteuid():
+                shutil.rmtree(path, ignore_errors=True)
+        finally:
+            os.close(descriptor)
+
+
+def _stages_in(parent: Path) -> list[Path]:
+    try:
+        with os.scandir(parent) as entries:
+            return [
+                Path(entry.path)
+                for entry in entries
+                if _STAGE_NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False)
+            ]
+    except OSError:
+        return []
+
+
+@contextmanager
+def staged_file(path: str | Path) -> Iterator[Path]:
+    """Yield the path of a file to write; after the block, the file is flushed to disk and renamed to ``path``.
+
+    An error within the block leaves what is at ``path`` unchanged, and no other file.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    _require_no_folder(path)
+    with Stage(path.parent) as stage:
+        staged = stage.folder / f"staged{path.suffix}"
+        yield staged
+        stage.commit(staged, path)
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
@@ -20,11 +122,8 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     path = Path(path)
     with _as_output_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _require_no_folder(path)
-        with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=path.parent) as stage:
-            staged = Path(stage) / path.name
-            _write_and_sync(staged, content)
-            staged.replace(path)
+        with staged_file(path) as staged:
+            staged.write_bytes(_to_bytes(content))
 
 
 def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:
@@ -46,23 +145,51 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
         folder.mkdir(parents=True, exist_ok=True)
         for path in paths:
             _require_no_folder(path)
-        with tempfile.TemporaryDirectory(prefix=".cmpdesign-", dir=folder) as stage:
+        with Stage(folder) as stage:
             for number, content in enumerate(files.values()):
-                _write_and_sync(Path(stage) / str(number), content)
+                staged = stage.folder / str(number)
+                staged.write_bytes(_to_bytes(content))
+                sync_file(staged)
             for path in paths:
                 path.parent.mkdir(parents=True, exist_ok=True)
             for number, path in enumerate(paths):
-                (Path(stage) / str(number)).replace(path)
+                (stage.folder / str(number)).replace(path)
+            for parent in dict.fromkeys(path.parent for path in paths):
+                sync_folder(parent)
     return paths
 
 
-def _write_and_sync(path: Path, content: str | bytes) -> None:
-    """Write and sync, so that a full disk raises an error here and not after the rename."""
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    with path.open("wb") as file:
-        file.write(data)
-        file.flush()
+def sync_file(path: Path) -> None:
+    """Flush a file, or all files of a folder, to disk, so that a full disk is an error before a rename.
+
+    Raises:
+        OSError: not all of it is on disk.
+    """
+    if path.is_dir():
+        for inner in path.iterdir():
+            sync_file(inner)
+        sync_folder(path)
+        return
+    with path.open("rb+") as file:
         os.fsync(file.fileno())
+
+
+def sync_folder(path: Path) -> None:
+    """Flush the names in a folder to disk, where the system can: a rename then survives a loss of power."""
+    with suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _to_bytes(content: str | bytes) -> bytes:
+    """The bytes of a file.
+
+    Half a surrogate pair, from a path whose bytes are not UTF-8, is written as in JSON: backslash, u, four digits.
+    """
+    return content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
 
 
 def _require_no_folder(path: Path) -> None:
@@ -76,7 +203,6 @@ def _as_output_error(path: Path) -> Iterator[None]:
         yield
     except OutputError:
         raise
-    except OSError as error:
-        raise OutputError(
-            f"{path}: cannot be written ({error.strerror or error}); nothing was changed"
-        ) from error
+    except (OSError, ValueError, RuntimeError) as error:  # also a NUL in the path, or a loop of links
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be written ({reason}); nothing was changed") from error

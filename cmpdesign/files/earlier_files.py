@@ -1,7 +1,8 @@
-"""Removal of files that an earlier build wrote into a product's folder and this build does not make.
+"""Removal of files that an earlier build wrote and this build does not make.
 
-Each product's folder holds a list of the written files with digests. Only files on the list with an unchanged digest
-are removed, so files of the user and changed files stay.
+The output folder and each product's folder hold a list of the written files with digests. Only files on a list with an
+unchanged digest are removed, so files of the user and changed files stay. A list also names the pattern of its files:
+where a build makes another pattern, all files of the earlier one go, because files of two patterns do not fit together.
 """
 
 from __future__ import annotations
@@ -10,22 +11,46 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+
+from cmpdesign.errors import InputError
+from cmpdesign.inputs.documents import read_json
+from cmpdesign.inputs.files import read_file
 
 LIST_NAME = ".cmpdesign-files.json"
 
 
-def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict[str, str | bytes]:
-    """Add the list of files of every folder that has files.
+@dataclass(frozen=True)
+class _FileList:
+    """A list of files: digests by name, and the digest of the pattern ("" where the list names none)."""
+
+    digests: Mapping[str, str] = field(default_factory=dict)
+    pattern: str = ""
+
+    def to_json(self) -> str:
+        document: dict[str, object] = {"format": "cmp-files", "version": 1}
+        if self.pattern:
+            document["pattern"] = self.pattern
+        return json.dumps(document | {"sha256": dict(sorted(self.digests.items()))}, indent=1) + "\n"
+
+
+def files_with_lists(
+    files: Mapping[str, str | bytes], folders: Iterable[str], output: Path | None = None, pattern: str = ""
+) -> dict[str, str | bytes]:
+    """Add the list of files of every product's folder that has files, and that of the output folder.
 
     Args:
         files: path relative to the output folder, with "/" -> content.
         folders: products' folders, as "mold/".
+        output: the output folder; its list keeps the files that an earlier build of the same pattern wrote. None: no
+            list is made for files outside the products' folders.
+        pattern: digest of the pattern, if known.
 
     Returns:
         The files and the lists.
     """
-    result = dict(files)
+    folders, result = list(folders), dict(files)
     for folder in folders:
         digests = {
             path.removeprefix(folder): _content_digest(data)
@@ -33,31 +58,49 @@ def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -
             if path.startswith(folder)
         }
         if digests:
-            document = {"format": "cmp-files", "version": 1, "sha256": dict(sorted(digests.items()))}
-            result[folder + LIST_NAME] = json.dumps(document, indent=1) + "\n"
+            result[folder + LIST_NAME] = _FileList(digests, pattern).to_json()
+    if output is not None:
+        earlier = _read_file_list(output / LIST_NAME)
+        kept = earlier.digests if earlier.pattern == pattern else {}
+        own = {
+            path: _content_digest(data) for path, data in files.items() if not path.startswith(tuple(folders))
+        }
+        result[LIST_NAME] = _FileList({**kept, **own}, pattern).to_json()
     return result
 
 
-def find_stale_files(output: Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """Find unchanged files that are on earlier lists and that this build does not make.
+def find_stale_files(
+    output: Path, files: Mapping[str, str | bytes], folders: Iterable[str] = (), pattern: str = ""
+) -> list[Path]:
+    """Find unchanged files on earlier lists that this build does not make.
+
+    In a product's folder that this build writes these are all such files; elsewhere those of another pattern.
 
     Args:
         output: the output folder, before the files of this build are written.
         files: files of this build with lists, from ``files_with_lists``.
+        folders: products' folders, as "mold/".
+        pattern: digest of the pattern, if known.
 
     Returns:
         Sorted paths.
     """
+    current = {output / name for name in files}
+    written = [str(PurePosixPath(name).parent) for name in files if name.endswith("/" + LIST_NAME)]
     found = []
-    for name in files:
-        if PurePosixPath(name).name != LIST_NAME:
+    for name in dict.fromkeys(("", *written, *(folder.rstrip("/") for folder in folders))):
+        folder = output / name
+        earlier = _read_file_list(folder / LIST_NAME)
+        is_other = bool(pattern and earlier.pattern) and earlier.pattern != pattern
+        if name not in written and not is_other:
             continue
-        folder = (output / name).parent
-        current = {output / other for other in files}
-        for listed, digest in _read_file_list(output / name).items():
-            path = folder / listed
-            if path not in current and _is_below(path, folder) and _is_unchanged(path, digest):
-                found.append(path)
+        found += [
+            path
+            for path, digest in ((folder / listed, digest) for listed, digest in earlier.digests.items())
+            if path not in current and _is_below(path, folder) and _is_unchanged(path, digest)
+        ]
+        if folder / LIST_NAME not in current:
+            found.append(folder / LIST_NAME)
     return sorted(found)
 
 
@@ -69,36 +112,39 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
         with suppress(OSError):
             path.unlink()
             removed.append(path)
-            path.parent.rmdir()
+            for parent in path.parents:
+                parent.rmdir()
     return removed
 
 
-def _read_file_list(path: Path) -> dict[str, str]:
-    """File name -> digest from an earlier list; empty without a valid list."""
+def _read_file_list(path: Path) -> _FileList:
+    """An earlier list; an empty one without a valid list."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if (document["format"], document["version"]) != ("cmp-files", 1):
-            return {}
-        return {str(name): str(digest) for name, digest in document["sha256"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {}
+            return _FileList()
+        digests = {str(name): str(digest) for name, digest in document["sha256"].items()}
+        return _FileList(digests, str(document.get("pattern", "")))
+    except (InputError, KeyError, TypeError, AttributeError):
+        return _FileList()
 
 
 def _is_below(path: Path, folder: Path) -> bool:
     """True if the path lies below the folder without links; an edited list may name other paths."""
-    return (
-        path.resolve() == folder.resolve() / path.relative_to(folder)
-        if path.is_relative_to(folder)
-        else False
-    )
+    try:
+        return path.is_relative_to(folder) and path.resolve() == folder.resolve() / path.relative_to(folder)
+    except (OSError, ValueError, RuntimeError):  # too long, a NUL, a loop of links
+        return False
 
 
 def _is_unchanged(path: Path, digest: str) -> bool:
     try:
-        return path.is_file() and _content_digest(path.read_bytes()) == digest
-    except OSError:
+        return _content_digest(read_file(path)) == digest
+    except InputError:
         return False
 
 
 def _content_digest(content: str | bytes) -> str:
-    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+    return hashlib.sha256(
+        content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    ).hexdigest()

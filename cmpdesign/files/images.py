@@ -1,4 +1,4 @@
-"""Reading of image files as arrays, and writing of PNG."""
+"""Reading of image files as arrays, and encoding of images by the ending of a file."""
 
 from __future__ import annotations
 
@@ -8,9 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.files.image_header import size_in_header
+from cmpdesign.inputs.files import MOST_PIXELS, read_file
 
 SMALLEST_PX = 16
+PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
+_NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
+# Endings of images that are written -> largest number of bits.
+IMAGE_BITS = {".png": 16, ".tif": 16, ".tiff": 16, ".bmp": 8, ".webp": 8, ".jpg": 8, ".jpeg": 8}
+JPEG_QUALITY = 95
+LOSSLESS_WEBP = 101
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -19,42 +27,59 @@ class ImageFileError(CmpDesignError, ValueError):
     """A file that is not a color image of sufficient size."""
 
 
-def read_image(path: str | Path, *, gray: bool = False) -> Image:
+def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False) -> Image:
     """Read the pixels of an image file.
 
     An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured.
 
     Args:
-        path: the file.
+        path: a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM file.
+        most_pixels: limit of width x height; the header is tested before memory is taken.
         gray: grayscale images are read, too; their three channels are equal.
 
     Returns:
         (H, W, 3) uint8 or uint16, BGR.
 
     Raises:
-        ImageFileError: the file cannot be read, is no image, has one channel (unless ``gray``), has other than 8
-            or 16 bits, or is smaller than 16 x 16 pixels.
+        ImageFileError: the file cannot be read, is no image, has one channel (unless ``gray``), has other than 8 or
+            16 bits, or is smaller than 16 x 16 or larger than ``most_pixels`` pixels.
+    """
+    return _to_bgr(decode_image(path, most_pixels), Path(path), gray)
+
+
+def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+    """Read the pixels of an image file as they are stored: (H, W) or (H, W, C), of any depth.
+
+    Raises:
+        ImageFileError: the file cannot be read, is no image, or has more than ``most_pixels`` pixels.
     """
     import cv2
 
-    path = Path(path)
     try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise ImageFileError(
-            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
-        ) from None
+        data = read_file(path)
+    except InputError as error:
+        raise ImageFileError(str(error)) from None
     if not data:
         raise ImageFileError(f"{path}: is empty; expected an image")
+    size = size_in_header(data)
+    if size is None:
+        raise ImageFileError(f"{path}: {_NO_IMAGE}")
+    if size[0] * size[1] > most_pixels:
+        raise ImageFileError(
+            f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
+            f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+        )
+    if data.startswith(b"\x89PNG") and size[0] * size[1] > PNG_PIXELS_PER_BYTE * len(data):
+        raise ImageFileError(
+            f"{path}: {_NO_IMAGE}; it claims {size[0]} x {size[1]} px, which {len(data)} bytes cannot hold"
+        )
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # OpenCV refuses to decode: too many pixels, or an unknown type
+    except (cv2.error, MemoryError):  # OpenCV refuses to decode: too many pixels, or an unknown type
         pixels = None
     if pixels is None:
-        raise ImageFileError(
-            f"{path}: is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
-        )
-    return _to_bgr(pixels, path, gray)
+        raise ImageFileError(f"{path}: {_NO_IMAGE}")
+    return np.asarray(pixels)
 
 
 def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
@@ -80,3 +105,33 @@ def to_png(pixels: Image) -> bytes:
     import cv2
 
     return bytes(cv2.imencode(".png", pixels)[1])
+
+
+def require_image_kind(path: Path, bits: int) -> None:
+    """Check that the ending of a file names an image format for the bits of a channel.
+
+    Raises:
+        CmpDesignError: another ending, or a format of fewer bits.
+    """
+    kinds = [suffix for suffix, most in IMAGE_BITS.items() if most >= bits]
+    if path.suffix.lower() not in IMAGE_BITS:
+        raise CmpDesignError(f"{path}: unknown ending; expected one of {', '.join(kinds)}")
+    if path.suffix.lower() not in kinds:
+        raise CmpDesignError(
+            f"{path}: this format has 8 bits, the image {bits}; expected one of {', '.join(kinds)}"
+        )
+
+
+def encode_image(pixels: Image, path: Path) -> bytes:
+    """Encode a (H, W, 3) BGR image by the ending of a file; all formats but JPEG are lossless.
+
+    Raises:
+        CmpDesignError: see ``require_image_kind``.
+    """
+    import cv2
+
+    require_image_kind(path, 8 * pixels.itemsize)
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, cv2.IMWRITE_WEBP_QUALITY, LOSSLESS_WEBP]
+    suffix = path.suffix.lower()
+    options = {".jpg": quality[:2], ".jpeg": quality[:2], ".webp": quality[2:]}.get(suffix, [])
+    return bytes(cv2.imencode(suffix, pixels, options)[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -58,6 +59,14 @@ def layout_to_json(layout: Layout) -> str:
             "diameter_mm": layout.fiducial_diameter_mm,
         }
     return _format_object(document, "") + "\n"
+
+
+def pattern_digest(layout: Layout) -> str:
+    """SHA-256 (hex) of all that the layout file says of the pattern, the program's version left out."""
+    lines = layout_to_json(layout).splitlines()
+    return hashlib.sha256(
+        "\n".join(line for line in lines if '"generator": ' not in line).encode()
+    ).hexdigest()
 
 
 def _format_object(value: Mapping[str, Any], indent: str) -> str:

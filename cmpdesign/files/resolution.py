@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
+
+from cmpdesign.errors import InputError
+from cmpdesign.files.image_header import open_header
+from cmpdesign.inputs.files import read_file
 
 # Cameras and programs without a resolution write 72 or 96; the code of a sheet is not legible in such coarse scans.
 LEAST_DPI = 100.0
@@ -16,19 +21,21 @@ def resolution_dpi(path: str | Path) -> tuple[float, float] | str:
     Returns:
         Pixels per inch in x and y, or a text that states the reason for the failure.
     """
-    from PIL import Image, UnidentifiedImageError
-
     try:
-        with Image.open(path) as image:
+        image = open_header(read_file(path))
+        if image is None:
+            return "the file's resolution cannot be read"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd tags
             exif = image.getexif().get_ifd(_CAMERA)
-            stated = image.info.get("dpi")
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError):
+        stated = image.info.get("dpi")
+        x, y = (float(value) for value in stated) if stated else (0.0, 0.0)
+    except (InputError, OSError, ValueError, SyntaxError, TypeError, ArithmeticError):
         return "the file's resolution cannot be read"
     if any(tag in exif for tag in _EXPOSURE):
         return "a photo's resolution tag says nothing of the sheet"
-    if stated is None:
+    if not stated:
         return "the file states no resolution"
-    x, y = (float(value) for value in stated)
     if not (x >= LEAST_DPI and y >= LEAST_DPI):
         return f"the file states {x:.3g} dpi, which programs write that know no resolution"
     return x, y

@@ -6,6 +6,7 @@ ICC.1 defines them. Profiles of tables ("A2B0") state no curves.
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.errors import InputError
+from cmpdesign.inputs.files import read_file
 from extractor.image.response import Response, light_of_values
 
 Values = NDArray[np.float64]
@@ -29,9 +32,9 @@ def stated_response(path: str | Path) -> Response | None:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(read_file(path))) as image:
             info: dict[Any, Any] = dict(image.info)
-    except (OSError, UnidentifiedImageError, ValueError, Image.DecompressionBombError):
+    except (InputError, OSError, UnidentifiedImageError, ValueError, Image.DecompressionBombError):
         return None
     profile = info.get("icc_profile")
     if isinstance(profile, bytes) and profile:

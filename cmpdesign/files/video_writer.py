@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import OutputError
+from cmpdesign.files.atomic import Stage
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}  # FFV1 is lossless
 
 
 class VideoWriter:
-    """Writes frames to ``<stem>.part<suffix>``; ``close`` completes and renames the file.
+    """Writes frames to a file of a random name; ``close`` completes and renames the file.
 
     Args:
         path: file with a suffix of ``CODECS``.
@@ -22,8 +23,8 @@ class VideoWriter:
     """
 
     def __init__(self, path: Path, fps: float) -> None:
-        self._path, self._part = path, path.with_name(f"{path.stem}.part{path.suffix}")
-        self._fps, self._frames = fps, 0
+        self._path, self._fps, self._frames = path, fps, 0
+        self._stage: Stage | None = None
         self._writer: Any = None
 
     def add(self, picture: NDArray[np.uint8]) -> None:
@@ -42,12 +43,17 @@ class VideoWriter:
 
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._stage = Stage(self._path.parent)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
         codec = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix])
-        self._writer = cv2.VideoWriter(str(self._part), codec, self._fps, size)
+        self._writer = cv2.VideoWriter(str(self._staged(self._stage)), codec, self._fps, size)
         if not self._writer.isOpened():
+            self.discard()
             raise OutputError(f"{self._path}: cannot be written as a video")
+
+    def _staged(self, stage: Stage) -> Path:
+        return stage.folder / f"video{self._path.suffix}"
 
     def close(self) -> None:
         """Complete the video and check the number of frames, because OpenCV does not report a full disk.
@@ -55,25 +61,39 @@ class VideoWriter:
         Raises:
             OutputError: frames are missing, or the file cannot be renamed.
         """
-        import cv2
-
-        if self._writer is None:
+        if self._stage is None:
             return
         self._writer.release()
-        written = cv2.VideoCapture(str(self._part))
-        frames = int(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
-        written.release()
-        if frames < self._frames:
-            raise OutputError(
-                f"{self._path}: holds {frames} of {self._frames} frames; is the disk full? It is kept as {self._part}"
-            )
+        staged, frames = self._staged(self._stage), 0
         try:
-            self._part.replace(self._path)
+            frames = count_frames(staged)
+            if frames >= self._frames:
+                self._stage.commit(staged, self._path)
+                return
+            kept = self._path.with_name(f"{self._path.stem}.incomplete{self._path.suffix}")
+            staged.replace(kept)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        finally:
+            self.discard()
+        raise OutputError(
+            f"{self._path}: {frames} of {self._frames} frames could be written; is the disk full? "
+            f"They are kept in {kept}"
+        )
 
     def discard(self) -> None:
         """Remove the unfinished file."""
-        if self._writer is not None:
+        if self._stage is not None:
             self._writer.release()
-            self._part.unlink(missing_ok=True)
+            self._stage.close()
+            self._stage = None
+
+
+def count_frames(path: Path) -> int:
+    """The number of frames that a video file declares; 0 for a file that is no video."""
+    import cv2
+
+    video = cv2.VideoCapture(str(path))
+    frames = int(video.get(cv2.CAP_PROP_FRAME_COUNT)) if video.isOpened() else 0
+    video.release()
+    return frames

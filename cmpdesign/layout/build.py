@@ -18,6 +18,8 @@ from cmpdesign.patterns import PatternShape, registered_patterns
 from cmpdesign.patterns.graphs import MarkerGraph
 from cmpdesign.patterns.numbering import Ints
 
+MOST_VIRTUAL_MARKERS = 4_000_000  # of a layout; readers refuse more
+
 
 def build_layout(design: Design) -> Layout:
     """Build the layout of a design: every marker, cell and edge, in the layout frame (mm).
@@ -26,8 +28,8 @@ def build_layout(design: Design) -> Layout:
     position in the arrays is its id. ``Layout.present`` marks the markers that can be seen.
 
     Raises:
-        DesignError: the sizes cannot be resolved, or the clip outline removes the reference cell or one of its
-            neighbours.
+        DesignError: the sizes cannot be resolved, there are too many virtual markers, or the clip outline removes the
+            reference cell or one of its neighbours.
 
     >>> from cmpdesign import load_design
     >>> layout = build_layout(load_design("honeycomb", {"layers": "10", "pitch_mm": "1.5"}))
@@ -50,6 +52,8 @@ def build_layout(design: Design) -> Layout:
         outline_mm = clip_outline(design)
         graph = _clip_graph(design, graph, xy_mm - centre_mm)
 
+    edges = _edges(graph.corners)
+    _require_few_virtual_markers(design, len(edges))
     return Layout(
         pattern=design.pattern,
         parameters=_layout_parameters(design, shape, pitch_mm),
@@ -58,7 +62,7 @@ def build_layout(design: Design) -> Layout:
         marker_xy_mm=_round_points(xy_mm),
         cell_corners=graph.corners.astype(np.int32),
         cell_color=graph.color,
-        edges=_edges(graph.corners),
+        edges=edges,
         virtual_per_edge=design.virtual_per_edge,
         reference_cell=graph.reference_cell,
         reference_marker=graph.reference_marker,
@@ -68,6 +72,14 @@ def build_layout(design: Design) -> Layout:
         fiducials_mm=_round_points(fiducial_positions(design.fiducials, outline_mm + centre_mm)),
         fiducial_diameter_mm=design.fiducials.diameter_mm if design.fiducials.count else 0.0,
     )
+
+
+def _require_few_virtual_markers(design: Design, edges: int) -> None:
+    if design.virtual_per_edge * edges > MOST_VIRTUAL_MARKERS:
+        raise DesignError(
+            f"virtual_per_edge = {design.virtual_per_edge} on {edges} edges is more than {MOST_VIRTUAL_MARKERS} "
+            f"virtual markers, which readers refuse; make it at most {MOST_VIRTUAL_MARKERS // edges}"
+        )
 
 
 def _clip_graph(design: Design, graph: MarkerGraph, xy_mm: Points) -> MarkerGraph:

@@ -79,11 +79,11 @@ def check_design(
 
     >>> from cmpdesign import load_design
     >>> [str(finding) for finding in check_design(load_design("honeycomb", {"pitch_mm": "0.3mm"}))]
-    ['smallest cell (inscribed circle): 0.173 mm, limit 0.3 mm; make pitch_mm larger or layers fewer']
+    ['smallest cell (inscribed circle): 0.173 mm, limit 0.3 mm; make pitch_mm larger']
     """
     layout = layout or build_layout(design)
     findings = [
-        *_size_findings(layout),
+        *_size_findings(design, layout),
         *_camera_findings(layout, camera_px),
         *_structure_findings(design, layout),
         *_color_findings(layout),
@@ -91,7 +91,7 @@ def check_design(
     return sorted(findings, key=lambda finding: finding.severity)
 
 
-def _size_findings(layout: Layout) -> Iterator[Finding]:
+def _size_findings(design: Design, layout: Layout) -> Iterator[Finding]:
     width_mm = float(cell_widths_mm(layout).min())
     yield from _findings_below(
         "smallest cell (inscribed circle)",
@@ -99,7 +99,7 @@ def _size_findings(layout: Layout) -> Iterator[Finding]:
         CELL_ERROR_MM,
         CELL_WARNING_MM,
         "mm",
-        "make pitch_mm larger or layers fewer",
+        _larger_cells_remedy(design),
     )
     angle_deg = float(cell_angles_deg(layout).min())
     yield from _findings_below(
@@ -110,6 +110,14 @@ def _size_findings(layout: Layout) -> Iterator[Finding]:
         "deg",
         'bring aspect nearer to 1, or choose spacing = "arc"',
     )
+
+
+def _larger_cells_remedy(design: Design) -> str:
+    """What makes cells larger: with a given pitch the pitch alone, with an overall size also fewer layers."""
+    if design.pitch_mm is not None:
+        return "make pitch_mm larger"
+    sizes = [name for name in ("width_mm", "height_mm") if getattr(design, name) is not None]
+    return f"make {' and '.join(sizes)} larger or layers fewer"
 
 
 def _camera_findings(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ The colors are checked from image and layout alone, independently of the extract
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
+from cmpdesign.reading.other_pattern import other_pattern_reason
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -89,7 +90,11 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
     """
     if not 0 <= min_share <= 1:
         raise CmpDesignError(f"min_share is {min_share:g}; expected a share from 0 to 1")
-    return judge_markers(reference, image, extractor.extract(image), min_share)
+    verdict = judge_markers(reference, image, extractor.extract(image), min_share)
+    if verdict.verified:
+        return verdict
+    misfit = other_pattern_reason(reference, image, verdict.markers)
+    return verdict if misfit is None else replace(verdict, reason=misfit)
 
 
 def judge_markers(
@@ -129,6 +134,7 @@ def _not_found_reason(markers: Markers) -> str | None:
         "no_pattern": "no triangles of the pattern were found",
         "reference_lost": "the white reference cell was not found",
         "ambiguous": "the numbering is ambiguous",
+        "several_pads": "several white cells agree with the cells around them; show one pad alone",
     }
     return words.get(str(markers.reason), "no marker was found")
 
@@ -203,9 +209,15 @@ def _cell_levels(image: Image, corners: NDArray[np.float64]) -> NDArray[np.float
     """(N, 3) mean R, G, B of (N, K, 2) cells, sampled at the centre and part of the way to each corner."""
     import cv2
 
+    from extractor.image.input import in_native_order
+
     centre = corners.mean(axis=1, keepdims=True)
     points = np.concatenate([centre, centre + _SAMPLE_REACH * (corners - centre)], axis=1).astype(np.float32)
     sampled = cv2.remap(
-        image, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        in_native_order(image),
+        points[..., 0],
+        points[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
     )
     return np.asarray(sampled.astype(np.float64).mean(axis=1)[:, ::-1])

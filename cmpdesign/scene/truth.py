@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import OutputError
+from cmpdesign.errors import InputError, OutputError
+from cmpdesign.files.atomic import staged_file
+from cmpdesign.files.npz import NpzError, read_npz
+from cmpdesign.inputs.files import MOST_DATA_BYTES
 from cmpdesign.scene.errors import SceneError
 
 
@@ -73,13 +76,10 @@ def _truth_columns(truth: Truth) -> dict[str, Any]:
 
 def _save_npz(columns: dict[str, Any], path: str | Path) -> Path:
     path = Path(path)
-    partial = path.with_name(path.name + ".part")
     try:
-        with partial.open("wb") as file:
+        with staged_file(path) as staged, staged.open("xb") as file:
             np.savez_compressed(file, **columns)
-        partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror or error}; choose another place") from error
     return path
 
@@ -106,15 +106,19 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
     if "time_s" not in columns:
         raise SceneError(f"{path} holds no sequence; read it with load_truth")
     time_s = columns.pop("time_s")
-    frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
+    try:
+        frames = [{name: values[i] for name, values in columns.items()} for i in range(len(time_s))]
+    except (TypeError, IndexError) as error:
+        raise SceneError(f"{path} is not a truth file ({error}); write one with save_truths") from error
     return [_truth_from_columns(frame, path) for frame in frames], time_s
 
 
 def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except (OSError, ValueError, TypeError, AttributeError, EOFError) as error:
+        return read_npz(path, most_bytes=MOST_DATA_BYTES)
+    except InputError as error:
+        raise SceneError(str(error)) from None
+    except NpzError as error:
         raise SceneError(f"{path} is not a truth file ({error}); write one with save_truth") from error
 
 

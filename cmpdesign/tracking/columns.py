@@ -8,6 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.inputs.texts import visible
+
 Columns = dict[str, NDArray[Any]]
 
 
@@ -43,7 +45,7 @@ def head_columns(frames: Sequence[Any]) -> Columns:
         "frame": np.array([frame.index for frame in frames], np.int64),
         "time_s": np.array([frame.time_s for frame in frames], np.float64),
         "frame_status": np.array([frame.status for frame in frames], np.uint8),
-        "reason": np.array([frame.reason for frame in frames], REASON),
+        "reason": np.array([visible(frame.reason) for frame in frames], REASON),
         "elapsed_ms": np.array([frame.elapsed_ms for frame in frames], np.float32),
     }
 

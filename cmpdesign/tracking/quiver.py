@@ -18,6 +18,8 @@ SIDE_PX = 1000  # the longer side of the drawing
 MARGIN_PX = 60
 FOOT_PX = 70
 LONGEST_EDGES = 1.5  # length of the longest arrow (about), in median edges
+NOISE_EDGES = 0.15  # largest length of an arrow of the noise's standard deviation, in median edges
+NOISE_BGR = (60, 60, 200)
 FIXED_BITS = 4  # fractional bits of OpenCV's coordinates
 GRID_BGR = (215, 215, 215)
 TEXT_BGR = (40, 40, 40)
@@ -27,7 +29,8 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     """Draw the gridlines at rest and an arrow for every marker with a displacement.
 
     Arrows have the direction of the image. They are magnified by the integer factor in the caption and colored by
-    their length.
+    their length. A circle beside the caption has the radius of the noise, magnified as the arrows are; noise alone is
+    not magnified to arrows that look like a motion.
 
     Returns:
         (H, W, 3) uint8 BGR.
@@ -43,13 +46,15 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     _draw_polylines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], GRID_BGR, 1)
     length = np.linalg.norm(frame.displacement_px[known], axis=1)
     largest = float(length.max()) if len(length) else 0.0
-    magnification = _magnification(lines, largest * scale)
+    noise_px = displacement_sigma_px(frame)
+    magnification = _magnification(lines, largest * scale, noise_px * scale)
     tips = points[known] + frame.displacement_px[known] * scale * magnification
     shade = np.round(255 * length / max(largest, 1e-12)).astype(np.uint8)
     colors = cv2.applyColorMap(shade[:, None], cv2.COLORMAP_VIRIDIS)[:, 0] if len(shade) else shade
     for start, tip, color in zip(points[known], tips, colors, strict=True):
         _draw_arrow(canvas, start, tip, tuple(int(c) for c in color))
     _draw_footer(canvas, frame, largest, magnification)
+    _draw_noise(canvas, noise_px, noise_px * scale * magnification)
     return canvas
 
 
@@ -59,10 +64,22 @@ def _drawing_scale(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float6
     return (SIDE_PX - 2 * MARGIN_PX) / max(float((high - low).max()), 1.0), low
 
 
-def _magnification(lines: NDArray[np.float64], longest: float) -> int:
-    """The factor for arrows, from (E, 2, 2) edges and the longest arrow in the drawing, px."""
+def displacement_sigma_px(frame: Tracked) -> float:
+    """The standard deviation of a displacement per axis: that of the frame's measured markers, and as much at rest.
+
+    0 where no marker is measured.
+    """
+    variances = frame.markers.cov_px2[frame.markers.status == 1][:, (0, 1), (0, 1)]
+    return float(np.sqrt(2 * np.median(variances))) if variances.size else 0.0
+
+
+def _magnification(lines: NDArray[np.float64], longest: float, noise: float) -> int:
+    """The factor for arrows, from (E, 2, 2) edges, the longest arrow and the noise in the drawing, px."""
     edge = float(np.nanmedian(np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1)))
-    return max(1, int(LONGEST_EDGES * edge / max(longest, 1e-9))) if longest > 0 else 1
+    factors = [
+        edges * edge / size for edges, size in ((LONGEST_EDGES, longest), (NOISE_EDGES, noise)) if size > 0
+    ]
+    return max(1, int(min(factors))) if longest > 0 else 1
 
 
 def _draw_polylines(canvas: Picture, lines: NDArray[np.float64], color: Any, thickness: int) -> None:
@@ -96,3 +113,17 @@ def _draw_footer(canvas: Picture, frame: Tracked, largest_px: float, magnificati
     text = f"0 to {largest_px:.3g} px{largest_mm}; arrows x {magnification}; frame {frame.index}"
     baseline = (left, top + 42)
     cv2.putText(canvas, text, baseline, cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)
+
+
+def _draw_noise(canvas: Picture, noise_px: float, radius: float) -> None:
+    """Draw the standard deviation of a displacement as a circle in the scale of the arrows, with its value."""
+    import cv2
+
+    height, width = canvas.shape[:2]
+    x, y = width - MARGIN_PX - 20, height - FOOT_PX // 2
+    fixed = 1 << FIXED_BITS
+    cv2.circle(canvas, (x * fixed, y * fixed), round(radius * fixed), NOISE_BGR, 1, cv2.LINE_AA, FIXED_BITS)
+    text = f"noise {noise_px:.2g} px"
+    size = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0]
+    place = (x - size[0] - 25, y + size[1] // 2 - 12)
+    cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, NOISE_BGR, 1, cv2.LINE_AA)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
+from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.overlay import OverlayWriter
-from cmpdesign.tracking.sinks import FrameSink
+from cmpdesign.tracking.sinks.tables import FrameSink
 from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:
-    from extractor import Markers, Reference
-    from extractor.image.response import Response
+    from extractor import Markers, Tracker
 
 
 @dataclass(eq=False)
@@ -112,49 +112,52 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
 
 
 def read_rest_markers(
-    text: str, source: str, reference: Reference, fps: float | None, response: Response | None = None
+    text: str, source: str, fps: float | None, tracker: Tracker, most_pixels: int = MOST_PIXELS
 ) -> Markers:
     """Extract the markers at rest.
 
     Args:
         text: number of a frame of the source, or path of an image file.
         source: the source, see ``open_source``.
-        reference: the layout.
         fps: see ``open_source``.
-        response: see ``Extractor``.
+        tracker: a new tracker; it reads the image as a tracker like it reads the frames.
+        most_pixels: see ``open_source``.
 
     Raises:
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
-    from extractor import Extractor
-
-    markers = Extractor(reference, response=response).extract(read_rest_image(text, source, fps))
+    markers = tracker.track(read_rest_image(text, source, fps, most_pixels)).markers
     if markers.reason is not None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
     return markers
 
 
-def read_rest_image(text: str, source: str, fps: float | None) -> Any:
+def read_rest_image(text: str, source: str, fps: float | None, most_pixels: int = MOST_PIXELS) -> Any:
     """Read the image at rest; arguments as for ``read_rest_markers``.
 
     Raises:
         CmpDesignError: no such frame or image.
     """
-    image = _read_frame(int(text), source, fps) if text.isdecimal() else read_image(Path(text))
+    image = (
+        _read_frame(int(text), source, fps, most_pixels)
+        if text.isdecimal()
+        else read_image(Path(text), most_pixels)
+    )
     if image is None:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(f"at rest: {name} cannot be read; choose another")
     return image
 
 
-def _read_frame(number: int, text: str, fps: float | None) -> Any:
-    source = open_source(text, fps)
-    if source.name.startswith("camera"):
+def _read_frame(number: int, text: str, fps: float | None, most_pixels: int) -> Any:
+    source = open_source(text, fps, most_pixels)
+    if source.is_live:
         raise CmpDesignError(
-            f"at rest, frame {number}: a camera's frames cannot be read ahead; give an image file"
+            f"at rest, frame {number}: a {source.name.partition(' ')[0]}'s frames cannot be read ahead; "
+            "give an image file"
         )
     for index, frame in enumerate(source.frames()):
         if index == number:
             return frame.image
-    raise CmpDesignError(f"at rest, frame {number}: {text} has fewer frames")
+    raise CmpDesignError(f"at rest, frame {number}: {source.name} has fewer frames")

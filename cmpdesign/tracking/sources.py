@@ -1,8 +1,9 @@
-"""Sources of frames: a video, a folder of images, a camera. An unreadable frame counts as a frame."""
+"""Sources of frames: a video, a folder of images, a camera, a stream. An unreadable frame counts as a frame."""
 
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,11 +11,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.files.image_folders import find_images
 from cmpdesign.files.images import ImageFileError, read_image
+from cmpdesign.inputs.files import MOST_PIXELS, is_folder, is_regular_file, path_exists
 
-IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 DEFAULT_FPS = 30.0
 MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
+STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits no longer
+_ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
 
 
 class SourceError(CmpDesignError, ValueError):
@@ -44,35 +48,52 @@ class FrameSource(Protocol):
         total: number of frames that the source declares; None if unknown.
         fps: frames per second; None if unknown.
         ended_early: after the last frame, the reason for an early end; "" if all frames were read.
+        is_live: the frames come as they are taken: no number is declared, and only a stop ends them.
     """
 
     name: str
     total: int | None
     fps: float | None
     ended_early: str
+    is_live: bool
 
     def frames(self) -> Iterator[SourceFrame]: ...
 
 
-def open_source(text: str, fps: float | None = None) -> FrameSource:
+def open_source(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
     """Open a source.
 
     Args:
-        text: number of a camera, or path of a folder of images or of a video file.
+        text: number of a camera, address of a stream ("rtsp://..."), or path of a folder of images or of a video.
         fps: frames per second of a folder (default 30), or in place of a video's own rate.
+        most_pixels: limit of width x height of an image or of a frame.
 
     Raises:
         SourceError: the source cannot be opened.
     """
+    if _ADDRESS.match(text):
+        return LiveSource(
+            text,
+            f"stream {without_password(text)}",
+            "is the address right, and is it switched on?",
+            most_pixels,
+        )
     path = Path(text)
-    if text.isdecimal() and not path.exists():
-        return CameraSource(int(text))
-    if path.is_dir():
-        return FolderSource(path, fps or DEFAULT_FPS)
-    return VideoSource(path, fps)
+    if text.isdecimal() and not path_exists(path):
+        return LiveSource(
+            int(text), f"camera {text}", "is it connected, and free of other programs?", most_pixels
+        )
+    if is_folder(path):
+        return FolderSource(path, fps or DEFAULT_FPS, most_pixels)
+    return VideoSource(path, fps, most_pixels)
 
 
-def open_sources(text: str, fps: float | None = None) -> FrameSource:
+def without_password(text: str) -> str:
+    """A source's text as it may be shown: the address of a stream without user and password."""
+    return re.sub(r"^([a-z]+://)[^/@]*@", r"\1", text, flags=re.IGNORECASE)
+
+
+def open_sources(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
     """Open a source, or of a list with commas one source for each view; see ``open_source``.
 
     Raises:
@@ -80,15 +101,15 @@ def open_sources(text: str, fps: float | None = None) -> FrameSource:
     """
     names = split_list(text)
     return (
-        MultiViewSource([open_source(name, fps) for name in names])
+        MultiViewSource([open_source(name, fps, most_pixels) for name in names])
         if len(names) > 1
-        else open_source(text, fps)
+        else open_source(text, fps, most_pixels)
     )
 
 
 def split_list(text: str) -> list[str]:
     """Split a list with commas; a text that is the path of a file is one name."""
-    return [text] if Path(text).exists() else text.split(",")
+    return [text] if path_exists(text) else text.split(",")
 
 
 class MultiViewSource:
@@ -100,6 +121,7 @@ class MultiViewSource:
         totals = [source.total for source in sources if source.total is not None]
         self.total = min(totals) if totals else None
         self.fps = sources[0].fps
+        self.is_live = all(source.is_live for source in sources)
 
     def frames(self) -> Iterator[SourceFrame]:
         """The frames of all sources, with the first source's time stamps; an unreadable image is None in the list."""
@@ -123,51 +145,34 @@ class MultiViewSource:
 class FolderSource:
     """The images of a folder in the natural order of their names."""
 
-    def __init__(self, path: Path, fps: float) -> None:
+    is_live = False
+
+    def __init__(self, path: Path, fps: float, most_pixels: int = MOST_PIXELS) -> None:
         try:
-            self.paths = sorted(
-                (p for p in path.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES), key=_natural_sort_key
-            )
-        except OSError as error:
-            raise SourceError(f"{path}: cannot be read ({error.strerror or error})") from None
-        if not self.paths:
-            raise SourceError(
-                f"{path}: holds no image; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
-            )
+            self.paths = find_images(path)
+        except ImageFileError as error:
+            raise SourceError(str(error)) from None
         self.name, self.ended_early = str(path), ""
         self.total: int | None = len(self.paths)
         self.fps: float | None = fps
-        self._fps = fps
+        self._fps, self._most_pixels = fps, most_pixels
 
     def frames(self) -> Iterator[SourceFrame]:
         for index, path in enumerate(self.paths):
             time_s = index / self._fps
             try:
-                yield SourceFrame(time_s, read_image(path))
+                yield SourceFrame(time_s, read_image(path, self._most_pixels))
             except ImageFileError as error:
                 yield SourceFrame(time_s, None, str(error))
-
-
-def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
-    """The key of the natural order: frame2 before frame10."""
-    parts: list[tuple[int, int | str]] = []
-    digits = ""
-    for letter in path.name + "\0":
-        if letter in "0123456789":
-            digits += letter
-            continue
-        if digits:
-            parts.append((0, int(digits)))
-            digits = ""
-        parts.append((1, letter))
-    return parts
 
 
 class VideoSource:
     """A video file, read by OpenCV; time stamps are those of the file, or counted at ``fps`` if given."""
 
-    def __init__(self, path: Path, fps: float | None) -> None:
-        if not path.is_file():
+    is_live = False
+
+    def __init__(self, path: Path, fps: float | None, most_pixels: int = MOST_PIXELS) -> None:
+        if not is_regular_file(path):
             raise SourceError(
                 f"{path}: no such file or folder; expected a video, a folder of images or a camera's number"
             )
@@ -179,6 +184,7 @@ class VideoSource:
         import cv2
 
         self.name, self.ended_early = str(path), ""
+        _require_frame_size(self._capture, self.name, most_pixels)
         declared = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         own = float(self._capture.get(cv2.CAP_PROP_FPS))
         self.total = declared if 0 < declared < 1 << 30 else None
@@ -214,21 +220,29 @@ class VideoSource:
         return index / self.fps if self.fps else float("nan")
 
 
-class CameraSource:
-    """A camera by its number; time stamps are times of arrival, counted from the first frame."""
+class LiveSource:
+    """A camera by its number, or a stream by its address; time stamps are times of arrival, from the first frame.
 
-    def __init__(self, number: int) -> None:
-        self._capture = _open_capture(number)
+    Args:
+        source: number or address.
+        name: name for messages.
+        hint: question on the likely reason for a failure.
+        most_pixels: limit of width x height of a frame.
+    """
+
+    is_live = True
+
+    def __init__(self, source: int | str, name: str, hint: str, most_pixels: int = MOST_PIXELS) -> None:
+        self._capture = _open_capture(source)
         if not self._capture.isOpened():
-            raise SourceError(
-                f"camera {number} cannot be opened; is it connected, and free of other programs?"
-            )
-        self.name, self.ended_early = f"camera {number}", ""
+            raise SourceError(f"{name} cannot be opened; {hint}")
+        _require_frame_size(self._capture, name, most_pixels)
+        self.name, self.ended_early = name, ""
         self.total: int | None = None
         self.fps: float | None = None
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Frames until the camera stops."""
+        """Frames until the camera or stream stops."""
         start: float | None = None
         failed, index = 0, 0
         try:
@@ -241,11 +255,23 @@ class CameraSource:
                     yield SourceFrame(now - start, image)
                 else:
                     failed += 1
-                    yield SourceFrame(now - start, None, "the camera gave no image")
+                    yield SourceFrame(now - start, None, f"the {self.name.partition(' ')[0]} gave no image")
                 index += 1
         finally:
             self._capture.release()
-        self.ended_early = f"the camera stopped after {index - failed} frames"
+        self.ended_early = f"the {self.name.partition(' ')[0]} stopped after {index - failed} frames"
+
+
+def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
+    """Raise ``SourceError`` for declared frames of more than ``most_pixels`` pixels."""
+    import cv2
+
+    width, height = (int(capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    if width * height > most_pixels:
+        raise SourceError(
+            f"{name}: its frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
+            "(--max-pixels)"
+        )
 
 
 def _open_capture(source: str | int) -> Any:
@@ -255,7 +281,13 @@ def _open_capture(source: str | int) -> Any:
 
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    # OpenCV's own reader of AVI files prints letters of the file; it is not tried where there is FFmpeg.
+    has_ffmpeg = isinstance(source, str) and cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
     try:
-        return cv2.VideoCapture(source)
+        if isinstance(source, str) and _ADDRESS.match(source):
+            limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, STREAM_TIMEOUT_MS]
+            limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, STREAM_TIMEOUT_MS]
+            return cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
+        return cv2.VideoCapture(source, cv2.CAP_FFMPEG if has_ffmpeg else cv2.CAP_ANY)
     finally:
         cv2.utils.logging.setLogLevel(level)

@@ -121,9 +121,7 @@ class TrackStatistics:
             "starts": {str(start): count for start, count in sorted(self._starts.items()) if start != "none"},
             "marker_shares": {"measured": measured, "repaired": repaired + fitted, "lost": lost},
             "time_ms": percentiles(self._elapsed_ms),
-            "frames_per_s": {
-                name: 1e3 / ms if ms else None for name, ms in percentiles(self._elapsed_ms).items()
-            },
+            "frames_per_s": 1e3 * self.frames / sum(self._elapsed_ms) if self.frames else None,
             "rest": _rest_json(rest),
             "jitter_px": self.jitter_px,
             "jitter_pairs": self._pairs,

@@ -20,8 +20,8 @@ NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (
 def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
     """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
 
-    16-bit images are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A grayscale image ((H, W)
-    or (H, W, 1)) has no color.
+    16-bit images of either byte order are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A
+    grayscale image ((H, W) or (H, W, 1)) has no color.
 
     Raises:
         ImageError: not an array, a float or signed type, another shape, or a side below 16 px.
@@ -30,7 +30,7 @@ def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
         raise ImageError(
             f"image is {type(image).__name__}; give a numpy array (H, W, 3) of uint8 in BGR order"
         )
-    if image.dtype not in (np.uint8, np.uint16):
+    if image.dtype.kind != "u" or image.dtype.itemsize > 2:
         raise ImageError(
             f"image has dtype {image.dtype}; give uint8 or uint16 (scale float images to 0..255 first)"
         )
@@ -44,10 +44,15 @@ def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
         )
     if image.ndim == 2 or image.shape[2] == 1:
         return None
-    color = image[:, :, :3]
+    color = in_native_order(image[:, :, :3])
     if color.dtype == np.uint16:
         color = cv2.convertScaleAbs(color, alpha=1 / 257)
     return np.ascontiguousarray(color, dtype=np.uint8)
+
+
+def in_native_order(image: NDArray[Any]) -> NDArray[Any]:
+    """The image in the byte order of this machine: OpenCV reads the bytes of another order as they lie."""
+    return image if image.dtype.isnative else image.astype(image.dtype.newbyteorder("="))
 
 
 @compiled

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.json_fields import fail
+from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates
 
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
 
 BLACK, WHITE = 3, 4
+# Axial corners of the cells (0, 0).
+UP_CORNERS, DOWN_CORNERS = np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 0], [0, 1], [-1, 1]])
 
 
 def check_consistency(reference: Reference) -> None:
@@ -31,6 +34,9 @@ def check_consistency(reference: Reference) -> None:
     _check_reference_cell(reference, triangular)
     if triangular:
         _check_colors(reference)
+        _check_lattice(reference)
+    else:
+        _check_grid(reference)
     if len(reference.outline_mm) < 3 or polygon_area(reference.outline_mm[None])[0] <= 0:
         fail(
             "outline", f"a polygon of {len(reference.outline_mm)} points", "three or more, counter-clockwise"
@@ -150,3 +156,52 @@ def _check_colors(reference: Reference) -> None:
     wrong = inner[polygon_area(centers) >= 0]
     if len(wrong):
         fail("cells.color", f"counter-clockwise around marker {wrong[0]}", "red, green, blue clockwise")
+
+
+def _check_lattice(reference: Reference) -> None:
+    """Check that cells and edges are those of the triangular lattice, so that no marker has more than six edges.
+
+    The corners of the up-cell (q, r) add up to (3q + 1, 3r + 1), those of the down-cell (q, r) to (3q - 1, 3r + 2).
+    """
+    axial = axial_coordinates(reference.layer, reference.index)
+    corners = axial[reference.cell_corners]
+    total = corners.sum(axis=1)
+    up = (total % 3 == 1).all(axis=1)
+    base = (total - np.where(up[:, None], (1, 1), (-1, 2))) // 3
+    steps = np.where(up[:, None, None], UP_CORNERS, DOWN_CORNERS)
+    # The corners are different markers, so they are the cell's if each is one of the three.
+    expected = (base[:, None] + steps)[:, :, None] == corners[:, None]
+    wrong = np.flatnonzero(~expected.all(axis=3).any(axis=1).all(axis=1))
+    if len(wrong):
+        first = int(wrong[0])
+        fail(
+            f"cells.corners[{first}]",
+            str(reference.cell_corners[first].tolist()),
+            "three markers that are neighbours by their layer and index",
+        )
+    step = axial[reference.edges[:, 1]] - axial[reference.edges[:, 0]]
+    _require_neighbours(reference, (step[:, None] == NEIGHBOUR_STEPS).all(axis=2).any(axis=1))
+
+
+def _check_grid(reference: Reference) -> None:
+    """Check that cells and edges are those of the square grid."""
+    place = np.stack([reference.layer, reference.index], axis=1)
+    corners = place[reference.cell_corners]
+    # Four different markers within one row and one column of each other are a cell's.
+    wrong = np.flatnonzero((np.ptp(corners, axis=1) != 1).any(axis=1))
+    if len(wrong):
+        first = int(wrong[0])
+        fail(
+            f"cells.corners[{first}]",
+            str(reference.cell_corners[first].tolist()),
+            "four markers that are neighbours by their row and column",
+        )
+    step = place[reference.edges[:, 1]] - place[reference.edges[:, 0]]
+    _require_neighbours(reference, np.abs(step).sum(axis=1) == 1)
+
+
+def _require_neighbours(reference: Reference, neighbours: NDArray[np.bool_]) -> None:
+    wrong = np.flatnonzero(~neighbours)
+    if len(wrong):
+        first = int(wrong[0])
+        fail(f"edges[{first}]", str(reference.edges[first].tolist()), "two neighbouring markers")

@@ -19,9 +19,12 @@ from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
 from extractor.layout.consistency import check_consistency
 from extractor.layout.reference import COLORS, Reference
+from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
-MAX_BYTES = 1 << 28  # of a layout file
+MAX_BYTES = 1 << 26  # of a layout file; 200 layers take 23 MiB
+MAX_VIRTUAL_PER_EDGE = 1000
+MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each
 FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
@@ -36,23 +39,7 @@ def load_layout(path: str | PathLike[str]) -> Reference:
         LayoutError: the file cannot be read, is of another format or version, or contradicts itself; one line
             that names the file, the field, the value and what is expected.
     """
-    name = str(path) if str(path).isprintable() else ascii(str(path))
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise LayoutError(f"{name}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a NUL byte in the path
-        raise LayoutError(f"{name}: cannot be read: {error}") from None
-    if len(data) > MAX_BYTES:
-        raise LayoutError(f"{name}: larger than {MAX_BYTES >> 20} MiB; expected a layout file")
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise LayoutError(
-            f"{name}: byte {error.start} is not UTF-8; expected a layout file in UTF-8"
-        ) from None
-    return parse_layout(text, name)
+    return parse_layout(read_text_file(path, MAX_BYTES, LayoutError), printable_path(path))
 
 
 def parse_layout(text: str, name: str = "layout") -> Reference:
@@ -90,7 +77,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         cell_corners=corners,
         cell_color=fields.choices(cells["color"], "cells.color", len(corners), COLORS),
         edges=fields.integer_rows(document["edges"], "edges", count - 1, (2,)),
-        virtual_per_edge=fields.integer(document["virtual_per_edge"], "virtual_per_edge", 0, 1000),
+        virtual_per_edge=_virtual_per_edge(document),
         reference_cell=fields.integer(origin["cell"], "reference.cell", 0, len(corners) - 1),
         reference_marker=fields.integer(origin["marker"], "reference.marker", 0, count - 1),
         palette=_palette(document["palette"]),
@@ -112,8 +99,7 @@ def _check_header(document: dict[str, Any]) -> None:
         if type(value) is not type(expected) or value != expected:
             found = fields.shown(value) if field in document else "missing"
             fields.fail(field, found, fields.shown(expected))
-    known = FIELDS + tuple(name for name in OPTIONAL_FIELDS if name in document)
-    fields.known_fields(document, known)
+    fields.known_fields(document, FIELDS, optional=OPTIONAL_FIELDS)
     fields.text_field(document["generator"], "generator")
 
 
@@ -121,7 +107,20 @@ def _parameters(value: object) -> dict[str, Any]:
     parameters = fields.mapping(value, "parameters")
     if type(parameters.get("mirrored", False)) is not bool:
         fields.fail("parameters.mirrored", fields.shown(parameters["mirrored"]), "true or false")
+    fields.require_plain_values(parameters, "parameters")
     return parameters
+
+
+def _virtual_per_edge(document: dict[str, Any]) -> int:
+    count = fields.integer(document["virtual_per_edge"], "virtual_per_edge", 0, MAX_VIRTUAL_PER_EDGE)
+    edges = len(document["edges"])
+    if count * edges > MAX_VIRTUAL_MARKERS:
+        fields.fail(
+            "virtual_per_edge",
+            f"{count} on {edges} edges",
+            f"at most {MAX_VIRTUAL_MARKERS} virtual markers, {MAX_VIRTUAL_MARKERS // edges} an edge",
+        )
+    return count
 
 
 def _palette(value: object) -> dict[str, str]:

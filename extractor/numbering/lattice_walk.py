@@ -22,9 +22,10 @@ from extractor.numbering.mesh_parts import largest_components, marker_turns, mos
 from extractor.numbering.outline_fit import align_to_outline
 from extractor.numbering.white_search import LayoutPlacement, placements_by_white_cell
 from extractor.numeric.compilation import compiled
-from extractor.result import Origin
+from extractor.result import Origin, Reason
 
 MIN_SCORE_LEAD = 2  # cells, of the best reference over the next one in its component of the mesh
+MAX_MORE_MISSING = 2  # neighbours that a second pad misses more than the best; an outline in view is many
 MIN_RELATIVE_WHITENESS = 0.75  # of the whitest candidate; less white ones are no white cells
 # A component of the mesh is this pattern if it shows this share of the pattern's cells and hardly any cell is outside.
 MIN_LAYOUT_SHARE = 0.06
@@ -47,7 +48,7 @@ class Numbering:
         mirrored: the pattern is seen from its back.
         white_px: (2,) float64, the center of the white cell; NaN if the outline gave the origin.
         conflicts: number of cells left out because their neighbours contradict each other.
-        ambiguous: two white cells are equally possible.
+        doubt: why the reference is not certain; None where it is.
         origin: what gave the origin.
         white_adjacent: the white cell touches cells that were numbered by it.
     """
@@ -56,7 +57,7 @@ class Numbering:
     mirrored: bool
     white_px: NDArray[np.float64]
     conflicts: int
-    ambiguous: bool = False
+    doubt: Reason | None = None
     origin: Origin = Origin.WHITE
     white_adjacent: bool = True
 
@@ -85,6 +86,8 @@ class _Candidate(NamedTuple):
     Attributes:
         inside: number of walked cells in the layout.
         score: ``inside`` minus penalties.
+        missing: see ``LayoutPlacement``.
+        fits: hardly any walked cell lies outside the layout.
         white: whiteness of the white cell.
         component: signed number of the component of the mesh.
         white_adjacent: the component touches the white cell.
@@ -93,6 +96,8 @@ class _Candidate(NamedTuple):
 
     inside: int
     score: int
+    missing: int
+    fits: bool
     white: float
     component: int
     white_adjacent: bool
@@ -211,8 +216,8 @@ def number_cells(
     """Stage 7: number the component of the mesh that holds the white cell or shows the whole outline.
 
     If several places of a component may be the white cell, the reference is the one with the most cells inside the
-    layout and the fewest outside. If components disagree, the whiter cell is the reference. The numbering is ambiguous
-    if neither rule separates the candidates.
+    layout and the fewest outside. If components disagree, the whiter cell is the reference. The numbering is in doubt
+    if neither rule separates the candidates, or if another white cell has the surroundings of a reference, too.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -236,7 +241,7 @@ def number_cells(
         placements = placements_by_white_cell(image, cells, lattice, walk.axial) if is_any_large else []
         own = [_score_placement(placement, walk) for placement in placements]
         found += own
-        if not any(one.inside >= min_cells for one in own):
+        if not any(one.fits and one.inside >= min_cells for one in own):
             no_white.append(walk)
     best = _select_candidate(found, min_cells, 0.5 * cells.edge_px)
     for walk in no_white:
@@ -247,13 +252,13 @@ def number_cells(
 
 
 def _select_candidate(found: list[_Candidate], min_cells: float, distance_px: float) -> _Candidate | None:
-    """The best candidate with at least ``min_cells`` cells inside.
+    """The best candidate that fits with at least ``min_cells`` cells inside.
 
-    It is ambiguous if a candidate with the white cell farther away than ``distance_px`` is nearly as good.
+    It is in doubt if a candidate with the white cell farther away than ``distance_px`` is nearly as good.
     """
-    white = MIN_RELATIVE_WHITENESS * max((one.white for one in found), default=0.0)
+    white = MIN_RELATIVE_WHITENESS * max((one.white for one in found if one.fits), default=0.0)
     found = [one for one in found if one.white >= white]
-    large = [one for one in found if one.inside >= min_cells]
+    large = [one for one in found if one.fits and one.inside >= min_cells]
     best = max(large, key=lambda one: (one.white_adjacent, one.score), default=None)
     if best is None:
         return None
@@ -261,9 +266,25 @@ def _select_candidate(found: list[_Candidate], min_cells: float, distance_px: fl
     rivals = [
         one for one in found if one is not best and np.hypot(*(one.numbering.white_px - middle)) > distance_px
     ]
-    if any(one.component != best.component or best.score - one.score < MIN_SCORE_LEAD for one in rivals):
-        return best._replace(numbering=replace(best.numbering, ambiguous=True))
-    return best
+    doubt = _doubt(best, rivals, min_cells)
+    return best if doubt is None else best._replace(numbering=replace(best.numbering, doubt=doubt))
+
+
+def _doubt(best: _Candidate, rivals: list[_Candidate], min_cells: float) -> Reason | None:
+    """The reason why the best candidate is not certain.
+
+    A rival with the surroundings of a reference is a second pad: of its layout no more cells are missing in the image
+    than of the best. A white place within a single pad misses the cells beyond the pad's outline, if that is in view.
+    """
+    others = [one for one in rivals if one.component != best.component and one.fits]
+    beside = [one for one in rivals if one.component == best.component]
+    if any(one.inside >= min_cells for one in others) or any(
+        one.missing - best.missing <= MAX_MORE_MISSING for one in beside
+    ):
+        return Reason.SEVERAL_PADS
+    if others or any(one.fits and best.score - one.score < MIN_SCORE_LEAD for one in beside):
+        return Reason.AMBIGUOUS
+    return None
 
 
 @compiled
@@ -291,7 +312,16 @@ def _score_placement(placement: LayoutPlacement, walk: _WalkedComponent) -> _Can
     numbering = Numbering(
         placement.cell, walk.front < 0, placement.white_px, walk.conflicts, white_adjacent=is_adjacent
     )
-    return _Candidate(inside, score, placement.white, walk.component, is_adjacent, numbering)
+    return _Candidate(
+        inside,
+        score,
+        placement.missing,
+        placement.fits,
+        placement.white,
+        walk.component,
+        is_adjacent,
+        numbering,
+    )
 
 
 def _candidate_from_outline(lattice: Lattice, walk: _WalkedComponent) -> _Candidate | None:
@@ -301,4 +331,4 @@ def _candidate_from_outline(lattice: Lattice, walk: _WalkedComponent) -> _Candid
         return None
     inside, nowhere = int(np.count_nonzero(cell >= 0)), np.full(2, np.nan)
     numbering = Numbering(cell, walk.front < 0, nowhere, walk.conflicts, origin=Origin.OUTLINE)
-    return _Candidate(inside, inside, 0.0, 0, False, numbering)
+    return _Candidate(inside, inside, 0, True, 0.0, 0, False, numbering)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
-from extractor.layout.lattice import rotated_cell
+from extractor.layout.lattice import NEIGHBOUR_STEPS, rotated_cell
 from extractor.layout.lattice_tables import Lattice, cell_at
 from extractor.localmap.cell_prediction import (
     MAX_OUTSIDE_SHARE,
@@ -45,6 +45,8 @@ class LayoutPlacement(NamedTuple):
     Attributes:
         cell: (N,) int32, the layout's cell of each cell of the image, or -1.
         inside, outside: how many walked cells lie in the layout, and how many do not.
+        missing: how often a neighbour of a walked cell lies in the layout and in the image, but was not found.
+        fits: hardly any walked cell lies outside the layout.
         white_px: (2,) the center of the white cell.
         white: its whiteness: its weakest channel, relative to the ink with most of that channel.
         white_adjacent: walked cells touch the white cell.
@@ -53,6 +55,8 @@ class LayoutPlacement(NamedTuple):
     cell: NDArray[np.int32]
     inside: int
     outside: int
+    missing: int
+    fits: bool
     white_px: NDArray[np.float64]
     white: float
     white_adjacent: bool
@@ -65,6 +69,7 @@ class _WhiteCandidates(NamedTuple):
         ring: the ring around the known cells in which they were found, -1 if none was.
         cell: (P, N) int32, the layout's cell of each cell of the image, or -1.
         inside: (P,) int64, how many known cells lie in the layout; 0 where the white cell is not there.
+        missing: (P,) int64, see ``LayoutPlacement``.
         center_px: (P, 2) float64, the center of the white cell, NaN where it is not there.
         brightness, whiteness: (P,) float64.
     """
@@ -72,6 +77,7 @@ class _WhiteCandidates(NamedTuple):
     ring: int
     cell: NDArray[np.int32]
     inside: NDArray[np.int64]
+    missing: NDArray[np.int64]
     center_px: NDArray[np.float64]
     brightness: NDArray[np.float64]
     whiteness: NDArray[np.float64]
@@ -80,7 +86,9 @@ class _WhiteCandidates(NamedTuple):
 def placements_by_white_cell(
     image: NDArray[np.uint8], cells: Cells, lattice: Lattice, axial: NDArray[np.int32]
 ) -> list[LayoutPlacement]:
-    """All placements with the white cell at a bright place that leave hardly any cell outside the layout.
+    """All placements with the white cell at a bright place; one of them leaves hardly any cell outside the layout.
+
+    The others are white cells, too, but the walked cells are not this layout around them.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -99,18 +107,21 @@ def placements_by_white_cell(
         lattice.layers, lattice.cell_lookup, *lattice.white_cell_frame, lattice.center_mm
     )
     found = _search_white_cell(image, center, axial, known, inks, layout)
-    fits = np.flatnonzero(found.inside)
+    is_fit = _fits(found.inside, len(index))
+    brightest = found.brightness[is_fit].max(initial=0.0)
     return [
         LayoutPlacement(
             found.cell[n],
             int(found.inside[n]),
             len(index) - int(found.inside[n]),
+            int(found.missing[n]),
+            bool(is_fit[n]),
             found.center_px[n],
             float(found.whiteness[n]),
             found.ring == 0,
         )
-        for n in fits
-        if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * found.brightness[fits[0]]
+        for n in np.flatnonzero(found.inside)
+        if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest
     ]
 
 
@@ -142,17 +153,21 @@ def _search_white_cell(image, center, axial, known, inks, layout):  # type: igno
         if bright.shape[0] == 0:
             continue
         candidates = places.axial[bright]
-        cell, inside, middle = _verify_placements(
+        cell, inside, missing, middle = _verify_placements(
             image, center, axial, known.cells, candidates, layout, inks.colors, black
         )
-        if inside.any():
+        if _fits(inside, known.cells.shape[0]).any():
             brightness, whiteness = shown.brightness[bright], shown.whiteness[bright]
-            return _WhiteCandidates(ring, cell, inside, middle, brightness, whiteness)
+            return _WhiteCandidates(ring, cell, inside, missing, middle, brightness, whiteness)
         update_excluded_places(grid, candidates)
-    nothing = np.empty(0)
-    return _WhiteCandidates(
-        -1, np.empty((0, 0), np.int32), np.empty(0, np.int64), np.empty((0, 2)), nothing, nothing
-    )
+    nothing, none = np.empty(0), np.empty(0, np.int64)
+    return _WhiteCandidates(-1, np.empty((0, 0), np.int32), none, none, np.empty((0, 2)), nothing, nothing)
+
+
+@compiled
+def _fits(inside, count):  # type: ignore[no-untyped-def]
+    """(P,) bool, whether hardly any of ``count`` known cells lies outside the layout."""
+    return (inside > 0) & (count - inside <= MAX_OUTSIDE_SHARE * count)
 
 
 @compiled
@@ -184,38 +199,89 @@ def _select_brightest(brightness, whiteness, least):  # type: ignore[no-untyped-
 
 @compiled
 def _verify_placements(image, center, axial, known, places, layout, inks, black):  # type: ignore[no-untyped-def]
-    """``cell``, ``inside`` and ``center_px`` of ``_WhiteCandidates`` at the axial ``places`` (P, 2)."""
+    """``cell``, ``inside``, ``missing`` and ``center_px`` of ``_WhiteCandidates`` at the axial ``places`` (P, 2)."""
     cell, inside = np.empty((places.shape[0], axial.shape[0]), np.int32), np.zeros(places.shape[0], np.int64)
-    middle = np.full((places.shape[0], 2), np.nan)
+    missing, middle = np.zeros(places.shape[0], np.int64), np.full((places.shape[0], 2), np.nan)
+    walked, first = _walked_lookup(axial, known)
     for n in range(places.shape[0]):
         count = _fill_placement(axial, known, places[n], layout.cell_lookup, cell[n])
-        if count > 0:
-            middle[n] = locate_white_cell(image, center, cell[n], layout, inks, black)
-            inside[n] = 0 if np.isnan(middle[n, 0]) else count
-    return cell, inside, middle
+        middle[n] = locate_white_cell(image, center, cell[n], layout, inks, black)
+        if not np.isnan(middle[n, 0]):
+            inside[n] = count
+            missing[n] = _count_missing(
+                image.shape, center, axial, known, places[n], layout.cell_lookup, walked, first
+            )
+    return cell, inside, missing, middle
+
+
+@compiled
+def _placed(q, r, place):  # type: ignore[no-untyped-def]
+    """The layout's axial (q, r) of the image's, if the down-cell at an axial place (2,) is the white cell.
+
+    The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
+    the right, to the left or above, and a rotation by 0, 120 or 240 degrees brings it to the right.
+    """
+    turn = (place[0] - place[1]) % 3
+    return rotated_cell(q - place[0] + turn, r - place[1], turn)
 
 
 @compiled
 def _fill_placement(axial, known, place, cell_lookup, out):  # type: ignore[no-untyped-def]
     """Number the known cells (K,) as if the down-cell at an axial place (2,) were the white cell.
 
-    The inks right of, above and left of a down-cell (q, r) are (q - r) mod 3 and the next two in turn. So red is to
-    the right, to the left or above, and a rotation by 0, 120 or 240 degrees brings it to the right.
-
     Args:
         axial: (N, 2) int32; cell_lookup: as ``Lattice.cell_lookup``.
         out: (N,) int32, receives the layout's cells, or -1.
 
     Returns:
-        How many known cells lie in the layout; 0 if too many do not.
+        How many known cells lie in the layout.
     """
-    turn, outside = (place[0] - place[1]) % 3, 0
+    inside = 0
     out[:] = -1
     for i in known:
-        q, r = rotated_cell(axial[i, 0] - place[0] + turn, axial[i, 1] - place[1], turn)
+        q, r = _placed(axial[i, 0], axial[i, 1], place)
         out[i] = cell_at(cell_lookup, q, r)
-        if out[i] < 0:
-            outside += 1
-            if outside > MAX_OUTSIDE_SHARE * known.shape[0]:
-                return 0
-    return known.shape[0] - outside
+        inside += out[i] >= 0
+    return inside
+
+
+@compiled
+def _walked_lookup(axial, known):  # type: ignore[no-untyped-def]
+    """(S, T) int32, the known cell at each axial place relative to the first (2,), or -1; with a rim of -1."""
+    first = np.array([axial[known, 0].min() - 1, axial[known, 1].min() - 1])
+    lookup = np.full(
+        (axial[known, 0].max() - first[0] + 2, axial[known, 1].max() - first[1] + 2), -1, np.int32
+    )
+    for i in known:
+        lookup[axial[i, 0] - first[0], axial[i, 1] - first[1]] = i
+    return lookup, first
+
+
+@compiled
+def _count_missing(shape, center, axial, known, place, cell_lookup, walked, first):  # type: ignore[no-untyped-def]
+    """How often a neighbour of a known cell lies in the layout and in the image, but is not known.
+
+    Its center is extrapolated from the cell and the one opposite; it counts a step away from the image's border.
+
+    Args:
+        shape: of the image. center: (N, 2) px. axial: (N, 2) int32. known: (K,). place: (2,) of the white cell.
+        cell_lookup: as ``Lattice.cell_lookup``. walked, first: of ``_walked_lookup``.
+    """
+    missing = 0
+    for i in known:
+        q, r = _placed(axial[i, 0], axial[i, 1], place)
+        if cell_at(cell_lookup, q, r) < 0:
+            continue
+        u, v = axial[i, 0] - first[0], axial[i, 1] - first[1]
+        for k in range(NEIGHBOUR_STEPS.shape[0]):
+            du, dv = NEIGHBOUR_STEPS[k, 0], NEIGHBOUR_STEPS[k, 1]
+            opposite = walked[u - du, v - dv]
+            if walked[u + du, v + dv] >= 0 or opposite < 0:
+                continue
+            q, r = _placed(axial[i, 0] + du, axial[i, 1] + dv, place)
+            if cell_at(cell_lookup, q, r) < 0:
+                continue
+            dx, dy = center[i, 0] - center[opposite, 0], center[i, 1] - center[opposite, 1]
+            x, y, margin = center[i, 0] + dx, center[i, 1] + dy, np.hypot(dx, dy)
+            missing += x > margin and y > margin and x < shape[1] - margin and y < shape[0] - margin
+    return missing

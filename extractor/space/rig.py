@@ -1,4 +1,6 @@
-"""The rig file: the views of a sensor. TOML, one [[view]] table for each view; unknown fields are refused.
+"""The rig file: the views of a sensor. TOML, one [[view]] table for each view; unknown names are refused.
+
+A scene file or a sensor file serves as a rig, too: only its [[view]] tables are read.
 
 [[view]]
 name = "left"
@@ -16,18 +18,24 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
-
 from extractor.errors import RigError
-from extractor.layout.json_fields import shown
+from extractor.layout.json_fields import nearest_name, shown
+from extractor.layout.text_file import printable_path, read_text_file
 from extractor.space.camera import View
 
 NUMBER_COUNTS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "area_px": 4, "t_camera_from_layout_mm": 3}
 REQUIRED_FIELDS = ("focal_px", "centre_px")
 KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout")
+# What stands beside [[view]] in the files of scenes and of sensors; it says nothing about the views.
+OTHER_TABLES = (
+    "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
+    "sequence", "name", "description", "source", "patterns", "elastomer", "response", "load", "conditions",
+)  # fmt: skip
+MAX_BYTES = 1 << 24  # of a rig file
+MAX_VIEWS = 64
+MAX_NUMBER = 1e9  # of a rig's numbers, px or mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +76,7 @@ def load_rig(path: str | PathLike[str]) -> Rig:
     Raises:
         RigError: one line that names the file, the field, the value and what is expected.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
-        raise RigError(f"{path}: cannot be read: {reason}") from None
-    return parse_rig(text, str(path))
+    return parse_rig(read_text_file(path, MAX_BYTES, RigError), printable_path(path))
 
 
 def parse_rig(text: str, name: str = "rig") -> Rig:
@@ -83,22 +86,40 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
         RigError: see ``load_rig``.
     """
     try:
-        document = tomllib.loads(text)
-        tables = document.get("view")
-        if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
-            raise RigError("view is missing; expected at least one [[view]] table")
-        return Rig(tuple(_parse_view(table, index) for index, table in enumerate(tables)))
+        return _parse_document(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise RigError(f"{name}: not TOML: {error}") from None
+    except RecursionError:
+        raise RigError(
+            f"{name}: nested too deeply; expected tables and lists at most a few levels deep"
+        ) from None
     except RigError as error:
         raise RigError(f"{name}: {error}") from None
+    except ValueError:  # the interpreter's limit on the digits of an integer
+        raise RigError(f"{name}: holds a number of thousands of digits; expected at most 9 digits") from None
+
+
+def _parse_document(document: Mapping[str, Any]) -> Rig:
+    for field in document:
+        if field != "view" and field not in OTHER_TABLES:
+            near = nearest_name(field, ("view", *OTHER_TABLES))
+            _raise_rig_error(shown(field), f"unknown{near}", "[[view]] tables")
+    tables = document.get("view")
+    if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
+        raise RigError("view is missing; expected at least one [[view]] table")
+    if len(tables) > MAX_VIEWS:
+        _raise_rig_error("view", f"a list of {len(tables)}", f"at most {MAX_VIEWS} [[view]] tables")
+    return Rig(tuple(_parse_view(table, index) for index, table in enumerate(tables)))
 
 
 def _parse_view(table: Mapping[str, Any], index: int) -> View:
     prefix = f"view[{index}]."
     for field in table:
         if field not in KNOWN_FIELDS:
-            _raise_rig_error(prefix + shown(field), "unknown", f"only the fields {', '.join(KNOWN_FIELDS)}")
+            near = nearest_name(field, KNOWN_FIELDS)
+            _raise_rig_error(
+                prefix + shown(field), f"unknown{near}", f"only the fields {', '.join(KNOWN_FIELDS)}"
+            )
     for field in REQUIRED_FIELDS:
         if field not in table:
             _raise_rig_error(prefix + field, "missing", f"{NUMBER_COUNTS[field]} numbers")
@@ -132,8 +153,9 @@ def _parse_numbers(value: object, field: str, count: int, whole: bool) -> tuple[
     if not isinstance(value, list) or len(value) != count:
         _raise_rig_error(field, shown(value), f"{count} numbers")
     for i, item in enumerate(value):
-        if type(item) not in kinds or not np.isfinite(item):
-            _raise_rig_error(f"{field}[{i}]", shown(item), "a whole number" if whole else "a finite number")
+        if type(item) not in kinds or not -MAX_NUMBER <= item <= MAX_NUMBER:
+            kind = "a whole number" if whole else "a finite number"
+            _raise_rig_error(f"{field}[{i}]", shown(item), f"{kind} from {-MAX_NUMBER:g} to {MAX_NUMBER:g}")
     return tuple(value)
 
 

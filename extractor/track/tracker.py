@@ -28,6 +28,9 @@ MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a co
 WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice
 EDGE_SAMPLING_STEP = 8  # one of this number of edges is measured for the choice of that scale
 COLD_START_INTERVAL = 200  # frames after which a cold start is done
+# Warm passes over the image of a cold start. Warm frames start from levels and blur of the frame before: without these
+# passes, equal frames after a cold start differ from it by 0.28 stated standard deviations (median), with two by 0.09.
+SETTLING_PASSES = 2
 
 
 class FrameStatus(IntEnum):
@@ -187,7 +190,20 @@ class Tracker:
             _fill_unseen_levels(check.cell_levels, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
             self._update_state(markers, appearance, check.cell_levels, count, 0)
+            markers = self._settle(image, markers)
         return markers, StartKind.COLD
+
+    def _settle(self, image: NDArray[Any], markers: Markers) -> Markers:
+        """The markers of a cold start after warm passes over the same image, so that equal frames agree; the markers
+        as they are where the image does not prove them. The state keeps the motion from the frame before."""
+        cold = self._state
+        for _ in range(SETTLING_PASSES):
+            warm = self._try_warm_start(image)
+            if warm is None or cold is None or self._state is None:
+                break
+            markers = warm[0]
+            self._state = replace(self._state, previous_px=cold.previous_px, frames_since_cold=0)
+        return markers
 
     def _try_warm_start(self, image: NDArray[Any]) -> tuple[Markers, StartKind] | None:
         """The markers of a warm start, or None where the image does not prove the prediction."""

@@ -32,8 +32,13 @@ from typer.testing import CliRunner
 
 from cmpdesign import demo
 from cmpdesign.cli import app
+from cmpdesign.cli.terminal import MOST_LINE_LETTERS
+from cmpdesign.contact.objects.heightmap import MOST_HEIGHTS
 from cmpdesign.design.design import Design
 from cmpdesign.design.templates import templates
+from cmpdesign.inputs import documents
+from cmpdesign.inputs import files as inputs
+from cmpdesign.inputs import names as lines
 from cmpdesign.patterns import registered_patterns
 from docs.figures import everything, fields
 
@@ -181,6 +186,29 @@ def test_every_path_of_the_map_exists() -> None:
     paths = re.findall(r"`((?:extractor|cmpdesign|benchmarks|tests|tools|docs)/[\w/.]*)`", page)
     assert len(paths) > 25
     assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+@pytest.mark.parametrize("name", ["reliability.md", "hard-cases.md"])
+def test_every_named_test_exists(name: str) -> None:
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:\w+/)+test_\w+)(?:\.py)?(?:::(test_\w+))?`", page)
+    assert len(named) > 15
+    for file, test in named:
+        text = (ROOT / "tests" / f"{file}.py").read_text(encoding="utf-8")
+        assert not test or f"def {test}(" in text, (file, test)
+
+
+def test_stated_limits_hold() -> None:
+    page = (ROOT / "docs" / "reliability.md").read_text(encoding="utf-8")
+    for text, limit in (
+        ("16 MiB", inputs.MOST_TEXT_BYTES == 16 << 20),
+        ("250 megapixels", inputs.MOST_PIXELS == 250_000_000),
+        ("40 levels, numbers of 300 digits", (documents.MOST_LEVELS, documents.MOST_DIGITS) == (40, 300)),
+        ("100; 1000 characters", (lines.MOST_NAME_LETTERS, lines.MOST_LINE_LETTERS) == (100, 1000)),
+        ("at most 300 characters", MOST_LINE_LETTERS == 300),
+        ("25,000,000 heights", MOST_HEIGHTS == 25_000_000),
+    ):
+        assert limit and text in page, text
 
 
 def test_the_comparison_can_fail() -> None:

@@ -143,6 +143,8 @@ def with_alpha(image: Image) -> Image:
 SAME = {
     "alpha": with_alpha,
     "16-bit": lambda image: image.astype(np.uint16) * 257,
+    "16-bit, the high byte first": lambda image: (image.astype(np.uint16) * 257).astype(">u2"),
+    "16-bit, the low byte first": lambda image: (image.astype(np.uint16) * 257).astype("<u2"),
     "16-bit with alpha": lambda image: with_alpha(image).astype(np.uint16) * 257,
     "Fortran order": np.asfortranarray,
     "every second pixel of a larger one": lambda image: image.repeat(2, axis=0).repeat(2, axis=1)[::2, ::2],
@@ -217,7 +219,7 @@ def test_pictures_of_anything_else_hold_nothing(kind: str, layers: int) -> None:
         image = STRANGE[kind](np.random.default_rng(seed))
         assert_nothing(
             extractor("honeycomb", layers).extract(image),
-            Reason.NO_COLOR, Reason.NO_PATTERN, Reason.REFERENCE_LOST, Reason.AMBIGUOUS,
+            Reason.NO_COLOR, Reason.NO_PATTERN, Reason.REFERENCE_LOST, Reason.AMBIGUOUS, Reason.SEVERAL_PADS,
         )  # fmt: skip
 
 
@@ -259,10 +261,10 @@ def test_of_two_white_cells_the_one_that_fits_the_outline_counts(at: int) -> Non
 
 
 @pytest.mark.parametrize("at", [0, 1, 7])
-def test_two_white_cells_without_the_outline_are_ambiguous(at: int) -> None:
+def test_two_white_cells_without_the_outline_are_several_pads(at: int) -> None:
     _, black = black_cells_by_distance(8)
     seen = scene_of(recolored(small_layout("honeycomb", 8), {int(black[at]): WHITE}), pitch_px=60)
-    assert_nothing(extractor("honeycomb", 8).extract(seen.image), Reason.AMBIGUOUS)
+    assert_nothing(extractor("honeycomb", 8).extract(seen.image), Reason.SEVERAL_PADS)
 
 
 @pytest.mark.parametrize("at", [0, 1, 7, 20, -1])

@@ -16,6 +16,7 @@ from benchmarks.suites.scoring.reading import CaseResult
 from benchmarks.suites.scoring.squares import MEASURED, calibration_lines
 from benchmarks.suites.stress.kinds import ConditionKind
 from benchmarks.support.machine import null_for_nan
+from cmpdesign.files.atomic import staged_file, write_file
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
@@ -228,9 +229,7 @@ def calibration_table(results: Sequence[CaseResult]) -> str:
 def write_json(rows: list[ConditionRow], path: Path) -> None:
     """Write every row as an object, NaN as null."""
     columns = [null_for_nan(asdict(row)) for row in rows]
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(columns, indent=1) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_file(path, json.dumps(columns, indent=1) + "\n")
 
 
 def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], path: Path) -> None:
@@ -251,15 +250,14 @@ def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], pa
     handles = [matplotlib.patches.Patch(color=color, label=name) for name, color in COLORS.items()]
     figure.legend(handles=handles, loc="upper center", ncols=len(handles), frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.98))
-    partial = path.with_name(path.name + ".part")
-    figure.savefig(
-        partial,
-        format=path.suffix[1:] or "png",
-        dpi=110,
-        metadata={"Software": None} if path.suffix == ".png" else None,
-    )
+    with staged_file(path) as staged:
+        figure.savefig(
+            staged,
+            format=path.suffix[1:] or "png",
+            dpi=110,
+            metadata={"Software": None} if path.suffix == ".png" else None,
+        )
     pyplot.close(figure)
-    partial.replace(path)
 
 
 def _is_of_kind(row: ConditionRow, kind: ConditionKind) -> bool:

@@ -35,12 +35,13 @@ def build(
 ) -> None:
     """Write a design's files: SVG, layout file, preview and report, or what --only names.
 
-    Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, unless
-    they were changed since.
+    Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
+    are all files of an earlier build of another pattern, unless they were changed since.
     """
     from cmpdesign.design.design import load_design
     from cmpdesign.files.atomic import write_folder
     from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
+    from cmpdesign.files.layout_json import pattern_digest
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.report import design_report
 
@@ -49,13 +50,15 @@ def build(
     layout = build_layout(parameters)
     report = design_report(parameters, layout)
     files, findings = make_products(names, parameters, layout, report)
-    listed = files_with_lists(files, product_folders())
-    stale = find_stale_files(output, listed)
+    pattern = pattern_digest(layout)
+    listed = files_with_lists(files, product_folders(), output, pattern)
+    stale = find_stale_files(output, listed, product_folders(), pattern)
     for path in write_folder(output, listed):
         if path.name != LIST_NAME:
             console().print(f"wrote {printable_path(path)}")
     for path in remove_files(stale):
-        console().print(f"removed {printable_path(path)}, of an earlier build")
+        if path.name != LIST_NAME:
+            console().print(f"removed {printable_path(path)}, of an earlier build")
     print_report(report)
     for finding in (*report.findings, *findings):
         verb = "will not work" if finding.severity == "error" else "may not work"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated
 
 import typer
 
 from cmpdesign.cli.commands.build import DesignArgument, SetOption, parse_overrides
+from cmpdesign.cli.pixels import parse_pixels
 from cmpdesign.cli.terminal import console
-from cmpdesign.errors import CmpDesignError
 
 EXIT_NOT_PASSED = 1
+LARGEST_CAMERA_PX = 99_999
 
 
 def check(
@@ -27,7 +27,10 @@ def check(
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.checks import check_design
 
-    findings = check_design(load_design(design, parse_overrides(override)), camera_px=_parse_pixels(camera))
+    findings = check_design(
+        load_design(design, parse_overrides(override)),
+        camera_px=parse_pixels("--camera", camera, LARGEST_CAMERA_PX),
+    )
     if not findings:
         console().print("nothing to report: it can be made and read")
         return
@@ -40,15 +43,3 @@ def check(
     console().print(table, soft_wrap=False)
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(EXIT_NOT_PASSED)
-
-
-def _parse_pixels(text: str) -> tuple[int, int]:
-    """Width and height from "640x480".
-
-    Raises:
-        CmpDesignError: another text.
-    """
-    match = re.fullmatch(r"([1-9]\d{1,4})x([1-9]\d{1,4})", text)
-    if not match:
-        raise CmpDesignError(f"--camera {text}: expected WIDTHxHEIGHT in pixels, as in 640x480")
-    return int(match[1]), int(match[2])

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.command import Command
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -16,11 +17,11 @@ if TYPE_CHECKING:
 
     from cmpdesign.evaluate.designs import DesignEntry
 
-EXIT_INTERRUPTED = 130
 PRESETS = ("fast", "balanced", "accurate")
 
 app = typer.Typer(
     no_args_is_help=True,
+    rich_markup_mode=None,
     help="Repeat the article's experiments on a simulated sensor, and compare designs. Writes report.html and "
     "report.json; an interrupted run goes on where it stopped.",
 )
@@ -38,7 +39,7 @@ SensorOption = Annotated[
 Preset = Annotated[str, typer.Option(metavar="NAME", help=f"The extractor's preset: {', '.join(PRESETS)}.")]
 
 
-@app.command()
+@app.command(cls=Command)
 def precision(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = 10,
@@ -57,7 +58,7 @@ def precision(
         )
 
 
-@app.command()
+@app.command(cls=Command)
 def response(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = 10,
@@ -75,7 +76,7 @@ def response(
         )
 
 
-@app.command()
+@app.command(cls=Command)
 def reliability(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = 300,
@@ -91,7 +92,7 @@ def reliability(
         console().print(f"{mode}, of {trials}: {counts}")
 
 
-@app.command()
+@app.command(cls=Command)
 def angles(output: Output, workers: Workers = None) -> None:
     """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
     document = _run_experiment("angles", output, 1, 0, workers, "tac3d", "balanced")
@@ -105,7 +106,7 @@ def angles(output: Output, workers: Workers = None) -> None:
             )
 
 
-@app.command()
+@app.command(cls=Command)
 def designs(
     design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
     output: Output,

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, parse_reading_response
-from cmpdesign.cli.terminal import console
+from cmpdesign.cli.terminal import console, print_document
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
@@ -39,6 +41,7 @@ def kerf(
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead.")] = False,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Measure the kerf on a coupon, ready for the material's file."""
     from cmpdesign.errors import CmpDesignError
@@ -50,7 +53,7 @@ def kerf(
 
     known = parse_reading_response(response)
     cut_coupon = load_coupon(coupon)
-    image = read_image(photo, gray=True)
+    image = read_image(photo, max_pixels, gray=True)
     try:
         reading = read_coupon(
             cut_coupon,
@@ -62,7 +65,7 @@ def kerf(
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
     if as_json:
-        print(json.dumps(_reading_to_json(cut_coupon, reading), indent=2))
+        print_document(json.dumps(_reading_to_json(cut_coupon, reading), indent=2) + "\n")
         return
     _print_kerf_table(cut_coupon, reading)
     console().print(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")

@@ -9,14 +9,24 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
-from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
-from cmpdesign.cli.terminal import console, printable_path
+from cmpdesign.cli.run_progress import (
+    exit_with_status,
+    print_written,
+    recover_and_report,
+    require_positive,
+    run_with_progress,
+    summary_path,
+)
+from cmpdesign.cli.terminal import console
 from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
     from extractor.image.response import Response
+    from extractor.layout.reference import Reference
 
 
 def reconstruct(
@@ -30,7 +40,7 @@ def reconstruct(
         str,
         typer.Argument(
             metavar="SOURCE",
-            help="A video, a folder of images, or a camera's number; one for each view with commas between.",
+            help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
         ),
     ],
     output: Annotated[
@@ -49,36 +59,39 @@ def reconstruct(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+        float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
     """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
     if recover:
-        from cmpdesign.tracking.sinks import recover_table as recover_file
+        from extractor import load_layout
 
-        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
+        recover_and_report(output, _points_in(load_layout(layout)))
         return
     require_positive("--fps", fps)
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
     known = parse_reading_response(response)
-    options = _Options(layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known)
+    options = _Options(
+        layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known, max_pixels
+    )
     run = _prepare_run(options)
     run.limit = frames
     try:
         run_with_progress(run, "reconstructing")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            _write_summary(run, source, output)
+            print_written(_write_summary(run, source, output))
         raise
-    _write_summary(run, source, output)
+    print_written([output, *_write_summary(run, source, output)])
     exit_with_status(run)
 
 
@@ -96,6 +109,12 @@ class _Options(NamedTuple):
     fps: float | None
     cold: bool
     response: Response | None
+    max_pixels: int
+
+
+def _points_in(layout: Reference) -> int:
+    """The number of points of a frame: markers and virtual markers."""
+    return len(layout.layer) + len(layout.edges) * layout.virtual_per_edge
 
 
 def _prepare_run(options: _Options) -> TrackingRun:
@@ -103,7 +122,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
-    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sinks.tables import open_sink
     from cmpdesign.tracking.sources import open_sources
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
@@ -118,7 +137,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     )
     sink = open_sink(options.output, ShapeTable(reconstructor))
     tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
-    source = open_sources(options.source, options.fps)
+    source = open_sources(options.source, options.fps, options.max_pixels)
     return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor))
 
 
@@ -132,20 +151,25 @@ def _read_rest_image(options: _Options) -> Any:
         rests = rests * len(sources)
     if len(rests) != len(sources):
         raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
-    images = [read_rest_image(rest, name, options.fps) for rest, name in zip(rests, sources, strict=True)]
+    images = [
+        read_rest_image(rest, name, options.fps, options.max_pixels)
+        for rest, name in zip(rests, sources, strict=True)
+    ]
     return images if len(images) > 1 else images[0]
 
 
-def _write_summary(run: TrackingRun, source: str, output: Path) -> None:
-    """Write the summary next to the table and print it; also after a failure."""
+def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
+    """Write the summary next to the table and print it; the written files."""
     if not run.statistics.frames:
-        return
+        return []
     from cmpdesign.files.atomic import write_file
+    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(source, run.source.total, run.ended_early)
+    summary = run.statistics.to_json(without_password(source), run.source.total, run.ended_early)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
-    write_file(output.with_suffix(".summary.json"), text)
+    write_file(summary_path(output), text)
+    return [summary_path(output)]
 
 
 def _print_summary(summary: dict[str, Any]) -> None:

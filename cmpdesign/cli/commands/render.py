@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmpdesign.cli.paths import require_suffix
+from cmpdesign.cli.pixels import parse_pixels
 from cmpdesign.cli.response import METAVAR, parse_response
 from cmpdesign.cli.terminal import console, printable_path
 from cmpdesign.errors import CmpDesignError
@@ -16,6 +20,7 @@ from cmpdesign.errors import CmpDesignError
 if TYPE_CHECKING:
     from cmpdesign.scene import Scene
 
+LARGEST_SIDE_PX = 9999
 # Options with a key in a scene file.
 SCENE_FILE_KEYS = {
     "pitch": "[camera] pitch_px",
@@ -51,7 +56,7 @@ def render(
             "-o",
             "--output",
             metavar="IMAGE",
-            help="PNG file to write; of a sequence a video (.mp4, .avi, .mkv) or a folder.",
+            help="Image (.png, .tif, .bmp, .webp, .jpg); of a sequence a video (.mp4, .avi, .mkv) or a folder.",
         ),
     ],
     scene: Annotated[
@@ -108,30 +113,49 @@ def render(
         from cmpdesign.cli.commands.render_scene import render_scene_file
 
         given = _given_options(ctx)
-        pixels = parse_image_size(size) if "size" in given else None
+        pixels = parse_pixels("--size", size, LARGEST_SIDE_PX) if "size" in given else None
         render_scene_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
         return
+    from cmpdesign.files.images import require_image_kind
     from cmpdesign.reading.read_layout import read_layout
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
-    pixels = parse_image_size(size)
+    pixels = parse_pixels("--size", size, LARGEST_SIDE_PX)
+    require_image_kind(output, 8)
+    require_suffix("--truth", truth, [".npz"])
     pattern = read_layout(layout)
     radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
-    pattern_scene = Scene(
-        layout=pattern,
-        camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
-        surface=composed(Press(radius, press)) if press else None,
-        optics=Optics(blur),
-        sensor=Sensor(noise=noise, response=parse_response(response)),
-        seed=seed,
-    )
+    with _option_names_in_errors():
+        pattern_scene = Scene(
+            layout=pattern,
+            camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
+            surface=composed(Press(radius, press)) if press else None,
+            optics=Optics(blur),
+            sensor=Sensor(noise=noise, response=parse_response(response)),
+            seed=seed,
+        )
     _write_rendered(pattern_scene, pixels, output, truth)
+
+
+@contextmanager
+def _option_names_in_errors() -> Iterator[None]:
+    """Within this context, errors of a scene name the option in the place of the scene's field."""
+    from cmpdesign.scene import SceneError
+
+    try:
+        yield
+    except SceneError as error:
+        text = str(error)
+        for name, key in SCENE_FILE_KEYS.items():
+            option, field = f"--{name.replace('_', '-')}", key.rpartition(" ")[2]
+            text = re.sub(rf"^{field}(?= is )", option, text)
+        raise CmpDesignError(text) from None
 
 
 def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: Path | None) -> None:
     """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
     from cmpdesign.files.atomic import write_file
-    from cmpdesign.files.images import to_png
+    from cmpdesign.files.images import encode_image
     from cmpdesign.scene import render as render_scene
     from cmpdesign.scene import save_truth
 
@@ -139,7 +163,7 @@ def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: 
     if truth is not None:
         save_truth(rendered.truth, truth)
         console().print(f"wrote {printable_path(truth)}")
-    write_file(output, to_png(rendered.image))
+    write_file(output, encode_image(rendered.image, output))
     visible = int(rendered.truth.visible.sum())
     console().print(
         f"wrote {printable_path(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible"
@@ -160,15 +184,3 @@ def _given_options(ctx: typer.Context) -> set[str]:
             f"{option} has no place beside --scene; write {SCENE_FILE_KEYS[name]} into the file"
         )
     return given
-
-
-def parse_image_size(text: str) -> tuple[int, int]:
-    """Width and height from "640x480".
-
-    Raises:
-        CmpDesignError: another text.
-    """
-    match = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
-    if not match:
-        raise CmpDesignError(f"--size {text}: expected WIDTHxHEIGHT, 10 to 9999 pixels each, as in 640x480")
-    return int(match[1]), int(match[2])

@@ -7,14 +7,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmpdesign.cli.paths import require_suffix
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from cmpdesign.scene.files.scene_file import SceneFile
     from cmpdesign.scene.truth import Truth
-
-IMAGE_SUFFIX = ".png"
 
 
 def render_scene_file(
@@ -42,6 +41,7 @@ def render_scene_file(
     from cmpdesign.reading.read_layout import read_layout
     from cmpdesign.scene.files.scene_file import load_scene
 
+    require_suffix("--truth", truth, [".npz"])
     file = load_scene(find_scene(scene), read_layout(layout), size_px=size, seed=seed)
     if file.fps is None:
         _render_image(file, output, truth)
@@ -51,20 +51,20 @@ def render_scene_file(
 
 def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.files.atomic import write_file
-    from cmpdesign.files.images import to_png
+    from cmpdesign.files.images import encode_image, require_image_kind
     from cmpdesign.scene import render, save_truth
 
-    if output.suffix != IMAGE_SUFFIX:
-        raise CmpDesignError(
-            f"{output}: unknown ending; expected {IMAGE_SUFFIX} (the scene has no [sequence])"
-        )
+    try:
+        require_image_kind(output, file.bits)
+    except CmpDesignError as error:
+        raise CmpDesignError(f"{error} (the scene has no [sequence])") from None
     rendered = render(file.scene(), size=file.size_px)
     for warning in rendered.warnings:
         print_warning(warning)
     if truth is not None:
         save_truth(rendered.truth, truth)
         console().print(f"wrote {printable_path(truth)}")
-    write_file(output, to_png(rendered.image))
+    write_file(output, encode_image(rendered.image, output))
     console().print(
         f"wrote {printable_path(output)}: {_format_size(file)}, {_format_visible_count(rendered.truth)}"
     )

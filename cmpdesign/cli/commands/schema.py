@@ -5,8 +5,7 @@ from __future__ import annotations
 
 def schema() -> None:
     """Print the JSON Schema of a design's TOML file, for editors."""
-    import sys
-
+    from cmpdesign.cli.terminal import print_document
     from cmpdesign.design.design import design_schema_text
 
-    sys.stdout.write(design_schema_text())
+    print_document(design_schema_text())

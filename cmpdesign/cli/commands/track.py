@@ -9,10 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.paths import require_suffix
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
-from cmpdesign.cli.run_progress import exit_with_status, require_positive, run_with_progress
+from cmpdesign.cli.run_progress import (
+    exit_with_status,
+    print_written,
+    recover_and_report,
+    require_positive,
+    run_with_progress,
+    summary_path,
+)
 from cmpdesign.cli.terminal import console, print_warning, printable_path
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import OutputError
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
@@ -23,7 +33,10 @@ if TYPE_CHECKING:
 def track(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
     source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="A video, a folder of images, or a camera's number.")
+        str,
+        typer.Argument(
+            metavar="SOURCE", help="A video, a folder of images, a camera's number, or rtsp://..."
+        ),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
@@ -41,7 +54,7 @@ def track(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second of a folder, or over a video's own. [folder: 30]")
+        float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     overlay: Annotated[
@@ -52,32 +65,36 @@ def track(
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
     """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
     if recover:
-        from cmpdesign.tracking.sinks import recover_table as recover_file
+        from extractor import load_layout
 
-        console().print(f"wrote {printable_path(output)}: {recover_file(output)} frames recovered")
+        recover_and_report(output, len(load_layout(layout).layer))
         return
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
-    _require_png(quiver)
+    require_suffix("--quiver", quiver, [".png"])
     from extractor import load_layout
 
     reference = load_layout(layout)
     known = parse_reading_response(response)
-    run = _prepare_run(reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known))
+    run = _prepare_run(
+        reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known, max_pixels)
+    )
     run.limit = frames
     try:
         run_with_progress(run, "tracking")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            _write_summary(run, reference, source, output, quiver)
+            print_written(_write_summary(run, reference, source, output, quiver))
         raise
-    _write_summary(run, reference, source, output, quiver)
+    written = _write_summary(run, reference, source, output, quiver)
+    print_written([output, *written, *([overlay] if overlay is not None and written else [])])
     exit_with_status(run)
 
 
@@ -92,24 +109,28 @@ class _Options(NamedTuple):
     overlay: Path | None
     cold: bool
     response: Response | None
+    max_pixels: int
 
 
 def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
     from cmpdesign.tracking.overlay import OverlayWriter
     from cmpdesign.tracking.run import TrackingRun, read_rest_markers
-    from cmpdesign.tracking.sinks import open_sink
+    from cmpdesign.tracking.sinks.tables import open_sink
     from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
     from cmpdesign.tracking.summary import TrackStatistics
     from cmpdesign.tracking.table import TrackTable
     from extractor.track.tracker import Tracker
 
     rest, source, fps, response = options.rest, options.source, options.fps, options.response
-    at_rest = None if rest is None else read_rest_markers(rest, source, reference, fps, response)
-    tracker = Tracker(
-        reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=not options.cold, response=response
-    )
-    frames = open_source(source, fps)
+    warm, most_pixels = not options.cold, options.max_pixels
+    at_rest = None
+    if rest is not None:
+        at_rest = read_rest_markers(
+            rest, source, fps, Tracker(reference, warm=warm, response=response), most_pixels
+        )
+    tracker = Tracker(reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=warm, response=response)
+    frames = open_source(source, fps, most_pixels)
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
     return TrackingRun(
@@ -119,31 +140,36 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
 
 def _write_summary(
     run: TrackingRun, reference: Reference, source: str, output: Path, quiver: Path | None
-) -> None:
-    """Write the summary next to the table and the quiver plot, and print the summary; also after a failure."""
+) -> list[Path]:
+    """Write the summary next to the table and the quiver plot, and print the summary; the written files."""
     if not run.statistics.frames:
-        return
+        return []
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.tracking.quiver import draw_quiver
+    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
+    summary = run.statistics.to_json(
+        without_password(source), run.source.total, run.ended_early, run.tracker.rest
+    )
     _print_summary(summary)
-    paths = {output.with_suffix(".summary.json"): json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
+    text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+    contents: dict[Path, str | bytes] = {summary_path(output): text}
     farthest, rest = run.statistics.farthest, run.tracker.rest
-    contents: dict[Path, str | bytes] = dict(paths)
     if quiver is not None and farthest is not None and rest is not None:
         contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
     elif quiver is not None:
         print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
     for path, content in contents.items():
         write_file(path, content)
+    return list(contents)
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
     frames, shares, rate = summary["frames"], summary["marker_shares"], summary["frames_per_s"]
+    times = ", ".join(f"{name} {value:.1f} ms" for name, value in summary["time_ms"].items())
     others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
     not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items())
     jitter, largest = summary["jitter_px"], summary["largest_displacement"]
@@ -151,7 +177,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         "frames": f"{frames['read']} read, {frames['tracked']} tracked{not_tracked}",
         "starts": ", ".join(f"{count} {start}" for start, count in summary["starts"].items()) or "none",
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in shares.items()),
-        "frames per second": ", ".join(f"{name} {value:.0f}" for name, value in rate.items() if value),
+        "time a frame": times + (f"; on the whole {rate:.3g} frames per second" if rate else ""),
         "jitter at rest": "too few resting frames" if jitter is None else f"{jitter:.4f} px per axis",
     }
     if summary["reasons"]:
@@ -165,8 +191,3 @@ def _print_summary(summary: dict[str, Any]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console().print(table)
-
-
-def _require_png(path: Path | None) -> None:
-    if path is not None and path.suffix != ".png":
-        raise CmpDesignError(f"--quiver {path}: unknown ending; expected .png")

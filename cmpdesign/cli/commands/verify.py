@@ -6,7 +6,6 @@ An image that shows the code of a print sheet is judged as a print: its layout, 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -15,8 +14,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, console, error_on_one_line, print_error, printable_path
+from cmpdesign.cli.terminal import (
+    EXIT_BAD_INPUT,
+    console,
+    error_on_one_line,
+    print_document,
+    print_error,
+    printable_path,
+)
+from cmpdesign.inputs.files import MOST_PIXELS, is_folder
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -51,7 +59,10 @@ class Outcome:
 
 def verify(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits.")],
+    images: Annotated[
+        list[Path],
+        typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits, or folders of pictures."),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
     ] = None,
@@ -67,13 +78,15 @@ def verify(
         ),
     ] = None,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from extractor import Extractor, load_layout
 
     reference, known = load_layout(layout), parse_reading_response(response)
     extractor = cache(lambda: Extractor(reference, response=known))
-    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug)
+    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, max_pixels)
+    images = _without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
         verifier.verify_image(path, name)
@@ -85,7 +98,7 @@ def verify(
 
         write_file(output / "verify.json", report)
     # Printed after the progress bar has ended, because the bar redirects standard output.
-    sys.stdout.write(report if as_json else _format_outcomes(outcomes))
+    print_document(report if as_json else _format_outcomes(outcomes))
     raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
 
 
@@ -99,6 +112,7 @@ class _ImageVerifier:
     sheet_dpi: float | None
     output: Path | None
     debug: Path | None
+    max_pixels: int
 
     def verify_image(self, path: Path, name: str) -> Outcome:
         """Verify one image and write its pictures; an unreadable image is reported on stderr."""
@@ -107,7 +121,7 @@ class _ImageVerifier:
         from cmpdesign.reading.verify import verify as verify_image
 
         try:
-            image = read_image(path)
+            image = read_image(path, self.max_pixels)
         except ImageFileError as error:
             print_error(error)
             return Outcome(printable_path(path), None, error_on_one_line(error))
@@ -166,6 +180,17 @@ def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: 
         "images": [outcome.to_json() for outcome in outcomes],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _without_folders(paths: list[Path]) -> list[Path]:
+    """The paths, with every folder replaced by its images.
+
+    Raises:
+        ImageFileError: a folder holds no image.
+    """
+    from cmpdesign.files.image_folders import find_images
+
+    return [image for path in paths for image in (find_images(path) if is_folder(path) else [path])]
 
 
 def _unique_names(stems: list[str]) -> list[str]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,8 +15,12 @@ from numpy.typing import NDArray
 
 from cmpdesign.contact.errors import ContactError, require
 from cmpdesign.contact.objects.indenters import Indenter
+from cmpdesign.errors import InputError
+from cmpdesign.files.images import ImageFileError, decode_image
+from cmpdesign.inputs.files import read_file
 
 Array = NDArray[np.float64]
+MOST_HEIGHTS = 25_000_000  # of a height map
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,26 +88,52 @@ class HeightMap(Indenter):
 
 
 def _read_npy(path: Path) -> Array:
+    """(rows, columns) float64 from an NPY file; its header is tested before memory is taken."""
     try:
-        heights = np.load(path, allow_pickle=False)
-    except (OSError, ValueError) as error:
-        raise ContactError(f"{path}: cannot be read as an NPY file ({error})") from None
-    if not isinstance(heights, np.ndarray) or heights.dtype.kind not in "fiu":
+        data = read_file(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the header's style
+            has_all = _has_all_numbers(data)
+            heights = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) if has_all else None
+    except InputError as error:
+        raise ContactError(str(error)) from None
+    except (ValueError, TypeError, SyntaxError, TokenError, EOFError, MemoryError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise ContactError(f"{path}: cannot be read as an NPY file ({reason})") from None
+    if heights is None:
+        raise ContactError(
+            f"{path}: its header claims more numbers than it holds, or more than {MOST_HEIGHTS}"
+        )
+    if heights.dtype.kind not in "fiu":
         raise ContactError(f"{path}: holds no array of numbers; save heights in mm with numpy.save")
-    return heights.astype(np.float64)
+    return np.asarray(heights, dtype=np.float64)
+
+
+def _has_all_numbers(data: bytes) -> bool:
+    """True if the bytes after the header of an NPY file are as many as its shape needs.
+
+    Raises:
+        ValueError: no NPY file of version 1 or 2.
+    """
+    file = io.BytesIO(data)
+    version = np.lib.format.read_magic(file)
+    readers = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }
+    if version not in readers:
+        raise ValueError(f"version {version[0]}.{version[1]}; expected 1.0 or 2.0")
+    shape, _, kind = readers[version](file)
+    count = math.prod(shape)
+    return count <= MOST_HEIGHTS and count * kind.itemsize <= len(data) - file.tell()
 
 
 def _read_gray(path: Path) -> Array:
     """(rows, columns) float64 brightness from 0 to 1."""
-    import cv2
-
     try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise ContactError(f"{path}: cannot be read ({error.strerror})") from None
-    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
-    if pixels is None:
-        raise ContactError(f"{path}: is no image; expected a grayscale PNG, or an NPY file of heights in mm")
+        pixels = decode_image(path, MOST_HEIGHTS)
+    except ImageFileError as error:
+        raise ContactError(f"{error} (a height map is a grayscale PNG, or an NPY file in mm)") from None
     if pixels.dtype not in (np.uint8, np.uint16):
         raise ContactError(f"{path}: has pixels of type {pixels.dtype}; expected 8 or 16 bits")
     if pixels.ndim == 3:

@@ -6,12 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
+# Tables of more columns are set smaller, so that they fit the width of the page.
+MANY_COLUMNS = 8
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c2126; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .8rem; border-bottom: 1px solid #d7dce0; text-align: right; white-space: nowrap; }
-th { white-space: normal; }
+th, th:first-child, td:first-child { white-space: normal; overflow-wrap: anywhere; }
+.wide { overflow-x: auto; } .many th, .many td { padding: .25rem .4rem; font-size: .8rem; }
+@media print { .wide { overflow-x: visible; } }
 th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8a949c; font-weight: 600; }
 figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; }
 caption, figcaption { color: #5a646c; text-align: left; font-size: .9rem; }
@@ -73,4 +77,6 @@ def _table_html(table: Table) -> str:
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
     )
-    return f"<table><caption>{escape(table.caption)}</caption>\n<tr>{head}</tr>\n{rows}\n</table>"
+    many = ' class="many"' if len(table.headings) > MANY_COLUMNS else ""
+    caption = f"<caption>{escape(table.caption)}</caption>"
+    return f'<div class="wide"><table{many}>{caption}\n<tr>{head}</tr>\n{rows}\n</table></div>'

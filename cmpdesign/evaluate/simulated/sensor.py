@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.design.design import Design
+from cmpdesign.errors import CmpDesignError, DesignError, InputError
+from cmpdesign.inputs.documents import parse_toml
+from cmpdesign.inputs.files import path_exists, read_text
+from cmpdesign.inputs.names import Line, Name, nearest_name
+from cmpdesign.inputs.validation import validation_message
 from extractor.image.response import light_of_values
 
 if TYPE_CHECKING:
@@ -95,9 +99,9 @@ class ConditionRanges(_StrictTable):
 class SensorTable(_StrictTable):
     """The file without its [[view]] tables, which the extractor's reader checks."""
 
-    name: str = ""
-    description: str = ""
-    source: str = ""
+    name: Name = ""
+    description: Line = ""
+    source: Line = ""
     size_px: tuple[Pixels, Pixels]
     patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
     elastomer: ElastomerTable
@@ -105,6 +109,20 @@ class SensorTable(_StrictTable):
     response: str | float | tuple[float, ...] = "srgb"
     load: tuple[LoadTable, ...] = ()
     conditions: ConditionRanges = ConditionRanges()
+
+    @field_validator("patterns")
+    @classmethod
+    def _known_patterns(cls, value: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        for name, design in value.items():
+            if name not in METHODS:
+                raise ValueError(
+                    f"{name} is unknown{nearest_name(name, METHODS)}; there are {', '.join(METHODS)}"
+                )
+            try:
+                Design(**design)
+            except DesignError as error:
+                raise ValueError(f"{name}: {error}") from None
+        return value
 
     @field_validator("response")
     @classmethod
@@ -186,9 +204,12 @@ def find_sensor(name_or_path: str | Path) -> Path:
     if str(name_or_path) in shipped:
         return shipped[str(name_or_path)]
     path = Path(name_or_path)
-    if path.is_file():
+    if path_exists(path):
         return path
-    raise SensorError(f"{name_or_path}: no such sensor; there are {', '.join(shipped)}, or give a TOML file")
+    raise SensorError(
+        f"{name_or_path}: no such sensor{nearest_name(name_or_path, shipped)}; there are {', '.join(shipped)}, "
+        "or give a TOML file"
+    )
 
 
 def load_sensor(name_or_path: str | Path = "tac3d") -> SimulatedSensor:
@@ -199,9 +220,9 @@ def load_sensor(name_or_path: str | Path = "tac3d") -> SimulatedSensor:
     """
     path = find_sensor(name_or_path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SensorError(f"{path}: cannot be read ({error})") from error
+        text = read_text(path)
+    except InputError as error:
+        raise SensorError(str(error)) from None
     return parse_sensor(text, str(path))
 
 
@@ -215,18 +236,14 @@ def parse_sensor(text: str, where: str = "sensor") -> SimulatedSensor:
     from extractor.space.rig import parse_rig
 
     try:
-        document = tomllib.loads(text)
+        document = parse_toml(text, where)
         rig = parse_rig(text, where)
         document.pop("view", None)
         table = SensorTable.model_validate(document)
-    except tomllib.TOMLDecodeError as error:
-        raise SensorError(f"{where}: not TOML: {error}") from None
-    except ExtractorError as error:
+    except (InputError, ExtractorError) as error:
         raise SensorError(str(error)) from None
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"]) or "the file"
-        raise SensorError(f"{where}: {field}: {first['msg']} (it is {first['input']!r})") from None
+        raise SensorError(f"{where}: {validation_message(error, SensorTable)}") from None
     for view in rig.views:
         if not view.placed:
             raise SensorError(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Generic, Literal, TypeVar
@@ -12,7 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cmpdesign.design.quantities import Length, LengthOrZero
 from cmpdesign.design.templates import templates_folder
-from cmpdesign.errors import DesignError
+from cmpdesign.errors import DesignError, InputError
+from cmpdesign.inputs.documents import read_toml
+from cmpdesign.inputs.files import path_exists
+from cmpdesign.inputs.names import Line, Name, nearest_name
+from cmpdesign.inputs.validation import validation_message
 
 Value = TypeVar("Value")
 Model = TypeVar("Model", bound=BaseModel)
@@ -30,13 +32,13 @@ class Sourced(_StrictModel, Generic[Value]):
     """A value with its source: a reference, a measurement, or "assumed"."""
 
     value: Value
-    source: str = Field(min_length=3)
+    source: Annotated[Line, Field(min_length=3)]
 
 
 class Machine(_StrictModel):
     """A laser machine; ``s_max`` is the S word of full power (GRBL's $30)."""
 
-    name: str
+    name: Name
     kind: Literal["co2", "diode", "fibre", "uv"]
     power_w: Sourced[Positive]
     bed_width_mm: Sourced[Length]
@@ -68,13 +70,13 @@ class Settings(_StrictModel):
 class Material(_StrictModel):
     """A silicone sheet, with the settings of each machine that can carve it."""
 
-    name: str
+    name: Name
     thickness_mm: Sourced[Length]
     minimum_web_mm: Sourced[LengthOrZero]
-    fill: str
-    cure: str
-    fumes: str
-    on: Mapping[str, Settings]
+    fill: Line
+    cure: Line
+    fumes: Line
+    on: Mapping[Name, Settings]
 
 
 def machines() -> dict[str, Path]:
@@ -122,29 +124,14 @@ def settings_on(material: Material, machine_name: str) -> Settings:
 
 def _load_file(model: type[Model], name_or_path: str, known: Mapping[str, Path], kind: str) -> Model:
     path = known.get(name_or_path, Path(name_or_path))
-    if not path.is_file():
-        near = difflib.get_close_matches(name_or_path, known, n=1, cutoff=0.5)
-        hint = f" (did you mean {near[0]}?)" if near else ""
+    if not path_exists(path):
         raise DesignError(
-            f"laser.{kind} = {name_or_path!r}: no such {kind}{hint}; there are {', '.join(known)}, "
-            "or give a TOML file"
+            f"laser.{kind} = {name_or_path!r}: no such {kind}{nearest_name(name_or_path, known)}; there are "
+            f"{', '.join(known)}, or give a TOML file"
         )
     try:
-        return model.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DesignError(f"laser.{kind}: {path}: is no TOML file of a {kind} ({error})") from None
+        return model.model_validate(read_toml(path))
+    except InputError as error:
+        raise DesignError(f"laser.{kind}: {error}") from None
     except ValidationError as error:
-        raise DesignError(f"laser.{kind}: {path}: {_validation_message(error, model)}") from None
-
-
-def _validation_message(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first validation error in one line."""
-    item = error.errors()[0]
-    where = ".".join(str(part) for part in item["loc"])
-    if item["type"] == "extra_forbidden":
-        fields = [*model.model_fields, *Settings.model_fields, "value", "source"]
-        near = difflib.get_close_matches(str(item["loc"][-1]), fields, n=1, cutoff=0.5)
-        return f"{where} is unknown" + (f" (did you mean {near[0]}?)" if near else "")
-    if item["type"] == "missing":
-        return f"{where} is missing"
-    return f"{where} = {item['input']!r}: {item['msg'].removeprefix('Value error, ')}"
+        raise DesignError(f"laser.{kind}: {path}: {validation_message(error, model)}") from None

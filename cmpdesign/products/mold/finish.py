@@ -1,41 +1,25 @@
-"""Parts built, checked and formatted as STEP; large molds by two processes at once.
+"""Parts built, checked and formatted as STEP.
 
-Parts do not depend on each other, and each part has its own document, so its bytes are the same in both processes.
+Parts do not depend on each other, and each part has its own document, so its bytes are the same in every process.
 """
 
 from __future__ import annotations
 
-import io
-import os
-import pickle
-import subprocess
-import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.mold.parts import Part, make_parts
+from cmpdesign.products.mold.processes import results_of_parts
 from cmpdesign.products.mold.solids.measure import drafts_deg, measure_solid
 from cmpdesign.products.mold.stack.stack import make_stack
 from cmpdesign.products.mold.step.step import NamedSolid, solid_to_step
 
 # Largest relative difference of a volume from its closed form.
 VOLUME_TOLERANCE = 1e-9
-# Starting a process and loading the kernel in it takes as long as some hundred bosses.
-MIN_BOSSES_FOR_TWO = 400
-
-
-class FinishTask(NamedTuple):
-    """Names of the parts to finish, of a design and its layout."""
-
-    design: Design
-    layout: Layout
-    names: list[str]
 
 
 class MoldError(CmpDesignError):
@@ -59,14 +43,13 @@ def finish_parts(design: Design, layout: Layout, parts: Sequence[Part]) -> dict[
     Raises:
         MoldError: see ``finish_part``.
     """
-    own, delegated = _split_work(parts)
-    finished = (
-        _finish_in_two_processes(design, layout, own, delegated)
-        if delegated
-        else [finish_part(part) for part in own]
-    )
-    by_name = dict(zip([part.name for part in (*own, *delegated)], finished, strict=True))
-    return {part.name: by_name[part.name] for part in parts}
+    return results_of_parts(f"{__name__}:finish_named_parts", design, layout, parts)
+
+
+def finish_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> list[FinishedPart]:
+    """As ``finish_parts`` in this process, for the parts of these names."""
+    parts = {part.name: part for part in make_parts(make_stack(design, layout))}
+    return [finish_part(parts[name]) for name in names]
 
 
 def finish_part(part: Part) -> FinishedPart:
@@ -102,84 +85,3 @@ def check_part(part: Part) -> dict[str, Any]:
         "draft_min_deg": round(drafts[0], 6) if drafts[0] == drafts[0] else None,
         "draft_max_deg": round(drafts[1], 6) if drafts[1] == drafts[1] else None,
     }
-
-
-def _split_work(parts: Sequence[Part]) -> tuple[list[Part], list[Part]]:
-    """The parts for this process and for a second process, balanced by work; all here if the mold is small."""
-    if sum(map(_boss_count, parts)) < MIN_BOSSES_FOR_TWO or available_cores() < 2 or not sys.executable:
-        return list(parts), []
-    own: list[Part] = []
-    delegated: list[Part] = []
-    for part in sorted(parts, key=_boss_count, reverse=True):
-        lighter = own if sum(map(_boss_count, own)) <= sum(map(_boss_count, delegated)) else delegated
-        lighter.append(part)
-    return own, delegated
-
-
-def available_cores() -> int:
-    """The number of cores that this process may use; all cores if the system does not state it."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _boss_count(part: Part) -> int:
-    """The number of bosses or holes, a measure of the work; for dished parts the number of cells."""
-    if part.slab is None:
-        return 0
-    curved = len(part.stack.cells(part.color_number)) if part.crown in ("plate", "sheet") else 0
-    return curved + len(part.slab.many) + len(part.slab.many_through)
-
-
-def _finish_in_two_processes(
-    design: Design, layout: Layout, own: Sequence[Part], delegated: Sequence[Part]
-) -> list[FinishedPart]:
-    """The finished own parts, then the delegated parts, which a second process finishes at the same time."""
-    # multiprocessing is not used, because it would import the caller's script again.
-    command = [sys.executable, "-P", "-c", f"from {__name__} import helper; helper()"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment) as process:
-        assert process.stdin is not None
-        try:
-            # The return code below reports a process that ends at once.
-            with suppress(BrokenPipeError):
-                task = FinishTask(design, layout, [part.name for part in delegated])
-                process.stdin.write(_pickle_task(task))
-                process.stdin.flush()
-            finished = [finish_part(part) for part in own]
-            output, errors = process.communicate()
-        except BaseException:
-            process.kill()
-            raise
-    if process.returncode:
-        raise RuntimeError(f"mold: the second process failed: {errors.decode(errors='replace')}")
-    result: list[FinishedPart] | MoldError = pickle.loads(output)
-    if isinstance(result, MoldError):
-        raise result
-    return finished + result
-
-
-def _pickle_task(task: FinishTask) -> bytes:
-    """Pickle a task; the layout's palette, a read-only view, is pickled as a copy."""
-    buffer = io.BytesIO()
-    pickler = pickle.Pickler(buffer)
-    pickler.dispatch_table = {MappingProxyType: lambda view: (dict, (dict(view),))}
-    pickler.dump(task)
-    return buffer.getvalue()
-
-
-def helper() -> None:
-    """The second process: reads a pickled task from standard input, writes the pickled result to standard output."""
-    output = os.fdopen(os.dup(1), "wb")
-    # Messages of the kernel go to standard error.
-    os.dup2(2, 1)
-    result: list[FinishedPart] | MoldError
-    try:
-        task: FinishTask = pickle.load(sys.stdin.buffer)
-        parts = {part.name: part for part in make_parts(make_stack(task.design, task.layout))}
-        result = [finish_part(parts[name]) for name in task.names]
-    except MoldError as error:
-        result = error
-    with output:
-        pickle.dump(result, output)

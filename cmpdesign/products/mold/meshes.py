@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from cmpdesign.products.mold.job_sheet import job_sheet_html
 from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.pictures import mold_pictures
+from cmpdesign.products.mold.processes import results_of_parts
 from cmpdesign.products.mold.solids.loops import bounding_boxes
 from cmpdesign.products.mold.solids.slab_shells import make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.solids.tessellate import chorded_slab, tessellate_solid
@@ -42,12 +44,15 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
         DesignError: the mold cannot be made.
         MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
+    for library in ("trimesh", "lib3mf"):  # a missing one is an error before the work
+        import_module(library)
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
     figures: dict[str, Any] = {}
     parts = make_parts(stack)
-    mold = [_add_checked_figures(f"mold/{part.name}", *make_part_mesh(part), figures) for part in parts]
+    meshes: dict[str, PartMesh] = results_of_parts(f"{__name__}:mesh_named_parts", design, layout, parts)
+    mold = [_add_checked_figures(f"mold/{name}", *mesh, figures) for name, mesh in meshes.items()]
     pad = [
         _add_checked_figures(f"pad/{mesh.name}", mesh, volume_mm3, EXACT_TOLERANCE, figures)
         for mesh, volume_mm3 in pad_meshes(stack)
@@ -71,6 +76,12 @@ class PartMesh(NamedTuple):
     mesh: TriangleMesh
     volume_mm3: float
     tolerance: float
+
+
+def mesh_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> list[PartMesh]:
+    """The triangle meshes of the parts of these names."""
+    parts = {part.name: part for part in make_parts(make_stack(design, layout))}
+    return [make_part_mesh(parts[name]) for name in names]
 
 
 def make_part_mesh(part: Part) -> PartMesh:

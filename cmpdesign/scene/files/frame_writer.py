@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.files.atomic import Stage
 from cmpdesign.files.video_writer import CODECS, VideoWriter
+from cmpdesign.inputs.files import is_folder, path_exists
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -54,12 +57,13 @@ def open_frame_writer(path: Path, fps: float, size: tuple[int, int], bits: int) 
 
 
 class PngFolderWriter:
-    """A folder of frame_000000.png and so on, written under another name and renamed by ``close``."""
+    """A folder of frame_000000.png and so on, written under a random name and renamed by ``close``."""
 
     def __init__(self, path: Path) -> None:
-        if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        if path_exists(path) and not (is_folder(path) and not any(path.iterdir())):
             raise OutputError(f"{path}: exists and is no empty folder; give another place or delete it")
-        self._path, self._part, self._frames = path, path.with_name(path.name + ".part"), 0
+        self._path, self._frames = path, 0
+        self._stage: Stage | None = None
 
     def add(self, picture: Image) -> None:
         """Append an image (H, W, 3) BGR.
@@ -69,14 +73,17 @@ class PngFolderWriter:
         """
         from cmpdesign.files.images import to_png
 
-        try:
-            if not self._frames:
-                shutil.rmtree(self._part, ignore_errors=True)
-                self._part.mkdir(parents=True)
-            (self._part / f"frame_{self._frames:06d}.png").write_bytes(to_png(picture))
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        with self._as_output_error():
+            if self._stage is None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                self._stage = Stage(self._path.parent)
+                self._staged(self._stage).mkdir()
+            file = self._staged(self._stage) / f"frame_{self._frames:06d}.png"
+            file.write_bytes(to_png(picture))
         self._frames += 1
+
+    def _staged(self, stage: Stage) -> Path:
+        return stage.folder / "frames"
 
     def close(self) -> None:
         """Move the folder to its path.
@@ -84,11 +91,21 @@ class PngFolderWriter:
         Raises:
             OutputError: the folder cannot be moved.
         """
-        try:
-            self._part.replace(self._path)
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
+        with self._as_output_error():
+            if self._stage is not None:
+                self._stage.commit(self._staged(self._stage), self._path)
+        self.discard()
 
     def discard(self) -> None:
-        """Delete all that was written."""
-        shutil.rmtree(self._part, ignore_errors=True)
+        """Delete all that was written and is not at its path."""
+        if self._stage is not None:
+            self._stage.close()
+            self._stage = None
+
+    @contextmanager
+    def _as_output_error(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.discard()
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None

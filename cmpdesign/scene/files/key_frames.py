@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from cmpdesign.inputs.names import nearest_name
 from cmpdesign.scene.errors import SceneError
 
 KeyFrames = tuple[tuple[float, float | tuple[float, ...]], ...]
@@ -53,10 +53,9 @@ def document_at_time(
 def _find_table(target: Any, name: str, path: str, parent_path: str) -> Any:
     known = [str(i) for i in range(len(target))] if isinstance(target, list) else list(target)
     if name not in known:
-        similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f" (did you mean {similar[0]}?)" if similar else ""
+        inside = f" in {parent_path}" if parent_path else ""
         raise SceneError(
-            f"[sequence] values.{path}: there is no {name}{' in ' + parent_path if parent_path else ''}{hint}; "
+            f"[sequence] values.{path}: there is no {name}{inside}{nearest_name(name, known)}; "
             "give its starting value in the file"
         )
     found = target[int(name)] if isinstance(target, list) else target[name]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,6 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.errors import InputError
+from cmpdesign.inputs.documents import read_toml
+from cmpdesign.inputs.names import nearest_name
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.scene.camera.pinhole import Pinhole
@@ -131,8 +133,11 @@ def load_scene(
         SceneError: the file cannot be read, is not TOML, or has a name or value that is not allowed.
     """
     path = Path(path)
+    try:
+        document = read_toml(path)
+    except InputError as error:
+        raise SceneError(str(error)) from None
     with _errors_with_path(path):
-        document = _read_toml(path)
         replacements = {"size_px": size_px and list(size_px), "seed": seed}
         document |= {name: value for name, value in replacements.items() if value is not None}
         sequence = document.pop("sequence", None)
@@ -155,17 +160,6 @@ def _check_tables(tables: SceneTables, file: SceneFile) -> None:
         from cmpdesign.scene.files.contacts import check_contact
 
         check_contact(tables.contact, file.path.parent)
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise SceneError("is no UTF-8 text, so no TOML") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"is no valid TOML: {error}") from None
 
 
 def _make_parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
@@ -219,7 +213,9 @@ def _make_background(tables: SceneTables, path: Path) -> Background:
 
 def _parse_rgb(value: tuple[float, float, float] | str, name: str) -> tuple[float, float, float]:
     if name not in COLORS:
-        raise SceneError(f"[inks] {name} is unknown; the inks are {', '.join(COLORS)}")
+        raise SceneError(
+            f"[inks] {name} is unknown{nearest_name(name, COLORS)}; the inks are {', '.join(COLORS)}"
+        )
     if not isinstance(value, str):
         return value
     digits = value.removeprefix("#")

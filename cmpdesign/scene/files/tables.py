@@ -5,8 +5,8 @@ A part's table has the names of its dataclass (``Camera``, ``Light`` ...), so ev
 
 from __future__ import annotations
 
-import difflib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from itertools import pairwise
@@ -16,6 +16,8 @@ from typing import Any, Literal, Self, Union, cast, get_args, get_origin, get_ty
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from cmpdesign.inputs.names import nearest_name
+from cmpdesign.inputs.validation import shown_value
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.errors import STRICT, SceneError
@@ -39,7 +41,10 @@ LOOKING_KEYS = (
     "back",
 )
 BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's kinds of errors
+MOST_ERRORS, MOST_VALUE_LETTERS = 20, 80  # of a message
 MUST_BE = "; it must be "  # between a value and the type that it must have
+TYPE_NAME = re.compile(r"float|str|[a-z-]+\[.*\]", re.DOTALL)  # as pydantic writes the types of a union
 # A key frame's value is a number, or a position as [x, y] or [x, y, z].
 Value = float | tuple[float, ...]
 
@@ -198,7 +203,7 @@ def read_background(table: Mapping[str, Any]) -> Any:
     kind = table.get("kind")
     if kind not in kinds:
         raise SceneError(
-            f"[background] kind is {kind!r}{_suggest_name(str(kind), kinds)}; it is one of {', '.join(kinds)}"
+            f"[background] kind is {kind!r}{nearest_name(kind, kinds)}; it is one of {', '.join(kinds)}"
         )
     if kind == "picture":
         return _validate_table(BackgroundTable, table, "background")
@@ -212,20 +217,22 @@ def _validate_table(model: type, table: Mapping[str, Any], where: str) -> Any:
         # Strict validation of JSON accepts lists for tuples and tables for dataclasses, but no texts for numbers.
         return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        messages = [_error_message(item, model, where) for item in error.errors()]
+        messages = [_error_message(item, model, where) for item in error.errors()[:MOST_ERRORS]]
         raise SceneError("; ".join(_join_alternatives(messages))) from None
 
 
 def _error_message(item: Any, model: type, where: str) -> str:
-    inner = [part for part in item["loc"] if not _is_type_name(part)]
+    *parents, last = item["loc"] or ("",)
+    is_name = item["type"] in UNKNOWN or not _is_type_name(last)
+    inner = [part for part in parents if not _is_type_name(part)] + ([last] if is_name else [])
     path: list[int | str] = [where, *inner] if where else inner
     text, kind = item["msg"].removeprefix("Value error, ").removeprefix("Input should be "), item["type"]
     if kind == "value_error":  # a part's own check: the message names the key
         return f"{_table_label(path)}{text}"
     table, key = _table_label(path[:-1]), str(path[-1])
-    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
+    if kind in UNKNOWN:
         known = _known_names(model, inner[:-1])
-        return f"{table}{key} is unknown{_suggest_name(key, known)}; there are {', '.join(known)}"
+        return f"{table}{key} is unknown{nearest_name(key, known)}; there are {', '.join(known)}"
     if kind == "too_long":
         found, most = item["ctx"]["actual_length"], item["ctx"]["max_length"]
         return f"{table}{key} has {found} values; it takes {most}"
@@ -237,6 +244,7 @@ def _error_message(item: Any, model: type, where: str) -> str:
     unit = next((f" in {unit}" for unit in ("mm", "deg", "px") if key.endswith(f"_{unit}")), "")
     text = text.replace("an object", "a table").replace("a valid array", "a list")
     shown = "a table" if isinstance(item["input"], dict) else json.dumps(item["input"])
+    shown = shown if len(shown) <= MOST_VALUE_LETTERS else shown_value(item["input"])
     return f"{table}{key} is {shown}{MUST_BE}{text}{unit}"
 
 
@@ -254,7 +262,7 @@ def _join_alternatives(messages: list[str]) -> list[str]:
 
 def _is_type_name(part: int | str) -> bool:
     """Whether a part of an error's path is a type: pydantic inserts the types of unions into paths."""
-    return isinstance(part, str) and (part in ("float", "str") or "[" in part)
+    return isinstance(part, str) and bool(TYPE_NAME.fullmatch(part))
 
 
 def _table_label(path: list[int | str]) -> str:
@@ -288,8 +296,3 @@ def _inner_table_class(hint: Any) -> Any:
             found for found in map(_inner_table_class, get_args(hint)) if found not in (type(None), Ellipsis)
         )
     return hint
-
-
-def _suggest_name(word: str, known: list[str]) -> str:
-    found = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f" (did you mean {found[0]}?)" if found else ""

@@ -27,7 +27,7 @@ from extractor.numbering.gaps.gap_check import consistent_cells, is_white_cell_c
 from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.compilation import compiled
 from extractor.numeric.nearest_points import bucket_grid, fill_nearest_points
-from extractor.result import Origin
+from extractor.result import Origin, Reason
 
 MAX_ROUNDS = 40
 MIN_NUMBERED_CELLS = 8  # intact ones, for any prediction
@@ -53,7 +53,7 @@ def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice) 
     is_ambiguous = is_white_cell_contradicted(
         cells.center_px, cells.is_intact, cell, white_px, white_mm, lattice.layout_cells
     )
-    return replace(numbering, cell=cell, ambiguous=bool(is_ambiguous))
+    return replace(numbering, cell=cell, doubt=Reason.AMBIGUOUS if is_ambiguous else None)
 
 
 @compiled

@@ -15,6 +15,7 @@ import pytest
 
 from cmpdesign import __version__
 from cmpdesign.design.templates import templates
+from cmpdesign.files.earlier_files import LIST_NAME
 from extractor import load_layout
 from tests.support.command import refused, run
 
@@ -30,8 +31,8 @@ def test_templates_are_listed() -> None:
 def test_build_every_template(name: str, tmp_path: Path) -> None:
     result = run("build", name, "-o", tmp_path)
     assert result.exit_code == 0, result.output
-    written = {"pattern.svg", "layout.json", "preview.png", "report.json"}
-    assert {path.name for path in tmp_path.iterdir()} == written
+    written = {"pattern.svg", "layout.json", "preview.png", "report.json"}  # and the list of them
+    assert {path.name for path in tmp_path.iterdir()} == {*written, LIST_NAME}
     assert all(file in result.stdout for file in written)
     reference = load_layout(tmp_path / "layout.json")
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
@@ -52,7 +53,7 @@ def test_build_only_and_set(tmp_path: Path) -> None:
     arguments = ("--set", "layers=3", "--set", "pitch_mm=60mil", "--set", "palette.red=#ff0000")
     result = run("build", "round", "-o", tmp_path, "--only", "layout, svg", *arguments)
     assert result.exit_code == 0, result.output
-    assert {path.name for path in tmp_path.iterdir()} == {"pattern.svg", "layout.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"pattern.svg", "layout.json", LIST_NAME}
     reference = load_layout(tmp_path / "layout.json")
     assert reference.layers == 3
     assert reference.parameters["pitch_mm"] == pytest.approx(1.524)
@@ -79,6 +80,11 @@ def test_check() -> None:
     assert "smallest cell" in result.stdout and "mm" in result.stdout
     assert run("check", "honeycomb", "--set", "pitch_mm=0.3").exit_code == 0
     assert "px" in run("check", "tac3d", "--camera", "160x120").stdout
+    for same in ("160X120", " 160 x 120 ", "160×120"):
+        assert (
+            run("check", "tac3d", "--camera", same).stdout
+            == run("check", "tac3d", "--camera", "160x120").stdout
+        )
 
 
 def test_schema_is_one() -> None:

@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
+from cmpdesign.files.images import IMAGE_BITS
 from cmpdesign.scene import load_truth
 from tests.support.command import refused, run
 
@@ -74,12 +75,12 @@ def test_render_takes_a_response(made: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("option", "value", "expected"),
     [
-        ("--pitch", "0", "pitch_px is 0"),
+        ("--pitch", "0", "--pitch is 0; it must be above 0 px"),
         ("--pitch", "nan", "--pitch is nan; expected a finite number"),
         ("--rotation", "inf", "--rotation is inf"),
-        ("--tilt", "89", "tilt_deg is 89"),
-        ("--blur", "-1", "blur_px is -1"),
-        ("--noise", "-1", "noise is -1"),
+        ("--tilt", "89", "--tilt is 89"),
+        ("--blur", "-1", "--blur is -1"),
+        ("--noise", "-1", "--noise is -1"),
         ("--press", "50", "fold"),
         ("--response", "rec709", "--response rec709: expected srgb, linear or an exponent from 0.2 to 5"),
         ("--response", "9", "response is the exponent 9; it must lie between 0.2 and 5"),
@@ -227,3 +228,51 @@ def test_output_that_cannot_be_written(made: Path, tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(os, "replace", full)
     assert "No space left" in refused("render", made / "layout.json", "-o", tmp_path / "a.png")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+MAGIC = {
+    ".png": b"\x89PNG", ".jpg": b"\xff\xd8\xff", ".JPEG": b"\xff\xd8\xff", ".tif": b"II*\0", ".tiff": b"II*\0",
+    ".bmp": b"BM", ".webp": b"RIFF",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", IMAGE_BITS)
+def test_an_image_is_encoded_by_its_ending(suffix: str, made: Path, tmp_path: Path) -> None:
+    options = ("--size", "200X160", "--noise", "2")
+    for name in (f"a{suffix}", "b.png"):
+        assert run("render", made / "layout.json", "-o", tmp_path / name, *options).exit_code == 0
+    data = (tmp_path / f"a{suffix}").read_bytes()
+    assert data.startswith(MAGIC.get(suffix) or MAGIC[suffix.upper()])
+    image, exact = cv2.imread(str(tmp_path / f"a{suffix}")), cv2.imread(str(tmp_path / "b.png"))
+    assert image is not None and exact is not None and image.shape == (160, 200, 3)
+    error = np.abs(image.astype(int) - exact)
+    assert error.max() == 0 or (suffix in (".jpg", ".jpeg") and error.mean() < 5)
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.txt", "a", "layout.json"])
+def test_an_image_of_another_ending_is_refused(name: str, made: Path, tmp_path: Path) -> None:
+    line = refused("render", made / "layout.json", "-o", tmp_path / name)
+    assert "unknown ending; expected one of .png, .tif" in line and list(tmp_path.iterdir()) == []
+    line = refused("render", made / "layout.json", "-o", tmp_path / "a.png", "--truth", tmp_path / name)
+    assert "unknown ending; expected .npz" in line and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--pitch", "--tilt", "--blur", "--noise", "--press-radius"])
+def test_the_option_is_blamed_that_was_given(option: str, made: Path, tmp_path: Path) -> None:
+    line = refused("render", made / "layout.json", "-o", tmp_path / "a.png", "--press", "0.1", option, "-500")
+    assert line.startswith(f"error: {option} is -500; ")
+
+
+def test_verify_takes_a_folder(made: Path, tmp_path: Path) -> None:
+    for name in ("frame10.png", "frame2.png"):
+        (tmp_path / name).write_bytes((made / "good.png").read_bytes())
+    (tmp_path / "notes.txt").write_text("no picture")
+    result = run("verify", made / "layout.json", tmp_path, made / "good.png")
+    names = [line.partition(": ")[0] for line in result.stdout.splitlines()]
+    assert result.exit_code == 0 and [Path(name).name for name in names] == [
+        "frame2.png",
+        "frame10.png",
+        "good.png",
+    ]
+    (tmp_path / "empty").mkdir()
+    assert "holds no image" in refused("verify", made / "layout.json", tmp_path / "empty")

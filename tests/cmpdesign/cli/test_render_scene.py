@@ -68,7 +68,7 @@ def test_the_command_refuses_what_does_not_fit(run: Callable[..., tuple[int, str
     odd = MOVING.replace("[96, 80]", "[97, 80]")
     deep = MOVING.replace("noise = 3", "bits = 16")
     for text, words, message in (
-        (still, ("-o", tmp_path / "a.mkv"), "unknown ending; expected .png"),
+        (still, ("-o", tmp_path / "a.mkv"), "unknown ending; expected one of .png"),
         (MOVING, ("-o", tmp_path / "a.png"), "expected .mp4, .avi, .mkv, or none"),
         (MOVING, ("-o", tmp_path / "full"), "is no empty folder"),
         (odd, ("-o", tmp_path / "a.mp4"), "an .mp4 has even sides"),

@@ -104,7 +104,7 @@ def test_height_maps_that_are_none(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "color.png"), np.arange(300, dtype=np.uint8).reshape(10, 10, 3))
     cv2.imwrite(str(tmp_path / "gray.png"), np.zeros((4, 4), np.uint8))
     for name, depth, words in (
-        ("text.png", 1.0, "is no image"),
+        ("text.png", 1.0, "is not an image"),
         ("none.png", 1.0, "cannot be read"),
         ("color.png", 1.0, "color image"),
         ("gray.png", None, "depth_mm is None; it must be above 0"),

@@ -239,7 +239,7 @@ def test_rest_poses_are_those_of_the_sensor() -> None:
     ("change", "message"),
     [
         (("thickness_mm = 5.0", "thickness_mm = -5.0"), "elastomer.thickness_mm"),
-        (("[elastomer]", "[elastomer"), "not TOML"),
+        (("[elastomer]", "[elastomer"), "is no valid TOML"),
         (("noise = [1.0, 3.0]", "noise = [3.0, 1.0]"), "smaller limit first"),
         (('object = "wedge"', 'object = "spoon"'), "spoon"),
         (("size_px = [640, 360]", ""), "size_px"),
@@ -257,7 +257,7 @@ def test_a_bad_sensor_is_one_clear_line(change: tuple[str, str], message: str) -
 
 def test_bad_choices_are_one_line(tmp_path: Path) -> None:
     for arguments, message in (
-        (("response", "-o", tmp_path, "--sensor", "tac4d"), "no such sensor; there are tac3d"),
+        (("response", "-o", tmp_path, "--sensor", "tac4d"), "did you mean tac3d?"),
         (("response", "-o", tmp_path, "--preset", "best"), "unknown; there are fast"),
     ):
         assert message in evaluate(*arguments, code=2)

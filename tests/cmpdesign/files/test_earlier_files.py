@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 from cmpdesign.cli import app
 from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
+from cmpdesign.products.registry import PRODUCTS
 
 
 def build(output: Path, files: dict[str, str | bytes]) -> list[str]:
@@ -99,3 +101,56 @@ def test_the_command_says_what_it_removed(tmp_path: Path) -> None:
     assert gone == {f"5-outline.{kind}" for kind in ("svg", "dxf", "lbrn2", "gcode")}
     assert all(f"{name}, of an earlier build" in text for name in gone) and LIST_NAME not in text
     assert (laser / "mine.svg").exists() and (tmp_path / "out" / "pattern.svg").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["a\0b", "x" * 300, "d/" * 3000, "\ud800", "loop", "loop/a", "pipe", ".", ""]
+)
+def test_odd_names_in_a_list_are_no_files_to_remove(name: str, tmp_path: Path) -> None:
+    build(tmp_path, FIRST)
+    (tmp_path / "mold" / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "mold" / "pipe")
+    path = tmp_path / "mold" / LIST_NAME
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["sha256"][name] = "0" * 64
+    path.write_text(json.dumps(document), encoding="utf-8")
+    before = sorted(tmp_path.rglob("*"))
+    assert [one for one in build(tmp_path, {"mold/base.step": b"6"}) if one != "mold/white.step"] == []
+    assert {one for one in before if one not in sorted(tmp_path.rglob("*"))} <= {
+        tmp_path / "mold" / "white.step"
+    }
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def built(output: Path, *arguments: str) -> dict[str, bytes]:
+    """The files of a folder after a build, without the lists."""
+    result = CliRunner().invoke(app, ["build", "honeycomb", "-o", str(output), *arguments])
+    assert result.exit_code == 0, result.output
+    return {name: data for name, data in contents(output).items() if not name.endswith(LIST_NAME)}
+
+
+# Solids take seconds, and the rule is the same for every folder.
+@pytest.mark.parametrize("only", sorted(PRODUCTS.keys() - {"mold", "mesh"}))
+def test_a_folder_holds_the_files_of_one_pattern(only: str, tmp_path: Path) -> None:
+    """Whatever one product is made of another pattern, nothing of the earlier pattern stays beside it."""
+    first = ("--set", "layers=2", "--only", "svg,layout,preview,report,laser,print")
+    other = ("--set", "layers=3", "--only", only)
+    built(tmp_path / "mixed", *first)
+    (tmp_path / "mixed" / "mine.txt").write_text("mine")
+    after = built(tmp_path / "mixed", *other)
+    assert after == {**built(tmp_path / "clean", *other), "mine.txt": b"mine"}
+    # The same pattern again: what earlier builds made stays.
+    more = built(tmp_path / "mixed", *other[:2], "--only", "layout")
+    assert after.items() <= more.items() and "layout.json" in more
+    gone = built(tmp_path / "mixed", *first[:2], "--only", "layout")
+    assert set(gone) == {"layout.json", "mine.txt"}
+
+
+def test_a_changed_file_of_another_pattern_stays(tmp_path: Path) -> None:
+    built(tmp_path, "--set", "layers=2")
+    (tmp_path / "pattern.svg").write_text("drawn over")
+    after = built(tmp_path, "--set", "layers=3", "--only", "layout")
+    assert set(after) == {"pattern.svg", "layout.json"} and after["pattern.svg"] == b"drawn over"

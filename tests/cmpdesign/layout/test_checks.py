@@ -13,6 +13,7 @@ from cmpdesign.layout.checks import Finding, check_design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_angles_deg, cell_areas_mm2, cell_widths_mm, edge_lengths_mm
 from cmpdesign.layout.report import design_report, report_to_json
+from cmpdesign.patterns import registered_patterns
 
 
 def findings(**fields: object) -> list[Finding]:
@@ -104,3 +105,23 @@ def test_the_report_file_carries_figures_and_findings() -> None:
     assert document["present_markers"] < document["markers"]
     assert {"subject", "value", "limit", "unit", "remedy", "severity"} == set(document["findings"][0])
     assert document["findings"][0]["severity"] == "error"
+
+
+@pytest.mark.parametrize("pattern", sorted(registered_patterns()))
+@pytest.mark.parametrize(
+    "size", [{"pitch_mm": 0.1, "layers": 4}, {"width_mm": 1.2, "layers": 8, "border_mm": 0}]
+)
+def test_what_the_remedy_for_small_cells_names_makes_them_larger(
+    pattern: str, size: dict[str, float]
+) -> None:
+    def cell_mm(fields: dict[str, object]) -> float:
+        return float(cell_widths_mm(build_layout(Design(**{"pattern": pattern, **fields}))).min())
+
+    found = findings(pattern=pattern, **({"pitch_mm": None} | size))
+    remedy = next(f.remedy for f in found if f.subject.startswith("smallest cell"))
+    named = {name: value for name, value in size.items() if name in remedy}
+    assert named
+    for name, value in named.items():
+        changed = value / 2 if name == "layers" else value * 2
+        assert f"{name} fewer" in remedy if name == "layers" else f"{name} larger" in remedy
+        assert cell_mm({**size, name: type(value)(changed)}) > 1.3 * cell_mm({**size})

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.reading.verify import judge_markers, verify
-from extractor import Extractor, Reason
+from cmpdesign.scene import Camera, Scene, render
+from extractor import Extractor, Reason, parse_layout
+from tests.support.layouts import small_layout, small_text
 from tests.support.verdicts import LAYERS, markers_at, picture, reference
 
 
@@ -116,3 +118,21 @@ def test_pictures_without_a_pattern(make: Callable[[NDArray[np.uint8]], NDArray[
 def test_a_share_is_a_share(share: float) -> None:
     with pytest.raises(CmpDesignError, match="min_share"):
         verify(Extractor(reference()), reference(), picture().image, min_share=share)
+
+
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
+@pytest.mark.parametrize(("seen", "given"), [(5, 3), (3, 5)])
+def test_a_pattern_of_other_layers_is_named(pattern: str, seen: int, given: int) -> None:
+    """Not as a lost white cell: more layers hide it from the search, and fewer leave the rim unseen."""
+    image = render(Scene(layout=small_layout(pattern, seen), camera=Camera(30, 7)), size=(480, 400)).image
+    layout = parse_layout(small_text("honeycomb", given))
+    verdict = verify(Extractor(layout), layout, image)
+    assert not verdict.verified
+    assert f"does not fit the layout: it has {seen} layers, the layout {given};" in str(verdict.reason)
+
+
+def test_a_part_of_the_pattern_is_not_taken_for_another() -> None:
+    """The picture ends before the pattern does, so its layers cannot be counted."""
+    image = render(Scene(layout=small_layout("honeycomb", 5), camera=Camera(30, 7)), size=(320, 240)).image
+    layout = parse_layout(small_text("honeycomb", 5))
+    assert "markers measured" in str(verify(Extractor(layout), layout, image).reason)

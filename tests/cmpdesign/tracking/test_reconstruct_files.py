@@ -97,7 +97,7 @@ def test_views_are_read_by_their_response(made: Path, tmp_path: Path) -> None:
 
     def errors(*options: object) -> tuple[float, float]:
         positions = arrays(made, tmp_path / "a.npz", "--frames", "2", *options)["3D_Positions"]
-        summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+        summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
         rest_px = float(np.mean([view["rms_px"] for view in summary["views"]]))
         return rest_px, float(np.sqrt(np.nanmean((positions - truth[:2]) ** 2)))
 
@@ -141,7 +141,7 @@ def test_all_tables_say_the_same(made: Path, tmp_path: Path) -> None:
 
 def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     arrays(made, tmp_path / "a.npz")
-    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
     assert summary["frames"] == {
         "declared": 4, "read": 4, "tracked": 3, "lost": 1, "unreadable": 0, "other_size": 0
     }  # fmt: skip

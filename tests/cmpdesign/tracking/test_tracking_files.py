@@ -9,7 +9,11 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import cv2
@@ -19,9 +23,10 @@ from typer.testing import CliRunner
 
 from cmpdesign.cli import app
 from cmpdesign.scene import Sensor, Twist, render
+from cmpdesign.tracking.sources import SourceError, open_source
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
-from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene
+from tests.support.tracking_scenes import LAYERS, SIZE, moving, reference, scene, shot
 
 FRAMES = 24
 MARKERS = 91
@@ -73,7 +78,7 @@ def test_a_video_becomes_arrays(made: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(table["displacement_px"], table["xy_px"] - table["rest_xy_px"])
     np.testing.assert_array_equal(table["layout_xy_mm"], reference().xy_mm)
     assert str(table["digest"]) == reference().digest
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.npz.summary.json"]
 
 
 def test_frames_are_read_by_their_response(made: Path, tmp_path: Path) -> None:
@@ -125,7 +130,7 @@ def test_all_tables_and_sources_say_the_same(made: Path, tmp_path: Path) -> None
 
 def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     result = run("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.csv")
-    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((tmp_path / "a.csv.summary.json").read_text(encoding="utf-8"))
     assert summary["frames"] == {
         "declared": 24,
         "read": 24,
@@ -146,15 +151,13 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
 
 
 def test_jitter_at_rest_is_the_noise_of_resting_markers(made: Path, tmp_path: Path) -> None:
-    from tests.support.tracking_scenes import shot
-
     (tmp_path / "rest").mkdir()
     found = []
     for index in range(15):
         cv2.imwrite(str(tmp_path / "rest" / f"{index}.png"), shot(seed=index).image)
     table = tracked(made, str(tmp_path / "rest"), tmp_path / "a.npz")
     found = table["xy_px"].std(axis=0, ddof=1)
-    summary = json.loads((tmp_path / "a.summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
     assert summary["jitter_px"] == pytest.approx(np.sqrt(np.mean(found**2)), rel=0.1)
 
 
@@ -205,7 +208,7 @@ def test_a_truncated_video_keeps_its_frames(made: Path, tmp_path: Path) -> None:
     good = table["frame_status"] == 1
     assert good.sum() >= read - 1  # the last one may be torn
     assert np.abs(table["xy_px"] - np.load(made / "truth.npy")[:read])[good].max() < 1.0
-    assert json.loads((tmp_path / "a.summary.json").read_text())["ended_early"]
+    assert json.loads((tmp_path / "a.npz.summary.json").read_text())["ended_early"]
 
 
 def test_a_damaged_folder_keeps_every_frame_in_its_place(made: Path, tmp_path: Path) -> None:
@@ -247,6 +250,9 @@ class StoppingCamera:
     def isOpened(self) -> bool:
         return True
 
+    def get(self, key: int) -> float:
+        return {cv2.CAP_PROP_FRAME_WIDTH: 320, cv2.CAP_PROP_FRAME_HEIGHT: 240}[key]
+
     def read(self) -> tuple[bool, Any]:
         return (True, cv2.imread(str(self.paths.pop(0)))) if self.paths else (False, None)
 
@@ -256,7 +262,9 @@ class StoppingCamera:
 
 def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     camera = StoppingCamera(made / "frames", 8)
-    monkeypatch.setattr(cv2, "VideoCapture", lambda number: camera)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: camera)
+    line = refused("track", made / "layout.json", "0", "-o", tmp_path / "a.npz", "--max-pixels", 60_000)
+    assert "camera 0: its frames have 320 x 240 px; the limit is 0.06 megapixels" in line
     result = run("track", made / "layout.json", "0", "-o", tmp_path / "a.npz")
     assert result.exit_code == 1 and "the camera stopped after 8 frames" in result.stderr
     table = loaded(tmp_path / "a.npz")
@@ -346,7 +354,7 @@ def test_ctrl_c_completes_the_file(number: int, made: Path, long_folder: Path, t
     assert code == 130 and "Traceback" not in errors
     rows = rows_of(tmp_path / "a.csv")
     assert len(rows) % MARKERS == 0 and 5 < len(rows) // MARKERS < 4000
-    assert json.loads((tmp_path / "a.summary.json").read_text())["frames"]["read"] == len(rows) // MARKERS
+    assert json.loads((tmp_path / "a.csv.summary.json").read_text())["frames"]["read"] == len(rows) // MARKERS
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])
@@ -421,3 +429,78 @@ def test_parquet_without_pyarrow_says_how_to_get_it(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
     assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []
+
+
+def test_letters_of_a_damaged_video_are_not_printed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A name of four letters in an AVI file may be an escape sequence."""
+    path = tmp_path / "a.avi"
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, (32, 24))
+    for _ in range(3):
+        video.write(np.zeros((24, 32, 3), np.uint8))
+    video.release()
+    good = path.read_bytes()
+    for name in (b"RIFF", b"AVI ", b"LIST", b"hdrl", b"avih", b"strl", b"strh", b"movi"):
+        path.write_bytes(good.replace(name, b"\x1b[2J", 1))
+        with suppress(SourceError):
+            list(open_source(str(path)).frames())
+    assert "\x1b" not in "".join(capfd.readouterr())
+
+
+def test_a_stream_is_read_by_its_address(made: Path, tmp_path: Path) -> None:
+    """A video that a server sends, as a network camera does; a password is not shown or stored."""
+    handler = partial(QuietHandler, directory=str(made))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://me:secret@127.0.0.1:{server.server_port}/video.avi"
+        result = run("track", made / "layout.json", address, "-o", tmp_path / "a.npz")
+        missing = f"http://me:secret@127.0.0.1:{server.server_port}/none.avi"
+        line = refused("track", made / "layout.json", missing, "-o", tmp_path / "b.npz")
+        server.shutdown()
+    assert result.exit_code == 1 and f"stream http://127.0.0.1:{server.server_port}" not in result.stdout
+    assert f"the stream stopped after {FRAMES} frames" in result.stderr
+    assert (loaded(tmp_path / "a.npz")["frame_status"][:FRAMES] == 1).all()
+    texts = [line, result.output, (tmp_path / "a.npz.summary.json").read_text()]
+    assert not any("secret" in text for text in texts)
+    assert f"stream {missing.replace('me:secret@', '')} cannot be opened" in line
+
+
+def test_an_address_is_said_as_it_was_given(made: Path, tmp_path: Path) -> None:
+    address = "rtsp://127.0.0.1:9/live"
+    assert f"stream {address} cannot be opened; is the address right" in refused(
+        "track", made / "layout.json", address, "-o", tmp_path / "a.npz"
+    )
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None: ...
+
+
+def test_tables_of_one_name_have_their_own_summaries(made: Path, tmp_path: Path) -> None:
+    written = []
+    for frames, kind in enumerate(("npz", "csv", "parquet"), start=1):
+        table, options = tmp_path / f"a.{kind}", ("--frames", frames, "--quiver", tmp_path / "q.png")
+        result = run("track", made / "layout.json", made / "video.avi", "-o", table, *options)
+        written.append(result.stdout)
+        assert f"wrote {table}\nwrote {table}.summary.json\nwrote {tmp_path / 'q.png'}\n" in result.stdout
+    for frames, kind in enumerate(("npz", "csv", "parquet"), start=1):
+        summary = json.loads((tmp_path / f"a.{kind}.summary.json").read_text())
+        assert summary["frames"]["read"] == frames
+        assert summary["frames_per_s"] > 0 and "frames per second" in written[0]
+
+
+def test_arrows_of_noise_are_not_shown_as_motion(made: Path, tmp_path: Path) -> None:
+    """Arrows of a resting pattern stay near the circle that shows the noise; those of a motion do not."""
+    (tmp_path / "rest").mkdir()
+    for index in range(4):
+        cv2.imwrite(str(tmp_path / "rest" / f"{index}.png"), shot(seed=index).image)
+
+    def colored(source: str) -> int:
+        tracked(made, source, tmp_path / "a.npz", "--quiver", tmp_path / "q.png")
+        picture = np.asarray(cv2.imread(str(tmp_path / "q.png")), dtype=int)[:-80]
+        (tmp_path / "a.npz").unlink()
+        return int((picture.max(axis=2) - picture.min(axis=2) > 60).sum())
+
+    resting, moved = colored(str(tmp_path / "rest")), colored("video.avi")
+    assert 0 < resting < 0.6 * moved

@@ -243,7 +243,7 @@ def test_wrong_files(tmp_path: Path) -> None:
         binary: "byte 12 is not UTF-8",
         loop: "cannot be read",
         tmp_path / "nul\0.json": "cannot be read",
-        Path("/dev/zero"): "larger than",
+        Path("/dev/zero"): "a device; expected a regular file",
     }
     for path, expected in cases.items():
         with pytest.raises(LayoutError, match=expected) as caught:
@@ -251,12 +251,14 @@ def test_wrong_files(tmp_path: Path) -> None:
         assert str(caught.value).isprintable()
 
 
-def test_deep_but_valid_parameters() -> None:
-    document = small_document()
-    text = json.dumps(document).replace(
-        '"parameters": {', '"parameters": {"deep": ' + "[" * 400 + "]" * 400 + ", "
-    )
-    assert isinstance(parse_layout(text), Reference)
+@pytest.mark.parametrize(("levels", "is_read"), [(38, True), (41, False), (900, False)])
+def test_deep_parameters(levels: int, is_read: bool) -> None:
+    deep = '"parameters": {"deep": ' + "[" * levels + "]" * levels + ", "
+    text = json.dumps(small_document()).replace('"parameters": {', deep)
+    if is_read:
+        assert isinstance(parse_layout(text), Reference)
+    else:
+        assert "nested too deeply" in refused(text)
 
 
 JSON = st.recursive(

@@ -290,3 +290,29 @@ def test_light_or_focus_that_jumps_is_seen_anew(tint: tuple[float, float, float]
     assert np.median(away / deviation) < 0.5 and (away < 5 * deviation).all()
     assert errors(frame.markers.xy_px, changed).max() < 0.1
     assert frame.markers.stages["refine"].blur_px == pytest.approx(fresh.stages["refine"].blur_px, rel=0.03)
+
+
+def test_equal_frames_agree() -> None:
+    """Within a tenth of the stated standard deviation, from the first frame on, which starts cold."""
+    squares, stated = [], []
+    for seed in range(3):
+        for changes in (
+            {},
+            {"rotation_deg": 31.0, "pitch_px": 15.0},
+            {"tilt_deg": 25.0, "tilt_axis_deg": 40.0},
+        ):
+            image = shot(seed=seed, **changes).image
+            tracker = Tracker(reference())
+            frames = [tracker.track(image) for _ in range(6)]
+            assert [frame.start for frame in frames] == ["cold"] + ["warm"] * 5
+            squares += [np.nanmean(frame.displacement_px**2) for frame in frames[1:]]
+            stated.append(np.mean(frames[0].markers.cov_px2[:, (0, 1), (0, 1)]))
+    assert np.sqrt(np.mean(squares)) < 0.1 * np.sqrt(np.mean(stated))
+
+
+def test_a_cold_start_in_the_middle_keeps_the_motion() -> None:
+    """A frame without color forces a cold start; the frames after it are followed over steps of a third of a pitch."""
+    tracker = Tracker(reference())
+    images = [shot(centre_px=(110 + 6.0 * i, 120.0), seed=i).image for i in range(9)]
+    starts = [tracker.track(image).start for image in [*images[:4], np.zeros_like(images[0]), *images[4:]]]
+    assert starts[4] is None and starts[6:].count("warm") >= 3, starts

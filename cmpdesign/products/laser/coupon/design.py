@@ -15,11 +15,15 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.inputs.documents import parse_json
+from cmpdesign.inputs.files import read_text
+from cmpdesign.inputs.names import Name
+from cmpdesign.inputs.validation import validation_message
 from cmpdesign.products.laser.setup import LaserSetup
 
 # Powers (columns) and repeats (rows), relative to the settings of the job.
@@ -144,19 +148,12 @@ def load_coupon(path: str | Path) -> Coupon:
         CouponError: the file cannot be read or does not describe a coupon; one line that names the field.
     """
     try:
-        with Path(path).open("rb") as file:
-            text = file.read(_MAX_BYTES + 1).decode("utf-8")
-        return _parse_coupon(json.loads(text))
-    except OSError as error:
-        raise CouponError(f"{path}: cannot be read: {error.strerror}") from None
+        return _parse_coupon(parse_json(read_text(path, _MAX_BYTES), str(path)))
+    except InputError as error:
+        raise CouponError(f"{error}; expected a coupon.json as build writes it with --only laser") from None
     except ValidationError as error:
-        item = error.errors()[0]
-        where = ".".join(str(part) for part in item["loc"])
-        raise CouponError(
-            f"{path}: {where}: {item['msg']}; expected a coupon.json as build writes it"
-        ) from None
-    except (ValueError, RecursionError):
-        raise CouponError(f"{path}: is no coupon.json; build writes one with --only laser") from None
+        message = validation_message(error, _CouponFile)
+        raise CouponError(f"{path}: {message}; expected a coupon.json as build writes it") from None
 
 
 class _StrictModel(BaseModel):
@@ -171,7 +168,7 @@ class _OpeningFile(_StrictModel):
 
 
 class _PatchFile(_StrictModel):
-    name: str = Field(min_length=1, max_length=20)
+    name: Annotated[Name, Field(min_length=1, max_length=20)]
     power_percent: float = Field(gt=0, le=100)
     speed_mm_s: float = Field(gt=0, le=1e6)
     passes: int = Field(ge=1, le=1000)
@@ -182,8 +179,8 @@ class _CouponFile(_StrictModel):
     format: str = Field(pattern="^cmp-coupon$")
     version: int = Field(ge=1, le=1)
     units: str = Field(pattern="^mm$")
-    machine: str
-    material: str
+    machine: Name
+    material: Name
     thickness_mm: float = Field(gt=0, le=100)
     taper_deg: float = Field(gt=-45, lt=45)
     taper_assumed: bool

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,7 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cmpdesign.design.mold_options import Tool
 from cmpdesign.design.templates import templates_folder
-from cmpdesign.errors import DesignError
+from cmpdesign.errors import DesignError, InputError
+from cmpdesign.inputs.documents import read_toml
+from cmpdesign.inputs.files import path_exists
+from cmpdesign.inputs.names import Line, Name, nearest_name
+from cmpdesign.inputs.validation import validation_message
 from cmpdesign.products.laser.library import Sourced
 
 Share = Annotated[float, Field(ge=0, lt=10)]
@@ -32,14 +34,14 @@ class Silicone(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    name: str
+    name: Name
     cure: Literal["platinum", "tin"]
     shrinkage_percent: Sourced[Share]
     density_g_cm3: Sourced[Positive]
     pot_life_min: Sourced[Positive]
     cure_h: Sourced[Positive]
     inhibited_by: Sourced[tuple[Tool, ...]]
-    remedy: str
+    remedy: Line
 
     @property
     def scale(self) -> float:
@@ -60,17 +62,14 @@ def load_silicone(name_or_path: str) -> Silicone:
     """
     known = silicones()
     path = known.get(name_or_path, Path(name_or_path))
-    if not path.is_file():
-        near = difflib.get_close_matches(name_or_path, known, n=1, cutoff=0.5)
-        hint = f" (did you mean {near[0]}?)" if near else ""
+    if not path_exists(path):
         raise DesignError(
-            f"mold: {name_or_path!r} is no silicone{hint}; there are {', '.join(known)}, or give a TOML file"
+            f"mold: {name_or_path!r} is no silicone{nearest_name(name_or_path, known)}; there are "
+            f"{', '.join(known)}, or give a TOML file"
         )
     try:
-        return Silicone.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DesignError(f"mold: {path}: is no TOML file of a silicone ({error})") from None
+        return Silicone.model_validate(read_toml(path))
+    except InputError as error:
+        raise DesignError(f"mold: {error}") from None
     except ValidationError as error:
-        item = error.errors()[0]
-        where = ".".join(str(part) for part in item["loc"])
-        raise DesignError(f"mold: {path}: {where}: {item['msg']}") from None
+        raise DesignError(f"mold: {path}: {validation_message(error, Silicone)}") from None

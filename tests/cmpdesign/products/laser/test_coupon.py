@@ -203,7 +203,7 @@ def test_bad_input_is_one_line(tmp_path: Path) -> None:
         (tmp_path / "none.json", blank, "none.json: cannot be read"),
         (tmp_path / "text.json", blank, "expected a coupon.json"),
         (with_change(tmp_path, "fiducials_mm", [[0, 0]]), blank, "fiducials_mm"),
-        (blank, blank, "is no coupon.json"),
+        (blank, blank, "expected a coupon.json"),
         (good, tmp_path / "none.png", "cannot be read"),
         (good, blank, "five round marks were not found"),
         (good, small, "px in a mm, limit 6 px"),

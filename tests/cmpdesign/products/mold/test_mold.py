@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.errors import DesignError
-from cmpdesign.products.mold import finish, make, pad
+from cmpdesign.products.mold import make, pad, processes
 from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.meshes import make_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
@@ -192,8 +192,14 @@ def test_what_cannot_be_made_is_refused_before_any_solid(
 
 def nothing_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every way to a solid or a mesh fails."""
-    for where, way in ((shells.ShellBuilder, "__init__"), (caps, "cap_solid"), (pad, "frusta_mesh")):
-        monkeypatch.setattr(where, way, lambda *arguments: pytest.fail("geometry was built"))
+    ways = (
+        (shells.ShellBuilder, "__init__"),
+        (caps, "cap_solid"),
+        (pad, "frusta_mesh"),
+        (processes.subprocess, "Popen"),
+    )
+    for where, way in ways:
+        monkeypatch.setattr(where, way, lambda *_, **__: pytest.fail("geometry was built"))
 
 
 @pytest.mark.parametrize("product", [make.make_mold, make_meshes])
@@ -261,25 +267,25 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
     design = load_design("honeycomb", {"layers": "3"})
     layout = build_layout(design)
     alone = make.make_mold(design, layout)
-    monkeypatch.setattr(finish, "MIN_BOSSES_FOR_TWO", 0)
+    monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)
     helped: list[object] = []
-    process = finish.subprocess.Popen
+    process = processes.subprocess.Popen
     monkeypatch.setattr(
-        finish.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
+        processes.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
     )
-    monkeypatch.setattr(finish, "available_cores", lambda: 2)
+    monkeypatch.setattr(processes, "available_cores", lambda: 2)
     together = make.make_mold(design, layout)
-    assert len(helped) == 1
+    assert len(helped) == 2
     assert list(together.files.items()) == list(alone.files.items())
     assert together.figures == alone.figures
 
 
 def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     design = load_design("honeycomb", {"layers": "2"})
-    monkeypatch.setattr(finish, "MIN_BOSSES_FOR_TWO", 0)
-    monkeypatch.setattr(finish, "available_cores", lambda: 2)
-    monkeypatch.setattr(finish, "__name__", "cmpdesign.mold.absent")
-    with pytest.raises(RuntimeError, match=r"(?s)the second process failed: .*No module named"):
+    monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)
+    monkeypatch.setattr(processes, "available_cores", lambda: 2)
+    monkeypatch.setattr(processes, "__name__", "cmpdesign.mold.absent")
+    with pytest.raises(RuntimeError, match=r"(?s)a process failed: .*No module named"):
         make.make_mold(design, build_layout(design))
 
 

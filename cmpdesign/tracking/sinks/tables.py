@@ -1,0 +1,133 @@
+"""A sink opened for the suffix of a file, and the table of a killed run completed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any, Protocol
+
+from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.files.atomic import remove_abandoned_stages
+from cmpdesign.files.locks import is_in_use
+from cmpdesign.inputs.files import is_folder, is_regular_file, open_file
+from cmpdesign.tracking.columns import FrameTable
+from cmpdesign.tracking.sinks.assembly import assemble_table
+from cmpdesign.tracking.sinks.chunk_files import find_chunks
+from cmpdesign.tracking.sinks.chunk_sink import ChunkSink
+from cmpdesign.tracking.sinks.csv_recovery import recover_csv
+from cmpdesign.tracking.sinks.csv_sink import CsvSink
+from cmpdesign.tracking.sinks.unfinished import Recovered, part_path, require_pyarrow
+
+KINDS = (".npz", ".parquet", ".csv")
+
+
+class FrameSink(Protocol):
+    """A table that is written frame by frame.
+
+    ``add`` and ``close`` raise ``OutputError``. ``kept`` states the number of written frames and their file.
+    """
+
+    def add(self, frame: Any) -> None: ...
+
+    def close(self) -> None: ...
+
+    def kept(self) -> str: ...
+
+
+def open_sink(path: Path, table: FrameTable) -> FrameSink:
+    """Open the sink for the suffix of a file. The place of a killed run that holds no frame is cleared.
+
+    Raises:
+        CmpDesignError: another suffix, Parquet without pyarrow, or frames of an interrupted or another run exist.
+        OutputError: the file cannot be written.
+    """
+    _require_kind(path)
+    part = part_path(path)
+    if is_folder(path):
+        raise OutputError(f"{path}: is a folder; give a file's name")
+    if os.path.lexists(part):
+        _require_not_in_use(part, path)
+        if _holds_frames(part):
+            raise CmpDesignError(
+                f"{part} holds the frames of an interrupted run; call with --recover, or delete it"
+            )
+    try:
+        _remove(part)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return CsvSink(path, table) if path.suffix == ".csv" else ChunkSink(path, table)
+    except (OSError, ValueError) as error:  # ValueError: a NUL, or characters that no path can hold
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be written ({reason})") from None
+
+
+def recover_table(path: Path, rows_per_frame: int) -> Recovered:
+    """Complete the file of an interrupted run from its chunks or its text; what cannot be read is left out.
+
+    Args:
+        path: the table.
+        rows_per_frame: number of rows of a frame in the long form.
+
+    Raises:
+        CmpDesignError: no interrupted run, a run that still goes on, or no whole frame is left.
+        OutputError: the file cannot be written; the chunks or the text are kept.
+    """
+    _require_kind(path)
+    part = part_path(path)
+    if not os.path.lexists(part):
+        raise CmpDesignError(f"{part}: there is nothing to recover")
+    _require_not_in_use(part, path)
+    try:
+        recovered = (
+            recover_csv(part, path, rows_per_frame) if path.suffix == ".csv" else _recover_chunks(part, path)
+        )
+        remove_abandoned_stages(path.parent)
+        if not recovered.frames and recovered.problems:
+            first, *others = recovered.problems
+            more = f"; and {len(others)} more" if others else ""
+            raise CmpDesignError(f"{part} holds no whole frame ({first}{more}); it is kept")
+        _remove(part)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error}); {part} is kept") from None
+    return recovered
+
+
+def _recover_chunks(part: Path, path: Path) -> Recovered:
+    found = find_chunks(part)
+    if found.about is None:
+        return Recovered(0, found.problems)
+    return Recovered(assemble_table(found.chunks, found.about, path), found.problems)
+
+
+def _require_kind(path: Path) -> None:
+    if path.suffix not in KINDS:
+        raise CmpDesignError(f"{path}: unknown ending; expected one of {', '.join(KINDS)}")
+    if path.suffix == ".parquet":
+        require_pyarrow()
+
+
+def _require_not_in_use(part: Path, path: Path) -> None:
+    """Check that the unfinished table is one of this program, and that no run writes it."""
+    if part.is_symlink() or not (is_regular_file if path.suffix == ".csv" else is_folder)(part):
+        kind = "text" if path.suffix == ".csv" else "folder"
+        raise CmpDesignError(
+            f"{part} is not the {kind} of an interrupted run; delete it, or give another name"
+        )
+    if is_in_use(part):
+        raise CmpDesignError(f"{part} is in use by another run; wait until it ends, or give another name")
+
+
+def _holds_frames(part: Path) -> bool:
+    if is_folder(part):
+        return any(part.glob("[0-9]*.npz"))
+    with open_file(part) as file:
+        file.readline()
+        return bool(file.readline())
+
+
+def _remove(part: Path) -> None:
+    """Remove an unfinished table, if there is one."""
+    if is_folder(part):
+        shutil.rmtree(part)
+    else:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,69 @@
+"""The unfinished table of a run: its place, its lock, and what is recovered of it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.files.locks import open_for_lock, try_lock
+
+# Largest time between two flushes to disk, s: frames of this time are lost with the power.
+FLUSH_S = 5.0
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What was recovered.
+
+    Attributes:
+        frames: number of whole frames in the table; without any, no table was written.
+        problems: one sentence on each damaged chunk or frame and on each gap.
+    """
+
+    frames: int
+    problems: tuple[str, ...] = ()
+
+
+def part_path(path: Path) -> Path:
+    """The place of a table's frames while the run goes on."""
+    return path.with_name(path.name + ".part")
+
+
+def lock_folder(path: Path) -> int | None:
+    """Lock a folder; the descriptor that holds the lock until it is closed, where the system gives one."""
+    descriptor = open_for_lock(path)
+    if descriptor is not None:
+        try_lock(descriptor)
+    return descriptor
+
+
+def release_lock(descriptor: int | None) -> None:
+    """Close the descriptor of ``lock_folder``."""
+    if descriptor is not None:
+        os.close(descriptor)
+
+
+def require_pyarrow() -> Any:
+    """The module pyarrow, with pyarrow.parquet.
+
+    Raises:
+        CmpDesignError: it is not installed.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise CmpDesignError(
+            "Parquet needs pyarrow: pip install 'cmpdesign[parquet]', or write .npz or .csv"
+        ) from None
+    return pyarrow
+
+
+def describe_gap(first: int, last: int | None) -> str:
+    """The sentence on missing frames; ``last`` is None where their number is unknown."""
+    if last is None:
+        return f"frames from {first} on are lost"
+    return f"frame {first} is lost" if first == last else f"frames {first} to {last} are lost"

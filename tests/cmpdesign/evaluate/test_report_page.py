@@ -1,0 +1,23 @@
+"""The page of a report: wide tables stay within it."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+
+from cmpdesign.evaluate.report.page import MANY_COLUMNS, Section, Table, report_html
+
+
+@pytest.mark.parametrize("columns", [2, MANY_COLUMNS, MANY_COLUMNS + 1, 30])
+def test_a_table_cannot_run_beyond_its_page(columns: int) -> None:
+    """Every table lies in a box that scrolls; names may break; tables of many columns are set smaller."""
+    table = Table(
+        "caption", [f"h{i}" for i in range(columns)], [["a-very-long-name " * 3, *["1"] * (columns - 1)]]
+    )
+    html = report_html("title", [Section("one", tables=[table])])
+    page = ElementTree.fromstring(html.replace("<!doctype html>", "").replace('<meta charset="utf-8">', ""))
+    boxes = [box for box in page.iter("div") if box.get("class") == "wide"]
+    assert [child.tag for box in boxes for child in box] == ["table"] == [t.tag for t in page.iter("table")]
+    assert (boxes[0][0].get("class") == "many") == (columns > MANY_COLUMNS)
+    assert ".wide { overflow-x: auto; }" in html and "overflow-wrap: anywhere" in html
