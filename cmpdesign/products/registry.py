@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
     from cmpdesign.layout.layout import Layout
     from cmpdesign.layout.report import DesignReport
+    from cmpdesign.products.as_made.made_pad import MadePad
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,14 @@ class ProductFiles:
         figures: measures of the product as JSON values; the product's member in ``report.json``.
         findings: errors and warnings about the product.
         pictures: name -> (H, W, 3) uint8 BGR picture of the product, shown in ``preview.png``.
+        made_pad: the pad that the product makes, which is read before the files are written; None without a pad.
     """
 
     files: Mapping[str, str | bytes]
     figures: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    made_pad: MadePad | None = None
 
 
 Maker = Callable[["Design", "Layout"], ProductFiles]

@@ -92,6 +92,30 @@ def make_pad(
     return MadePad(layout, replace(layout, as_made=made), tuple(causes))
 
 
+def cut_by_later(outlines_mm: Sequence[Points]) -> list[Points]:
+    """What stays of each cell when the cells are made one after the other, and a later cell replaces earlier ones.
+
+    Args:
+        outlines_mm: (K, 2) simple outlines in the order of making.
+
+    Returns:
+        The outline of each cell's largest part.
+    """
+    import shapely
+
+    cells = shapely.make_valid(np.array([shapely.Polygon(ring) for ring in outlines_mm]))
+    earlier, later = shapely.STRtree(cells).query(cells, predicate="intersects")
+    found = list(outlines_mm)
+    for cell in np.unique(earlier[later > earlier]).tolist():
+        cutters = cells[later[(earlier == cell) & (later > cell)]]
+        rest = shapely.difference(cells[cell], shapely.union_all(cutters))
+        parts = [part for part in shapely.get_parts(rest) if part.geom_type == "Polygon"]
+        if parts:
+            largest = max(parts, key=lambda part: float(part.area))
+            found[cell] = shapely.get_coordinates(largest.exterior)[:-1]
+    return found
+
+
 def _signed_area_mm2(ring: Points) -> float:
     x, y = ring.T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
-from cmpdesign.products.laser.as_made import measure_as_made
+from cmpdesign.products.laser.as_made import made_pad, measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
 from cmpdesign.products.laser.checks import as_made_findings, path_findings, require_no_errors, setup_findings
 from cmpdesign.products.laser.coupon.job import coupon_job
@@ -51,4 +51,4 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
     files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings)
-    return ProductFiles(files, job_figures(job, figures, timings), warnings)
+    return ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))

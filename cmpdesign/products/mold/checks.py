@@ -12,7 +12,8 @@ from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.mold.shapes.bosses import boss_features
-from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3, inset_cells
+from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
+from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3
 from cmpdesign.products.mold.stack.crown import Crown
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crown_edge_mm
 
@@ -38,8 +39,9 @@ TOOL_LIMITS = {
 SLENDER_ERROR, SLENDER_WARNING = 3.0, 1.5
 DRAFT_MAX_DEG = 15.0
 DRAFT_WARNING_DEG = 0.5
-# Thinner webs of soft silicone tear when the plate is lifted.
-WEB_WARNING_MM = 0.05
+# Every color's cavities are filled before the next plate comes, so a web never stands free. Thinner ones close where
+# two plates are off by some micrometres.
+WEB_WARNING_MM = 0.01
 # Silicone layers whose sizes differ by more than this at the pad's edge wrinkle.
 MISMATCH_WARNING_MM = 0.1
 # Largest height of the crown over flat tips of bosses, as a share of the black layer, before the base layer bulges.
@@ -81,7 +83,7 @@ def min_feature_mm(stack: MoldStack) -> float:
 
 def tip_width_mm(stack: MoldStack) -> float:
     """Diameter of the inscribed circle of the narrowest boss's tip; negative if the tip vanishes."""
-    inset = stack.options.gap_mm / 2 + stack.lean * stack.thickness_mm[1]
+    inset = stack.options.gap_mm / 2 + seen_inset_mm(stack)
     return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
@@ -111,7 +113,7 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
         )
         return
     if option.gap_mm < WEB_WARNING_MM:
-        remedy = "make mold.gap_mm larger, or the black web tears"
+        remedy = "make mold.gap_mm larger, or fillings of two colors meet"
         yield Finding("mold.gap_mm", option.gap_mm, WEB_WARNING_MM, "mm", remedy, "warning")
     width, height = tip_width_mm(stack), stack.thickness_mm[1]
     if width < limit:
@@ -138,8 +140,10 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
 
 def stencil_width_mm(stack: MoldStack) -> float:
     """Diameter of the inscribed circle of the narrowest stencil hole at the lower face."""
-    inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
-    return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+    return min(
+        _inscribed_diameter_mm(stack.cells(color)) - 2 * float(open_insets(stack, color).max())
+        for color in stack.colors
+    ) - 2 * stack.options.clearance_mm
 
 
 def _slenderness_findings(ratio: float) -> Iterator[Finding]:
@@ -156,8 +160,7 @@ def plate_web_mm(stack: MoldStack) -> tuple[float, str]:
 
     least, name = float("inf"), ""
     for color in stack.colors:
-        inset = inset_cells(stack.cells(color), stack.options.gap_mm / 2, 0.0)
-        roots = shapely.polygons([loop.points for loop in inset])
+        roots = np.array([shapely.Polygon(cavity.open.with_chords().points) for cavity in cavities(stack, color)])
         if len(roots) < 2:
             continue
         _, distances = shapely.STRtree(roots).query_nearest(roots, exclusive=True, return_distance=True)
@@ -318,5 +321,5 @@ def facet_sag_mm(stack: MoldStack) -> float:
 
 def boss_volume_mm3(stack: MoldStack, color: int) -> float:
     """Volume of the silicone that fills a color's cavities."""
-    pairs = [(feature.root, feature.tip) for feature in boss_features(stack, stack.cells(color))]
+    pairs = [(feature.root, feature.tip) for feature in boss_features(stack, color)]
     return frusta_volume_mm3(pairs, stack.thickness_mm[1])

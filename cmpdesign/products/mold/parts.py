@@ -187,7 +187,7 @@ def _ring_slab(stack: MoldStack, silicone_layer: int) -> Slab:
 
 def _boss_plate_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    bosses = () if stack.crown else boss_features(stack, mirror_cells(stack.cells(color)))
+    bosses = () if stack.crown else [_mirror_feature(boss) for boss in boss_features(stack, color)]
     holes = [_mirror_loop(loop) for loop in (*stack.holes(), *_jack_holes(stack))]
     depth = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
     slab = Slab(_mirror_loop(stack.block), -depth, 0.0, [(h, h) for h in holes], many=bosses)
@@ -206,7 +206,7 @@ def _boss_plate_part(stack: MoldStack, color: int) -> Part:
 
 def _stencil_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    through = () if stack.crown else stencil_hole_outlines(stack, stack.cells(color))
+    through = () if stack.crown else stencil_hole_outlines(stack, color)
     holes = [(hole, hole) for hole in stack.holes()]
     slab = Slab(stack.block, 0.0, stack.options.stencil_mm, holes, many_through=through)
     return Part(
@@ -259,10 +259,9 @@ def _jack_holes(stack: MoldStack) -> list[Loop]:
     return [circle_loop(np.array(p), JACK_MM) for p in ((left, bottom + quarter), (right, top - quarter))]
 
 
-def mirror_cells(cells: Points) -> Points:
-    """(N, k, 2) cells on a plate with its bosses up: y mirrored, still counter-clockwise."""
-    mirrored: Points = cells[:, ::-1] * np.array([1.0, -1.0])
-    return mirrored
+def _mirror_feature(boss: Feature) -> Feature:
+    """A boss on a plate with its bosses up."""
+    return Feature(_mirror_loop(boss.root), _mirror_loop(boss.tip), boss.height_mm)
 
 
 def _mirror_loop(loop: Loop) -> Loop:

@@ -104,7 +104,9 @@ def test_draft_is_measured_on_the_faces(draft: str, lean: float) -> None:
     values = {"layers": "2", "mold.draft_deg": draft}
     for name in ("base", "boss-red", "frame", "cover"):
         part = parts(**values)[name]
-        assert drafts_deg(part.solid, *part.pull_box_mm) == pytest.approx((lean, lean), abs=1e-6), name
+        # Walls between the white cell and its neighbours stand upright.
+        least = 0.0 if name == "boss-red" else lean
+        assert drafts_deg(part.solid, *part.pull_box_mm) == pytest.approx((least, lean), abs=1e-6), name
     stencil = parts(**values)["stencil-red"]
     assert drafts_deg(stencil.solid, *stencil.pull_box_mm) == pytest.approx((10, 10), abs=1e-6)
 
@@ -119,7 +121,9 @@ def test_every_kind_of_part_has_its_draft(name: str) -> None:
             continue
         wanted = {"stencil": 10.0, "lid": 5.0}.get(kind, 2.0)
         slack = 0.06 * wanted if crowned and kind in ("boss", "stencil") else 1e-6
-        assert wanted - slack <= low <= high <= wanted + slack, kind
+        # Beside the white cell of a flat pad, and nowhere else, walls stand upright.
+        least = 0.0 if kind == "boss" and name == "shrinking" else wanted
+        assert least - slack <= low <= high <= wanted + slack, kind
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "square"])
@@ -139,8 +143,12 @@ def test_no_turn_or_flip_of_a_part_fits_the_pins(pattern: str) -> None:
 
 
 def test_pins_are_where_the_laser_has_its_fiducials() -> None:
-    mold = stack(layers="3")
-    np.testing.assert_array_equal(mold.pins_mm[:3], mold.layout.fiducials_mm)
+    """The laser's sheet lies on the pins as it was carved for a pad that is seen from the back, else turned over."""
+    for mirrored, sign in (("true", 1.0), ("false", -1.0)):
+        design = load_design("honeycomb", {"layers": "3", "mirrored": mirrored})
+        layout = build_layout(design)
+        mold = make_stack(design, layout)
+        np.testing.assert_array_equal(mold.pins_mm[:3], layout.fiducials_mm * (sign, 1.0))
 
 
 def test_shrinkage_is_added_as_a_scale() -> None:
@@ -162,9 +170,9 @@ def test_equidistant_projection_keeps_lengths_from_the_apex() -> None:
 
 SPHERE = {"mold.crown": "sphere"}
 IMPOSSIBLE = {
-    "gap 0": ({"mold.gap_mm": "0"}, r"mold.gap_mm: 0 mm, limit 0.05 mm; make it larger"),
+    "gap 0": ({"mold.gap_mm": "0"}, r"mold.gap_mm: 0 mm, limit 0.01 mm; make it larger"),
     "nozzle": ({"pitch_mm": "0.6", "mold.tool": "fdm-pla"}, r"narrowest boss at its tip: .*, limit 0.4 mm"),
-    "cutter": ({"mold.minimum_feature_mm": "1"}, r"narrowest boss at its tip: 0.7.* mm, limit 1 mm"),
+    "cutter": ({"mold.minimum_feature_mm": "1"}, r"narrowest boss at its tip: 0.8.* mm, limit 1 mm"),
     "steep": ({**SPHERE, "mold.crown_radius_mm": "3"}, r"crown_radius_mm = 3 mm: .* limit 60 deg"),
     "no radius": (SPHERE, "needs mold.crown_radius_mm"),
     "undercut": ({"mold.draft_deg": "-1"}, "an undercut"),
@@ -211,7 +219,7 @@ def test_resin_that_inhibits_the_cure_is_reported() -> None:
 
 
 def test_findings_that_warn_do_not_refuse() -> None:
-    findings = check_mold(stack(layers="2", **{"mold.draft_deg": "0", "mold.gap_mm": "0.03"}))
+    findings = check_mold(stack(layers="2", **{"mold.draft_deg": "0", "mold.gap_mm": "0.005"}))
     assert {finding.severity for finding in findings} == {"warning"}
     require_no_errors(findings)
 
