@@ -15,12 +15,15 @@ from pathlib import Path, PurePosixPath
 LIST_NAME = ".cmpdesign-files.json"
 
 
-def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -> dict[str, str | bytes]:
+def files_with_lists(
+    files: Mapping[str, str | bytes], folders: Iterable[str], design: str = ""
+) -> dict[str, str | bytes]:
     """Add the list of files of every folder that has files.
 
     Args:
         files: path relative to the output folder, with "/" -> content.
         folders: products' folders, as "mold/".
+        design: digest of the layout that the files belong to.
 
     Returns:
         The files and the lists.
@@ -33,7 +36,7 @@ def files_with_lists(files: Mapping[str, str | bytes], folders: Iterable[str]) -
             if path.startswith(folder)
         }
         if digests:
-            document = {"format": "cmp-files", "version": 1, "sha256": dict(sorted(digests.items()))}
+            document = {"format": "cmp-files", "version": 1, "design": design, "sha256": dict(sorted(digests.items()))}
             result[folder + LIST_NAME] = json.dumps(document, indent=1) + "\n"
     return result
 

@@ -15,11 +15,14 @@ from cmpdesign.layout.side import seen_side
 Points = NDArray[np.float64]
 # Decimals in mm of places that were read in a picture: the digits that every run of a machine agrees on.
 READ_DECIMALS = 5
+# A rounded corner moves no marker by more than this share of what it loses (read in pictures of all patterns): the
+# corners of the cells around a marker lose alike. A side that is moved moves its markers by as much.
+CORNER_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A parameter by which made cells differ from the nominal ones, and by how much at most, mm."""
+    """A parameter by which made cells differ from the nominal ones, and by how far at most it moves a marker, mm."""
 
     parameter: str
     effect_mm: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from cmpdesign.layout.checks import CAMERA_PX, Finding
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side
-from cmpdesign.products.as_made.made_pad import MadePad
+from cmpdesign.products.as_made.made_pad import MadePad, make_pad
 
+FOLDER = "as-made"
 # Share of the picture's height or width that the pad fills.
 FILL_SHARE = 0.94
 # A camera in focus blurs an edge by about a pixel (standard deviation).
@@ -21,6 +23,8 @@ MIN_SHARE = 0.98
 # Largest deviation of a marker, in pitches, that no warning is given for.
 WARNING_PITCHES = 0.02
 MEASURED = 1
+# A pattern with this many colored cells is numbered however a clip cuts it: all that failed had fewer than ten.
+CERTAIN_CELLS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,33 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading
     )
 
 
+@dataclass(frozen=True, eq=False)
+class PadReadings:
+    """The reading of several pads: files ``as-made/<product>.json``, findings, figures and readings by product."""
+
+    files: dict[str, str | bytes]
+    findings: list[Finding]
+    figures: dict[str, Any]
+    readings: dict[str, PadReading]
+
+
+def read_pads(pads: Iterable[MadePad], camera_px: tuple[int, int] = CAMERA_PX) -> PadReadings:
+    """Read pads; a pad whose cells are no triangles is not read, and its markers stay nominal."""
+    from cmpdesign.files.layout_json import layout_to_json
+
+    found = PadReadings({}, [], {}, {})
+    for pad in pads:
+        found.figures[pad.product] = pad.figures()
+        if pad.nominal.cell_corners.shape[1] == 3:
+            reading = read_pad(pad, camera_px)
+            found.readings[pad.product] = reading
+            found.findings.extend(reading_findings(pad, reading))
+            found.figures[pad.product] |= {"camera_px": list(camera_px), **reading.figures()}
+            pad = pad.with_markers(reading.xy_mm)
+        found.files[f"{FOLDER}/{pad.product}.json"] = layout_to_json(pad.layout)
+    return found
+
+
 def reading_findings(pad: MadePad, reading: PadReading) -> list[Finding]:
     """Errors where too little or the wrong side is read; a warning where markers deviate."""
     name, cause = pad.product, pad.main_cause
@@ -117,6 +148,20 @@ def reading_findings(pad: MadePad, reading: PadReading) -> list[Finding]:
         subject = f"{name}: deviation of a marker on the pad as made"
         return [Finding(subject, reading.worst_pitches, WARNING_PITCHES, "pitch", remedy, "warning")]
     return []
+
+
+def clip_findings(layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> list[Finding]:
+    """An error if a clip outline leaves too few cells to be numbered; only small patterns are drawn and read."""
+    cells = len(layout.colored_cells)
+    triangular = layout.cell_corners.shape[1] == 3
+    if "clip" not in layout.parameters or not triangular or cells >= CERTAIN_CELLS:
+        return []
+    reading = read_pad(make_pad(layout, "design", list(layout.colored_outlines_mm)), camera_px)
+    if reading.share >= MIN_SHARE:
+        return []
+    subject = f"share of markers that are measured where the clip leaves {cells} colored cells"
+    remedy = "make the clip outline larger or the pitch smaller"
+    return [Finding(subject, reading.share, MIN_SHARE, "", remedy, "error")]
 
 
 def _view_of(layout: Layout, camera_px: tuple[int, int]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.as_made.made_pad import Cause, MadePad, cut_by_later, make_pad
+from cmpdesign.products.as_made.made_pad import CORNER_SHARE, Cause, MadePad, cut_by_later, make_pad
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import ARC_POINTS, Cavities, burnt_areas_mm2, burnt_outlines_mm
@@ -86,7 +86,7 @@ def made_pad(job: LaserJob) -> MadePad:
         rings += list(fewer_points(burnt) - job.origin_mm)
     outlines = dict(zip(cells, cut_by_later(rings), strict=True))
     causes = (
-        Cause("the kerf (laser.kerf_mm)", nominal_loss_mm),
+        Cause("the kerf (laser.kerf_mm)", CORNER_SHARE * nominal_loss_mm),
         Cause("laser.face", abs(loss_mm - nominal_loss_mm)),
     )
     in_order = [outlines[cell] for cell in job.layout.colored_cells.tolist()]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
+from cmpdesign.products.as_made.made_pad import MadePad
 from cmpdesign.products.laser.as_made import made_pad, measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
 from cmpdesign.products.laser.checks import as_made_findings, path_findings, require_no_errors, setup_findings
@@ -28,6 +29,18 @@ FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
     "lbrn2": drawing_to_lightburn,
     "gcode": drawing_to_gcode,
 }
+
+
+def laser_pad(design: Design, layout: Layout) -> MadePad:
+    """The pad as carved.
+
+    Raises:
+        DesignError: see ``make_laser``.
+    """
+    job = make_job(design.name, layout, complete_setup(design.laser))
+    require_no_errors(setup_findings(design, job))
+    require_no_errors(as_made_findings(job, measure_as_made(job)))
+    return made_pad(job)
 
 
 def make_laser(design: Design, layout: Layout) -> ProductFiles:

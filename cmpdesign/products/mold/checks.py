@@ -11,10 +11,12 @@ import numpy as np
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.mold.clearances import LEAST_WALL_MM, clearance_findings
 from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
 from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3
 from cmpdesign.products.mold.stack.crown import Crown
+from cmpdesign.products.mold.stack.silicones import load_silicone, silicones
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crown_edge_mm
 
 
@@ -48,8 +50,6 @@ MISMATCH_WARNING_MM = 0.1
 SAG_WARNING = 0.1
 # Least thickness of a dome's silicone layers at the foot, measured across, as a share of that at the apex.
 THIN_WARNING = 0.85
-# Least wall between the moat and a pin hole.
-LEAST_WALL_MM = 0.3
 
 
 def check_mold(stack: MoldStack) -> list[Finding]:
@@ -61,7 +61,11 @@ def check_mold(stack: MoldStack) -> list[Finding]:
         *_curing_findings(stack),
         *_shape_findings(stack),
         *_unused_option_findings(stack),
+        *_side_findings(stack),
     ]
+    # Outlines have a shape only where the dimensions are possible.
+    if all(finding.severity == "warning" for finding in findings):
+        findings += clearance_findings(stack)
     return sorted(findings, key=lambda finding: finding.severity)
 
 
@@ -196,6 +200,9 @@ def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
     if option.vents and option.vent_mm < min_feature_mm(stack):
         remedy = "make mold.vent_mm larger, or drill the vents"
         yield Finding("mold.vent_mm", option.vent_mm, min_feature_mm(stack), "mm", remedy, "error")
+    if not option.vents:
+        remedy = "give the lid some vents, or pour in a vacuum: air stays under it"
+        yield Finding("mold.vents", 0, 1, "", remedy, "warning")
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
         if getattr(option, field) < least:
@@ -235,6 +242,23 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
         remedy = "choose silicones that shrink alike"
         subject = "difference of the layers' shrinkage at the pad's edge"
         yield Finding(subject, mismatch, MISMATCH_WARNING_MM, "mm", remedy, "warning")
+
+
+def _side_findings(stack: MoldStack) -> Iterator[Finding]:
+    """Findings on what lies between the camera and the pattern: the base layer."""
+    base = stack.silicones[0]
+    if base.clear is None:
+        remedy = "add clear = { value = true, source = ... } to its file if light passes through it"
+        yield Finding(f"base silicone of unknown clarity ({base.name})", 1, 0, "", remedy, "warning")
+    elif not base.clear.value:
+        clear = ", ".join(name for name in silicones() if _is_clear(name))
+        remedy = f"the camera looks at the pattern through the base layer: set mold.base_silicone to {clear}"
+        yield Finding(f"base silicone that is not clear ({base.name})", 1, 0, "", remedy, "error")
+
+
+def _is_clear(name: str) -> bool:
+    clear = load_silicone(name).clear
+    return clear is not None and clear.value
 
 
 def _shape_findings(stack: MoldStack) -> Iterator[Finding]:

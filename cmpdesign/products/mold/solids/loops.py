@@ -77,10 +77,11 @@ class Loop:
         shift = np.array([x_mm, y_mm])
         return Loop(self.points + shift, self.centres + shift)
 
-    def with_chords(self, radius_mm: float | None = None) -> Loop:
+    def with_chords(self, radius_mm: float | None = None, chord_deg: float | None = None) -> Loop:
         """The outline with arcs replaced by chords of at most ``FINE_DEG`` or, for small radii, ``COARSE_DEG``.
 
         ``radius_mm`` replaces each arc's own radius in this choice, so that paired outlines get paired chords.
+        ``chord_deg`` replaces the choice.
         """
         points = []
         for side, point in enumerate(self.points):
@@ -89,7 +90,8 @@ class Loop:
                 continue
             arc = self.arc(side)
             fine = (radius_mm or arc.radius_mm) >= FINE_RADIUS_MM
-            count = max(1, int(np.ceil(np.degrees(arc.sweep) / (FINE_DEG if fine else COARSE_DEG) - 1e-6)))
+            largest = chord_deg or (FINE_DEG if fine else COARSE_DEG)
+            count = max(1, int(np.ceil(np.degrees(arc.sweep) / largest - 1e-6)))
             angles = arc.first + arc.sweep * np.arange(1, count) / count
             directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
             points += list(self.centres[side] + arc.radius_mm * directions)
