@@ -36,7 +36,12 @@ def files_with_lists(
             if path.startswith(folder)
         }
         if digests:
-            document = {"format": "cmp-files", "version": 1, "design": design, "sha256": dict(sorted(digests.items()))}
+            document = {
+                "format": "cmp-files",
+                "version": 1,
+                "design": design,
+                "sha256": dict(sorted(digests.items())),
+            }
             result[folder + LIST_NAME] = json.dumps(document, indent=1) + "\n"
     return result
 

@@ -56,9 +56,7 @@ class DesignReport:
     findings: tuple[Finding, ...]
 
 
-def design_report(
-    design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX
-) -> DesignReport:
+def design_report(design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> DesignReport:
     """The key figures of a design and its layout; ``camera_px`` as in ``check_design``.
 
     >>> from cmpdesign import build_layout, load_design

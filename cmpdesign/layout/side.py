@@ -17,11 +17,6 @@ def seen_side(mirrored: bool) -> Side:
     return "back" if mirrored else "front"
 
 
-def hidden_side(mirrored: bool) -> Side:
-    """The side that the camera does not see."""
-    return seen_side(not mirrored)
-
-
 def turned_over(layout: Layout) -> Layout:
     """The layout as its back shows it: x is mirrored; ids, colors and edges stay, corners stay counter-clockwise."""
     mirror = np.array([-1.0, 1.0])

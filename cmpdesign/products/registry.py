@@ -155,7 +155,9 @@ def make_products(
     figures = {name: product.figures for name, product in made.items() if product.figures}
     findings = [finding for product in made.values() for finding in product.findings]
     # A mold and its meshes make the same pad.
-    pads = {product.made_pad.product: product.made_pad for product in in_order if product.made_pad is not None}
+    pads = {
+        product.made_pad.product: product.made_pad for product in in_order if product.made_pad is not None
+    }
     readings: dict[str, PadReading] = {}
     if pads:
         from cmpdesign.products.as_made.reading import read_pads

@@ -165,11 +165,17 @@ def _as_made(document: dict[str, Any], colored: int) -> AsMade | None:
         fields.fail("as_made.side", fields.shown(side), f"one of {', '.join(SIDES)}")
     outlines = made["outlines"]
     if not isinstance(outlines, list) or len(outlines) != colored:
-        fields.fail("as_made.outlines", fields.shown(outlines), f"{colored} outlines, one for each cell that is not black")
+        fields.fail(
+            "as_made.outlines",
+            fields.shown(outlines),
+            f"{colored} outlines, one for each cell that is not black",
+        )
     rings = [fields.points_mm(ring, f"as_made.outlines[{i}]") for i, ring in enumerate(outlines)]
     for number, ring in enumerate(rings):
         if len(ring) < MIN_OUTLINE:
-            fields.fail(f"as_made.outlines[{number}]", f"a list of {len(ring)}", f"at least {MIN_OUTLINE} points")
+            fields.fail(
+                f"as_made.outlines[{number}]", f"a list of {len(ring)}", f"at least {MIN_OUTLINE} points"
+            )
     covariance = None
     if optional:
         xx, xy, yy = fields.lengths_mm(made["covariance_mm2"], "as_made.covariance_mm2", 3).tolist()

@@ -136,7 +136,7 @@ def _corner_losses_mm(nominal: Points, made: Points) -> Points:
 
     cells = shapely.polygons(made)[:, None]
     distances: Points = shapely.distance(cells, shapely.points(nominal))
-    return distances.max(axis=1)
+    return np.asarray(distances.max(axis=1))
 
 
 def _rounded(value: float) -> float:

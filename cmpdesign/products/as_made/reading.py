@@ -57,7 +57,9 @@ class PadReading:
         found: dict[str, Any] = {"measured_share": round(self.share, 6), "side_seen": self.side_seen}
         for name, value in (("rms", self.rms_px), ("worst", self.worst_px)):
             known = np.isfinite(value)
-            found |= {f"{name}_{unit}": round(value * by, 5) if known else None for unit, by in scales.items()}
+            found |= {
+                f"{name}_{unit}": round(value * by, 5) if known else None for unit, by in scales.items()
+            }
         return found
 
     def line(self) -> str:
@@ -94,6 +96,8 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading
     measured = visible & (markers.status == MEASURED)
     deviation = np.hypot(*(markers.xy_px - rendered.truth.marker_xy_px)[measured].T)
     xy_mm = np.full_like(nominal.marker_xy_mm, np.nan)
+    # The pad is flat, so the map to the picture is a homography.
+    assert rendered.truth.H is not None
     xy_mm[measured] = _to_layout(rendered.truth.H, markers.xy_px[measured])
     return PadReading(
         share=float(measured.sum() / max(visible.sum(), 1)),

@@ -144,10 +144,13 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
 
 def stencil_width_mm(stack: MoldStack) -> float:
     """Diameter of the inscribed circle of the narrowest stencil hole at the lower face."""
-    return min(
-        _inscribed_diameter_mm(stack.cells(color)) - 2 * float(open_insets(stack, color).max())
-        for color in stack.colors
-    ) - 2 * stack.options.clearance_mm
+    return (
+        min(
+            _inscribed_diameter_mm(stack.cells(color)) - 2 * float(open_insets(stack, color).max())
+            for color in stack.colors
+        )
+        - 2 * stack.options.clearance_mm
+    )
 
 
 def _slenderness_findings(ratio: float) -> Iterator[Finding]:
@@ -164,7 +167,9 @@ def plate_web_mm(stack: MoldStack) -> tuple[float, str]:
 
     least, name = float("inf"), ""
     for color in stack.colors:
-        roots = np.array([shapely.Polygon(cavity.open.with_chords().points) for cavity in cavities(stack, color)])
+        roots = np.array(
+            [shapely.Polygon(cavity.open.with_chords().points) for cavity in cavities(stack, color)]
+        )
         if len(roots) < 2:
             continue
         _, distances = shapely.STRtree(roots).query_nearest(roots, exclusive=True, return_distance=True)

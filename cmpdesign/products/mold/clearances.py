@@ -61,7 +61,9 @@ def _size_findings(stack: MoldStack) -> Iterator[Finding]:
     width = min(float(np.ptp(stack.edges(layer)[0].points, axis=0).min()) for layer in (0, 2))
     if stack.options.vents and width < 3 * stack.options.vent_mm:
         remedy = "make mold.vent_mm smaller, or mold.vents 0"
-        yield Finding("width of the pad under its vents", width, 3 * stack.options.vent_mm, "mm", remedy, "error")
+        yield Finding(
+            "width of the pad under its vents", width, 3 * stack.options.vent_mm, "mm", remedy, "error"
+        )
 
 
 def _distance_mm(first: Any, second: Any) -> float:

@@ -28,7 +28,10 @@ def made_pad(layout: Layout, stack: MoldStack) -> MadePad:
     outlines: dict[int, Points] = {}
     for color in stack.colors:
         cells = np.flatnonzero(layout.cell_color == color).tolist()
-        rings = [_in_layout(cavity.seen.with_chords(chord_deg=CHORD_DEG).points, layout, stack) for cavity in cavities(stack, color)]
+        rings = [
+            _in_layout(cavity.seen.with_chords(chord_deg=CHORD_DEG).points, layout, stack)
+            for cavity in cavities(stack, color)
+        ]
         outlines |= dict(zip(cells, rings, strict=True))
     option, inset = stack.options, seen_inset_mm(stack)
     # Of the common inset, the gap asks for what remains without draft.

@@ -17,8 +17,8 @@ from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import job_sheet_html
-from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.made_pad import made_pad
+from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.pictures import mold_pictures
 from cmpdesign.products.mold.solids.loops import bounding_boxes

@@ -15,13 +15,13 @@ import shapely
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.layout.layout import Layout
-from cmpdesign.layout.side import hidden_side, seen_side, turned_over
+from cmpdesign.layout.side import seen_side, turned_over
 from cmpdesign.products.as_made.made_pad import cut_by_later, make_pad
 from cmpdesign.products.as_made.reading import read_pad, reading_findings
 from cmpdesign.products.mold.stack.silicones import load_silicone
 from cmpdesign.reading.read_layout import read_layout
 from tests.support.command import run
-from tests.support.seen_pads import SeenCell, SeenPad, carved_pad, cast_pad, read_seen
+from tests.support.made.seen_pads import SeenCell, SeenPad, carved_pad, cast_pad, read_seen
 
 LEAST_SHARE, RMS_PITCHES, WORST_PITCHES = 0.99, 0.005, 0.025
 TRIANGULAR = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "tac3d")
@@ -29,7 +29,9 @@ TRIANGULAR = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "tac
 
 def built(folder: Path, name: str, only: str, **values: str) -> Layout:
     """The layout of a design whose files are in the folder."""
-    flags = [part for field, value in values.items() for part in ("--set", f"{field.replace('__', '.')}={value}")]
+    flags = [
+        part for field, value in values.items() for part in ("--set", f"{field.replace('__', '.')}={value}")
+    ]
     result = run("build", name, "-o", folder, "--only", f"layout,{only}", *flags)
     assert result.exit_code == 0, result.output
     return read_layout(folder / "layout.json")
@@ -48,8 +50,8 @@ def carved(folder: Path, name: str, **values: str) -> tuple[Layout, SeenPad]:
 
 def carved_cells(folder: Path, layout: Layout) -> list[SeenCell]:
     figures = json.loads((folder / "report.json").read_text())["laser"]
-    faces = (np.array(figures[f"kerf_{face}_mm"]) for face in ("front", "back"))
-    return carved_pad(folder, np.array(figures["layout_origin_mm"]), *faces, layout.mirrored)
+    front, back = np.array(figures["kerf_front_mm"]), np.array(figures["kerf_back_mm"])
+    return carved_pad(folder, np.array(figures["layout_origin_mm"]), front, back, layout.mirrored)
 
 
 def require_as_designed(layout: Layout, pad: SeenPad) -> None:
@@ -89,7 +91,10 @@ def test_cells_of_the_wrong_size_or_side_would_be_seen(tmp_path: Path) -> None:
     require_as_designed(layout, nominal)
     assert nominal.rms < 0.001
     narrow = [
-        SeenCell(c.color, shapely.get_coordinates(shapely.Polygon(c.outline_mm).buffer(-0.07, join_style="mitre"))[:-1])
+        SeenCell(
+            c.color,
+            shapely.get_coordinates(shapely.Polygon(c.outline_mm).buffer(-0.07, join_style="mitre"))[:-1],
+        )
         for c in cells
     ]
     assert read_seen(layout, narrow).worst > WORST_PITCHES
@@ -102,7 +107,10 @@ def test_predicted_cells_are_those_of_the_written_files(mirrored: str, tmp_path:
     """Area of the difference of both, against the area of the cells."""
     layout = built(tmp_path, "honeycomb", "mesh,laser", layers="2", mirrored=mirrored)
     side = np.array([-1.0 if layout.mirrored else 1.0, 1.0])
-    found = {"mold": cast_pad(tmp_path, load_silicone("dragon-skin-10").scale), "laser": carved_cells(tmp_path, layout)}
+    found = {
+        "mold": cast_pad(tmp_path, load_silicone("dragon-skin-10").scale),
+        "laser": carved_cells(tmp_path, layout),
+    }
     for product, cells in found.items():
         predicted = read_layout(tmp_path / "as-made" / f"{product}.json")
         assert predicted.as_made is not None
@@ -114,7 +122,7 @@ def test_predicted_cells_are_those_of_the_written_files(mirrored: str, tmp_path:
 
 
 def test_sides() -> None:
-    assert (seen_side(True), seen_side(False)) == ("back", "front") == (hidden_side(False), hidden_side(True))
+    assert (seen_side(True), seen_side(False)) == ("back", "front")
     layout = build_layout(load_design("gelsight-mini"))
     assert turned_over(turned_over(layout)).digest == layout.digest
     np.testing.assert_array_equal(turned_over(layout).marker_xy_mm, layout.marker_xy_mm * (-1, 1))
@@ -135,7 +143,9 @@ def test_a_deviation_names_its_parameter_and_what_cannot_be_read_is_an_error(tmp
     assert "change laser.face" in text and "change mold.gap_mm" in text
     layout = build_layout(load_design("honeycomb", {"layers": "3"}))
     outlines = list(layout.colored_outlines_mm)
-    small = make_pad(layout, "mold", [ring.mean(axis=0) + 0.2 * (ring - ring.mean(axis=0)) for ring in outlines])
+    small = make_pad(
+        layout, "mold", [ring.mean(axis=0) + 0.2 * (ring - ring.mean(axis=0)) for ring in outlines]
+    )
     (finding,) = reading_findings(small, read_pad(small))
     assert finding.severity == "error" and "share of markers" in finding.subject
     wrong = make_pad(layout, "mold", [ring * (-1, 1) for ring in outlines])

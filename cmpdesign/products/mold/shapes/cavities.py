@@ -1,11 +1,16 @@
 """Outlines of the cavities in the black layer: nominal where the camera sees them, wider at the open, hidden side.
 
-            open side: the boss's root           The camera looks at the base layer. A boss stands on the base layer
-      ______            ______            ___    with its tip, so its tip is the cell that is seen: nominal but for the
-            \\          /      |          /       corners' radius. Walls lean outwards by the draft. Between two cavities
-     black   \\  red   /       |  white  /        that meet in a corner a web stays at the open side, because corners
-      ________\\______/________|________/______    are round. Between two that share a side, as the white cell and its
-        clear base layer, the camera below       neighbours, the web is upright and as wide as the gap.
+            open side: the boss's root
+      ______            ______          ____
+            \\          /      |        |
+     black   \\  red   /  black | white  | green
+      ________\\______/________|________|____
+        clear base layer, the camera below
+
+The camera looks at the base layer. A boss stands on the base layer with its tip, so its tip is the cell that is seen:
+nominal but for the corners' radius. Walls lean outwards by the draft. Between two cavities that meet in a corner a web
+stays at the open side, because corners are round. Between two that share a side, as the white cell and its neighbours,
+the web is upright and as wide as the gap.
 
 Where the web would be narrower than the gap (large draft, sharp corners), all cells are inset alike. On a domed pad
 every outline lies within its flat facet, so cells are inset by half the gap at the open side, and by the draft besides.
@@ -62,7 +67,12 @@ def cavities(stack: MoldStack, color: int) -> list[Cavity]:
             found.append(Cavity(tip, root))
         else:
             chords = tip.with_chords()
-            found.append(Cavity(chords, chords.offset_sides(_chord_drafts(chords, sides.cells[number], sides.draft[number]))))
+            found.append(
+                Cavity(
+                    chords,
+                    chords.offset_sides(_chord_drafts(chords, sides.cells[number], sides.draft[number])),
+                )
+            )
     return found
 
 
