@@ -1,6 +1,7 @@
 """as-made.svg: the pattern as the laser leaves it at the side that the camera sees, filled with ink, at true size.
 
-The drawing is not mirrored: it shows the front's x to the right. It is built like ``pattern.svg``, so that programs can compare and render it and the extractor can read it.
+The drawing is not mirrored: it shows the front's x to the right. It is built like ``pattern.svg``, so that programs can
+compare and render it and the extractor can read it.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def made_pad(layout: Layout, stack: MoldStack) -> MadePad:
         Cause("mold.gap_mm", option.gap_mm / 2 + by_gap),
         Cause("mold.draft_deg", inset - by_gap),
     )
-    # A plate lies anywhere within the clearance of its holes. The variance over a disc is a fourth of its radius squared.
+    # A plate lies anywhere within the clearance of its holes. Over a disc the variance is radius^2 / 4.
     variance = (option.clearance_mm / 2) ** 2 / 4 / PLATES_AT_A_MARKER
     in_order = [outlines[cell] for cell in layout.colored_cells.tolist()]
     return make_pad(layout, "mold", in_order, causes, (round(variance, 9), 0.0, round(variance, 9)))

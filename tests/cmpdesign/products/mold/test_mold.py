@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +19,7 @@ from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.meshes import make_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes import caps
+from cmpdesign.products.mold.shapes.cavities import cavities, seen_inset_mm
 from cmpdesign.products.mold.solids import slab_shells as shells
 from cmpdesign.products.mold.solids.loops import (
     Loop,
@@ -181,6 +183,24 @@ IMPOSSIBLE = {
     "tin": ({"mold.base_silicone": "mold-max-30"}, "tin-cured layers .* under a platinum-cured one"),
     "tin on top": ({"mold.cover_silicone": "mold-max-30"}, "platinum-cured layers .* under a tin-cured one"),
     "unknown": ({"mold.base_silicone": "solari"}, "did you mean solaris"),
+    "pins": (
+        {"layers": "2", "mold.pin_diameter_mm": "4"},
+        r"a pin hole and a jack screw's hole in the boss plates: .* mm",
+    ),
+    "pins at the pad": (
+        {"layers": "2", "fiducials.gap_mm": "0"},
+        "wall between a pin hole and .*; make .*fiducials.gap_mm",
+    ),
+    "many vents": (
+        {"mold.vents": "64"},
+        "wall between a vent and another in the lid.*; make mold.vents fewer",
+    ),
+    "wide vents": ({"layers": "2", "mold.vent_mm": "3"}, "wall between a vent and another|under its vents"),
+    "thin pins": ({"mold.pin_diameter_mm": "0.5"}, "diameter of a pin between its chamfers"),
+    "hidden": (
+        {"mold.base_silicone": "ecoflex-00-30"},
+        "is not clear .*set mold.base_silicone to solaris, sylgard-184",
+    ),
     "moat": ({"mold.moat_mm": "6"}, "wall between the moat and a pin hole"),
     "square dome": ({"pattern": "square", **SPHERE, "mold.crown_radius_mm": "20"}, "four are in no plane"),
 }
@@ -216,6 +236,41 @@ def test_resin_that_inhibits_the_cure_is_reported() -> None:
     subjects = [finding.subject for finding in check_mold(stack(layers="2"))]
     assert any("Solaris" in subject and "sla-resin" in subject for subject in subjects)
     assert check_mold(stack(layers="2", **{"mold.tool": "steel"})) == []
+
+
+def test_a_lid_without_vents_is_warned_of() -> None:
+    (finding,) = check_mold(stack(layers="2", **{"mold.tool": "steel", "mold.vents": "0"}))
+    assert finding.severity == "warning" and "air stays" in finding.remedy
+
+
+def test_the_size_of_a_pad_is_stated_at_both_faces() -> None:
+    mold = stack(layers="2", **{"mold.draft_deg": "3"})
+    sizes = make.mold_figures(mold)["pad_mm"]
+    width, height = mold.layout.size_mm
+    assert sizes["back"] == pytest.approx([width, height], abs=1e-5)
+    # The whole pad, 5 mm high, leans by 3 degrees; the outline is a hexagon with corners to the left and right.
+    growth = 2 * 5 * np.tan(np.radians(3))
+    assert sizes["cover"] == pytest.approx(
+        [width + growth / np.cos(np.radians(30)), height + growth], abs=1e-5
+    )
+
+
+@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical", "square"])
+@pytest.mark.parametrize("values", [{}, {"mold.draft_deg": "6"}, {"mold.tip_radius_mm": "0"}])
+def test_cavities_leave_the_gap_between_them_at_the_open_side(pattern: str, values: dict[str, str]) -> None:
+    mold = stack(layers="3", pattern=pattern, **values)
+    rings = [
+        cavity.open.with_chords(chord_deg=1.0).points
+        for color in mold.colors
+        for cavity in cavities(mold, color)
+    ]
+    cells = [shapely.Polygon(ring) for ring in rings]
+    _, distances = shapely.STRtree(cells).query_nearest(cells, exclusive=True, return_distance=True)
+    # Beside the white cell corners are chords, which lie up to half a micrometre outside their arcs.
+    assert distances.min() >= mold.options.gap_mm - 1e-3
+    # No more is taken from the seen cells than this asks for.
+    if seen_inset_mm(mold) > 0:
+        assert distances.min() <= mold.options.gap_mm + 1e-4
 
 
 def test_findings_that_warn_do_not_refuse() -> None:
