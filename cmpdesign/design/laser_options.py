@@ -32,8 +32,9 @@ class LaserOptions(BaseModel):
     order: Literal["travel", "heat", "given"] = Field(
         "travel", description="Short ways, neighbours far apart in time, or as in the layout."
     )
-    face: Literal["front", "middle", "back"] = Field(
-        "front", description="Where a cell has its nominal size when the beam tapers."
+    face: Literal["front", "middle", "back"] | None = Field(
+        None,
+        description="Where a cell has its nominal size when the beam tapers; else at the side that the camera sees.",
     )
     fill: Literal["hatch", "offset"] = Field("hatch", description="Pocket: parallel lines or rings.")
     hatch_mm: Length | None = Field(None, description="Pocket: pitch of lines or rings, else half the kerf.")

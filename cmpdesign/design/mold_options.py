@@ -27,10 +27,12 @@ class MoldOptions(BaseModel):
     marker_mm: Length = Field(0.5, description="Thickness of the black layer with the pattern.")
     cover_mm: Length = Field(0.5, description="Thickness of the protective layer.")
 
-    draft_deg: Angle = Field(2.0, description="Lean of every wall that silicone is pulled from.")
+    draft_deg: Angle = Field(
+        2.0, description="Lean of every wall that silicone is pulled from; cells widen away from the camera."
+    )
     tip_radius_mm: LengthOrZero = Field(0.05, description="Radius of a boss's upright edges at its tip.")
     gap_mm: LengthOrZero = Field(
-        0.1, description="Black web between neighbouring cells, where it is thinnest."
+        0.02, description="Least black web between neighbouring cells, at the open side of their cavities."
     )
     minimum_feature_mm: Length | None = Field(
         None, description="The nozzle, beam or cutter; else what the tool's material usually allows."

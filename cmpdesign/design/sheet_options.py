@@ -20,4 +20,9 @@ class SheetOptions(BaseModel):
     pads: Annotated[int, Field(ge=1, le=10_000, strict=True)] | None = Field(
         None, description="How many pads; else as many as fit."
     )
+    film: Literal["opaque", "clear"] | None = Field(
+        None,
+        description="Printed on the side that the camera sees (opaque), or behind a clear film; else opaque for a "
+        "front that is seen, clear for a back.",
+    )
     bleed_mm: LengthOrZero = Field(2.0, description="How far the black ground is printed beyond the cut.")

@@ -10,7 +10,7 @@ from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.files.atomic import write_file
-from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.layout import AsMade, Layout
 from cmpdesign.patterns.colors import COLORS
 
 FORMAT, VERSION = "cmp-layout", 1
@@ -58,6 +58,8 @@ def layout_to_json(layout: Layout) -> str:
             "y": layout.fiducials_mm[:, 1].tolist(),
             "diameter_mm": layout.fiducial_diameter_mm,
         }
+    if layout.as_made is not None:
+        document["as_made"] = _as_made_object(layout.as_made)
     return _format_object(document, "") + "\n"
 
 
@@ -67,6 +69,22 @@ def pattern_digest(layout: Layout) -> str:
     return hashlib.sha256(
         "\n".join(line for line in lines if '"generator": ' not in line).encode()
     ).hexdigest()
+
+
+def _as_made_object(as_made: AsMade) -> dict[str, Any]:
+    found: dict[str, Any] = {"of": as_made.of, "product": as_made.product, "side": as_made.side}
+    found["outlines"] = [_without_repeats(outline.tolist()) for outline in as_made.outlines_mm]
+    if as_made.covariance_mm2 is not None:
+        found["covariance_mm2"] = list(as_made.covariance_mm2)
+    return found
+
+
+def _without_repeats(points: list[list[float]]) -> list[list[float]]:
+    """The points without those at the end that repeat the last one."""
+    count = len(points)
+    while count > 3 and points[count - 1] == points[count - 2]:
+        count -= 1
+    return points[:count]
 
 
 def _format_object(value: Mapping[str, Any], indent: str) -> str:

@@ -139,7 +139,17 @@ def _camera_findings(layout: Layout, camera_px: tuple[int, int]) -> Iterator[Fin
 
 def _structure_findings(design: Design, layout: Layout) -> Iterator[Finding]:
     layers, pitch_mm = int(layout.parameters["layers"]), float(layout.parameters["pitch_mm"])
-    triangular = layout.cell_corners.shape[1] == 3
+    corners = layout.cell_corners.shape[1]
+    triangular = corners == 3
+    if not triangular:
+        yield Finding(
+            "corners of a cell (the extractor reads triangles only)",
+            corners,
+            3,
+            "",
+            "choose a triangular pattern; only `cmpdesign evaluate` reads the square pattern, as the baseline",
+            "error",
+        )
     if triangular and layers < 2:
         yield Finding(
             "layers (the white cell's third neighbour lies in layer 2)",

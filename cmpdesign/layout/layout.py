@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,29 @@ from cmpdesign.patterns.colors import BLACK
 
 # Coordinates are rounded to a picometre, so that every machine writes the same digits.
 DECIMALS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class AsMade:
+    """How a product differs from the layout that it was made after.
+
+    Attributes:
+        of: digest of the nominal layout.
+        product: name of the product: "laser", "mold", "print".
+        side: side of the pattern whose outlines these are: "front" or "back".
+        outlines_mm: (N, K, 2) float64, layout frame: outline of every cell that is not black, in the layout's order,
+            counter-clockwise from the front; shorter outlines repeat their last point.
+        covariance_mm2: xx, xy, yy of every marker's place, from errors that differ from pad to pad; None: unknown.
+    """
+
+    of: str
+    product: str
+    side: Literal["front", "back"]
+    outlines_mm: NDArray[np.float64]
+    covariance_mm2: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        self.outlines_mm.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +61,7 @@ class Layout:
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
         fiducial_diameter_mm: the marks' diameter.
+        as_made: how the cells of a made pad look; None: as designed.
     """
 
     pattern: str
@@ -56,6 +80,7 @@ class Layout:
     outline_mm: NDArray[np.float64]
     fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
+    as_made: AsMade | None = None
 
     def __post_init__(self) -> None:
         columns: tuple[NDArray[Any], ...] = (
@@ -92,6 +117,19 @@ class Layout:
         return present
 
     @cached_property
+    def colored_cells(self) -> NDArray[np.int64]:
+        """(N,) numbers of the cells that are not black."""
+        return np.flatnonzero(self.cell_color != BLACK)
+
+    @cached_property
+    def colored_outlines_mm(self) -> NDArray[np.float64]:
+        """(N, K, 2) outlines of the ``colored_cells``: as made where this is known, else their corners."""
+        if self.as_made is not None:
+            return self.as_made.outlines_mm
+        outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]
+        return outlines
+
+    @cached_property
     def virtual_xy_mm(self) -> NDArray[np.float64]:
         """(E, m, 2) float64 mm: virtual marker j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""
         start, end = self.marker_xy_mm[self.edges[:, 0]], self.marker_xy_mm[self.edges[:, 1]]
@@ -118,3 +156,9 @@ class Layout:
         ):
             digest.update(np.ascontiguousarray(column, dtype=dtype).tobytes())
         return digest.hexdigest()
+
+
+def equal_length_outlines(outlines: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(N, K, 2) outlines of one array; shorter outlines repeat their last point."""
+    longest = max(map(len, outlines))
+    return np.stack([np.concatenate([o, np.repeat(o[-1:], longest - len(o), axis=0)]) for o in outlines])

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmpdesign import __version__
 from cmpdesign.design.design import Design
-from cmpdesign.layout.checks import Finding, check_design
+from cmpdesign.layout.checks import CAMERA_PX, Finding, check_design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
 from cmpdesign.patterns.colors import COLORS
@@ -56,8 +56,8 @@ class DesignReport:
     findings: tuple[Finding, ...]
 
 
-def design_report(design: Design, layout: Layout) -> DesignReport:
-    """The key figures of a design and its layout.
+def design_report(design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> DesignReport:
+    """The key figures of a design and its layout; ``camera_px`` as in ``check_design``.
 
     >>> from cmpdesign import build_layout, load_design
     >>> design = load_design("tac3d")
@@ -84,7 +84,7 @@ def design_report(design: Design, layout: Layout) -> DesignReport:
         smallest_feature_mm=round(float(cell_widths_mm(layout).min()), 6),
         sharpest_corner_deg=round(float(cell_angles_deg(layout).min()), 6),
         digest=layout.digest,
-        findings=tuple(check_design(design, layout)),
+        findings=tuple(check_design(design, layout, camera_px)),
     )
 
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
     from cmpdesign.layout.layout import Layout
     from cmpdesign.layout.report import DesignReport
+    from cmpdesign.products.as_made.made_pad import MadePad
+    from cmpdesign.products.as_made.reading import PadReading
 
 
 @dataclass(frozen=True)
@@ -34,15 +36,34 @@ class ProductFiles:
         figures: measures of the product as JSON values; the product's member in ``report.json``.
         findings: errors and warnings about the product.
         pictures: name -> (H, W, 3) uint8 BGR picture of the product, shown in ``preview.png``.
+        made_pad: the pad that the product makes, which is read before the files are written; None without a pad.
     """
 
     files: Mapping[str, str | bytes]
     figures: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    made_pad: MadePad | None = None
 
 
+# The camera that reads a pad, unless another one is given.
+CAMERA_PX = (640, 480)
 Maker = Callable[["Design", "Layout"], ProductFiles]
+
+
+@dataclass(frozen=True, eq=False)
+class MadeProducts:
+    """The results of ``make_products``.
+
+    Attributes:
+        files: all files by relative path, in the registry's order.
+        findings: findings of the products and of the reading of their pads.
+        readings: name of a product -> what the extractor reads of its pad.
+    """
+
+    files: dict[str, str | bytes]
+    findings: tuple[Finding, ...]
+    readings: Mapping[str, PadReading]
 
 
 @dataclass(frozen=True)
@@ -53,23 +74,34 @@ class Product:
         maker: "module:function" of the ``Maker``.
         where: the file or folder that the product writes; a folder ends with "/".
         usual: True if a plain ``build`` makes the product; other products are made when ``--only`` names them.
+        pad: "module:function" that makes the product's pad of ``(design, layout)``; empty if it makes no other pad
+            than the products before it.
     """
 
     maker: str
     where: str
     usual: bool = False
+    pad: str = ""
 
 
-PREVIEW, REPORT = "preview", "report"
+PREVIEW, REPORT, AS_MADE = "preview", "report", "as_made"
 PRODUCTS: Mapping[str, Product] = {
     "svg": Product("cmpdesign.products.registry:_make_svg", "pattern.svg", usual=True),
     "layout": Product("cmpdesign.products.registry:_make_layout", "layout.json", usual=True),
     # The preview and the report are no ``Maker``s: they show the pictures and figures of the other products.
     PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
-    "laser": Product("cmpdesign.products.laser.make:make_laser", "laser/"),
-    "mold": Product("cmpdesign.products.mold.make:make_mold", "mold/"),
+    "laser": Product(
+        "cmpdesign.products.laser.make:make_laser", "laser/", pad="cmpdesign.products.laser.make:laser_pad"
+    ),
+    "mold": Product(
+        "cmpdesign.products.mold.make:make_mold", "mold/", pad="cmpdesign.products.mold.make:mold_pad"
+    ),
     "mesh": Product("cmpdesign.products.mold.meshes:make_meshes", "mesh/"),
-    "print": Product("cmpdesign.products.sheet.print_sheet:make_print_sheet", "print/"),
+    "print": Product(
+        "cmpdesign.products.sheet.print_sheet:make_print_sheet",
+        "print/",
+        pad="cmpdesign.products.sheet.print_sheet:made_pad",
+    ),
     REPORT: Product("cmpdesign.layout.report:report_to_json", "report.json", usual=True),
 }
 USUAL_NAMES = ",".join(name for name, product in PRODUCTS.items() if product.usual)
@@ -99,14 +131,15 @@ def product_folders() -> list[str]:
 
 
 def make_products(
-    names: Sequence[str], design: Design, layout: Layout, report: DesignReport
-) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
-    """Make the named products.
+    names: Sequence[str],
+    design: Design,
+    layout: Layout,
+    report: DesignReport,
+    camera_px: tuple[int, int] = CAMERA_PX,
+) -> MadeProducts:
+    """Make the named products, and read their pads as a camera of ``camera_px`` (width, height) sees them.
 
     ``report.json`` is also made when a named product has figures, and ``preview.png`` when one has pictures.
-
-    Returns:
-        All files by relative path, in the registry's order, and the findings of the products.
 
     Raises:
         CmpDesignError: a product cannot be made. No file has been written.
@@ -120,18 +153,53 @@ def make_products(
     in_order = [made[name] for name in PRODUCTS if name in made]
     files = {path: content for product in in_order for path, content in product.files.items()}
     figures = {name: product.figures for name, product in made.items() if product.figures}
+    findings = [finding for product in made.values() for finding in product.findings]
+    # A mold and its meshes make the same pad.
+    pads = {
+        product.made_pad.product: product.made_pad for product in in_order if product.made_pad is not None
+    }
+    readings: dict[str, PadReading] = {}
+    if pads:
+        from cmpdesign.products.as_made.reading import read_pads
+
+        read = read_pads(pads.values(), camera_px)
+        files |= read.files
+        findings += read.findings
+        figures[AS_MADE] = read.figures
+        readings |= read.readings
     if figures or REPORT in names:
         from cmpdesign.layout.report import report_to_json
 
         files[PRODUCTS[REPORT].where] = report_to_json(report, figures)
-    findings = dict.fromkeys(finding for product in made.values() for finding in product.findings)
-    return files, tuple(findings)
+    return MadeProducts(files, tuple(dict.fromkeys(findings)), readings)
+
+
+def pads_as_made(design: Design, layout: Layout) -> tuple[list[MadePad], dict[str, str]]:
+    """The pads of all products that make one, without the products' files.
+
+    Returns:
+        The pads, and for each product that cannot be made its name and the reason.
+    """
+    pads, reasons = [], {}
+    for name, product in PRODUCTS.items():
+        if not product.pad:
+            continue
+        try:
+            pads.append(_load(product.pad)(design, layout))
+        except CmpDesignError as error:
+            reasons[name] = str(error)
+    return pads, reasons
 
 
 def _load_maker(name: str) -> Maker:
-    module, _, function = PRODUCTS[name].maker.partition(":")
-    maker: Maker = getattr(import_module(module), function)
+    maker: Maker = _load(PRODUCTS[name].maker)
     return maker
+
+
+def _load(place: str) -> Any:
+    """The function at "module:function"."""
+    module, _, function = place.partition(":")
+    return getattr(import_module(module), function)
 
 
 def _make_svg(design: Design, layout: Layout) -> ProductFiles:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.layout import AsMade, Layout, equal_length_outlines
+from cmpdesign.layout.side import seen_side
 
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
@@ -41,4 +42,14 @@ def layout_from_reference(reference: Reference) -> Layout:
         outline_mm=reference.outline_mm,
         fiducials_mm=reference.fiducials_mm,
         fiducial_diameter_mm=reference.fiducial_diameter_mm,
+        as_made=_as_made(reference),
     )
+
+
+def _as_made(reference: Reference) -> AsMade | None:
+    made = reference.as_made
+    if made is None:
+        return None
+    outlines = equal_length_outlines(made.outlines_mm)
+    side = seen_side(made.side == "back")
+    return AsMade(made.of, made.product, side, outlines, made.covariance_mm2)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
 from extractor.layout.consistency import check_consistency
-from extractor.layout.reference import COLORS, Reference
+from extractor.layout.reference import BLACK, COLORS, AsMade, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
@@ -29,7 +29,9 @@ FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
-OPTIONAL_FIELDS = ("fiducials",)
+OPTIONAL_FIELDS = ("fiducials", "as_made")
+SIDES = ("front", "back")
+MIN_OUTLINE = 3
 
 
 def load_layout(path: str | PathLike[str]) -> Reference:
@@ -68,6 +70,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
     origin = fields.mapping(document["reference"], "reference")
     fields.known_fields(origin, ("cell", "marker"), "reference.")
     fiducials_mm, fiducial_diameter_mm = _fiducials(document)
+    color = fields.choices(cells["color"], "cells.color", len(corners), COLORS)
     reference = Reference(
         pattern=fields.text_field(document["pattern"], "pattern"),
         parameters=_parameters(document["parameters"]),
@@ -75,7 +78,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         index=fields.integers(markers["index"], "markers.index", fields.MAX_INT, count),
         xy_mm=np.column_stack([x_mm, y_mm]),
         cell_corners=corners,
-        cell_color=fields.choices(cells["color"], "cells.color", len(corners), COLORS),
+        cell_color=color,
         edges=fields.integer_rows(document["edges"], "edges", count - 1, (2,)),
         virtual_per_edge=_virtual_per_edge(document),
         reference_cell=fields.integer(origin["cell"], "reference.cell", 0, len(corners) - 1),
@@ -86,6 +89,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         digest=fields.text_field(document["digest"], "digest"),
         fiducials_mm=fiducials_mm,
         fiducial_diameter_mm=fiducial_diameter_mm,
+        as_made=_as_made(document, int(np.count_nonzero(color != BLACK))),
     )
     check_consistency(reference)
     _check_digest(reference)
@@ -143,6 +147,42 @@ def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
     y_mm = fields.lengths_mm(marks["y"], "fiducials.y", count)
     diameter_mm = fields.length_mm(marks["diameter_mm"], "fiducials.diameter_mm")
     return np.column_stack([x_mm, y_mm]), diameter_mm
+
+
+def _as_made(document: dict[str, Any], colored: int) -> AsMade | None:
+    """How the pad was made, with one outline for each of the ``colored`` cells; None for a pad as designed."""
+    if "as_made" not in document:
+        return None
+    made = fields.mapping(document["as_made"], "as_made")
+    optional = tuple(name for name in ("covariance_mm2",) if name in made)
+    fields.known_fields(made, ("of", "product", "side", "outlines", *optional), "as_made.")
+    of = fields.text_field(made["of"], "as_made.of")
+    if not re.fullmatch("[0-9a-f]{64}", of):
+        fields.fail("as_made.of", fields.shown(of), "the digest of a layout, 64 hex digits")
+    side = made["side"]
+    if side not in SIDES:
+        fields.fail("as_made.side", fields.shown(side), f"one of {', '.join(SIDES)}")
+    outlines = made["outlines"]
+    if not isinstance(outlines, list) or len(outlines) != colored:
+        fields.fail(
+            "as_made.outlines",
+            fields.shown(outlines),
+            f"{colored} outlines, one for each cell that is not black",
+        )
+    rings = [fields.points_mm(ring, f"as_made.outlines[{i}]") for i, ring in enumerate(outlines)]
+    for number, ring in enumerate(rings):
+        if len(ring) < MIN_OUTLINE:
+            fields.fail(
+                f"as_made.outlines[{number}]", f"a list of {len(ring)}", f"at least {MIN_OUTLINE} points"
+            )
+    covariance = None
+    if optional:
+        xx, xy, yy = fields.lengths_mm(made["covariance_mm2"], "as_made.covariance_mm2", 3).tolist()
+        if min(xx, yy) < 0 or xx * yy < xy * xy:
+            fields.fail("as_made.covariance_mm2", f"[{xx:g}, {xy:g}, {yy:g}]", "xx, xy, yy of a covariance")
+        covariance = (xx, xy, yy)
+    product = fields.text_field(made["product"], "as_made.product")
+    return AsMade(of, product, side, tuple(rings), covariance)
 
 
 def _check_digest(reference: Reference) -> None:

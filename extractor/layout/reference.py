@@ -21,6 +21,25 @@ ARRAY_FIELDS = (
 
 
 @dataclass(frozen=True, eq=False)
+class AsMade(FrozenRecord):
+    """How a made pad differs from the layout that it was made after. No marker is found by this.
+
+    Attributes:
+        of: digest of the nominal layout.
+        product: name of the product: "laser", "mold", "print".
+        side: side of the pattern that the outlines belong to: "front" or "back".
+        outlines_mm: one (K, 2) float64 outline for each cell that is not black.
+        covariance_mm2: xx, xy, yy of every marker's place from pad to pad; None: unknown.
+    """
+
+    of: str
+    product: str
+    side: str
+    outlines_mm: tuple[NDArray[np.float64], ...]
+    covariance_mm2: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Reference(FrozenRecord):
     """A pattern as the layout file describes it, in read-only arrays and mappings.
 
@@ -43,6 +62,7 @@ class Reference(FrozenRecord):
         digest: SHA-256 (hex) of the geometry.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where there are none.
         fiducial_diameter_mm: diameter of these marks.
+        as_made: how a made pad differs from its design; None for a pad as designed.
     """
 
     pattern: str
@@ -62,6 +82,7 @@ class Reference(FrozenRecord):
     digest: str
     fiducials_mm: NDArray[np.float64] = with_default(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
+    as_made: AsMade | None = None
 
     def __post_init__(self) -> None:
         for name in ARRAY_FIELDS:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmpdesign.cli.pixels import parse_pixels
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products, make_products, product_folders
@@ -22,6 +23,13 @@ SetOption = Annotated[
     ),
 ]
 
+CameraOption = Annotated[
+    str, typer.Option("--camera", metavar="WxH", help="Pixels of the camera whose picture the pattern fills.")
+]
+CAMERA_TEXT = "640x480"
+EXIT_NOT_PASSED = 1
+LARGEST_CAMERA_PX = 99_999
+
 
 def build(
     design: DesignArgument,
@@ -32,26 +40,31 @@ def build(
     only: Annotated[
         str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
     ] = USUAL_NAMES,
+    camera: CameraOption = CAMERA_TEXT,
 ) -> None:
     """Write a design's files: SVG, layout file, preview and report, or what --only names.
 
     Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
-    are all files of an earlier build of another pattern, unless they were changed since.
+    are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
+    prints are read as the camera sees them before files are written. Exit code 1 when something will not work.
     """
     from cmpdesign.design.design import load_design
     from cmpdesign.files.atomic import write_folder
     from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
     from cmpdesign.files.layout_json import pattern_digest
+    from cmpdesign.files.other_designs import find_other_designs
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.report import design_report
+    from cmpdesign.products.as_made.reading import clip_findings
 
     names = chosen_products(only)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
-    report = design_report(parameters, layout)
-    files, findings = make_products(names, parameters, layout, report)
+    camera_px = parse_camera(camera)
+    report = design_report(parameters, layout, camera_px)
+    made = make_products(names, parameters, layout, report, camera_px)
     pattern = pattern_digest(layout)
-    listed = files_with_lists(files, product_folders(), output, pattern)
+    listed = files_with_lists(made.files, product_folders(), output, pattern)
     stale = find_stale_files(output, listed, product_folders(), pattern)
     for path in write_folder(output, listed):
         if path.name != LIST_NAME:
@@ -60,9 +73,25 @@ def build(
         if path.name != LIST_NAME:
             console().print(f"removed {printable_path(path)}, of an earlier build")
     print_report(report)
-    for finding in (*report.findings, *findings):
+    for name, reading in made.readings.items():
+        console().print(f"{name} as made: {reading.line()}")
+    for path in find_other_designs(output, product_folders(), layout.digest, pattern):
+        print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
+    findings = (*report.findings, *clip_findings(layout, camera_px), *made.findings)
+    for finding in findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def parse_camera(text: str) -> tuple[int, int]:
+    """Width and height of ``--camera``, px.
+
+    Raises:
+        CmpDesignError: another text than "640x480".
+    """
+    return parse_pixels("--camera", text, LARGEST_CAMERA_PX)
 
 
 def parse_overrides(texts: list[str] | None) -> dict[str, str]:

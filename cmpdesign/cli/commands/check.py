@@ -2,35 +2,63 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.commands.build import DesignArgument, SetOption, parse_overrides
-from cmpdesign.cli.pixels import parse_pixels
-from cmpdesign.cli.terminal import console
+from cmpdesign.cli.commands.build import (
+    CAMERA_TEXT,
+    EXIT_NOT_PASSED,
+    CameraOption,
+    DesignArgument,
+    SetOption,
+    parse_camera,
+    parse_overrides,
+)
+from cmpdesign.cli.terminal import console, print_warning
 
-EXIT_NOT_PASSED = 1
-LARGEST_CAMERA_PX = 99_999
+if TYPE_CHECKING:
+    from cmpdesign.layout.checks import Finding
 
 
 def check(
     design: DesignArgument,
     override: SetOption = None,
-    camera: Annotated[
-        str, typer.Option(metavar="WxH", help="Pixels of the camera whose picture the pattern fills.")
-    ] = "640x480",
+    camera: CameraOption = CAMERA_TEXT,
+    read: Annotated[
+        bool, typer.Option("--read", help="Draw and read the pads that laser, mold and print would make.")
+    ] = False,
 ) -> None:
     """List what cannot be made or read. Exit code 1 when something will not work."""
+    from cmpdesign.design.design import load_design
+    from cmpdesign.layout.build import build_layout
+    from cmpdesign.layout.checks import check_design
+    from cmpdesign.products.as_made.reading import clip_findings
+
+    camera_px = parse_camera(camera)
+    parameters = load_design(design, parse_overrides(override))
+    layout = build_layout(parameters)
+    findings = [*check_design(parameters, layout, camera_px), *clip_findings(layout, camera_px)]
+    if read:
+        from cmpdesign.products.as_made.reading import read_pads
+        from cmpdesign.products.registry import pads_as_made
+
+        pads, reasons = pads_as_made(parameters, layout)
+        found = read_pads(pads, camera_px)
+        for name, reading in found.readings.items():
+            console().print(f"{name} as made: {reading.line()}")
+        for name, reason in reasons.items():
+            print_warning(f"{name} is not read: {reason}")
+        findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
+    _print_findings(findings)
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
 
-    from cmpdesign.design.design import load_design
-    from cmpdesign.layout.checks import check_design
-
-    findings = check_design(
-        load_design(design, parse_overrides(override)),
-        camera_px=parse_pixels("--camera", camera, LARGEST_CAMERA_PX),
-    )
     if not findings:
         console().print("nothing to report: it can be made and read")
         return
@@ -41,5 +69,3 @@ def check(
         numbers = (f"{finding.value:.3g}", f"{finding.limit:.3g}")
         table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
     console().print(table, soft_wrap=False)
-    if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(EXIT_NOT_PASSED)

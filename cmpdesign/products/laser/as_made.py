@@ -7,14 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.products.as_made.made_pad import CORNER_SHARE, Cause, MadePad, cut_by_later, make_pad
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
-from cmpdesign.products.laser.paths.cavities import Cavities, burnt_areas_mm2, burnt_outlines_mm
+from cmpdesign.products.laser.paths.cavities import ARC_POINTS, Cavities, burnt_areas_mm2, burnt_outlines_mm
 from cmpdesign.products.laser.paths.kerf import polygon_areas
 from cmpdesign.products.laser.paths.webs import burn_depth_mm, smallest_web_mm
 
 # Cavities further apart than this many pitches are not compared.
 WEB_REACH_PITCHES = 1.5
+# Every third point of an arc is kept: chords stay within a micrometre of a curve of 0.1 mm radius.
+ARC_STRIDE = 3
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,39 @@ def burnt_cell_outlines_mm(laser_pass: LaserPass, beam: BeamFootprint) -> Points
     """(N, P, 2) outlines of a pass' cavities in the bed's frame, in burning order, mm."""
     assert laser_pass.cavities is not None
     return burnt_outlines_mm(laser_pass.cavities, beam)
+
+
+def made_pad(job: LaserJob) -> MadePad:
+    """The pad with its cells as burnt at the side that the camera sees."""
+    share = {"front": 0.0, "middle": 0.5, "back": 1.0}[job.nominal_face]
+    nominal_beam = job.front.at_depth(share * job.setup.depth_mm, job.setup.taper_deg)
+    cells: list[int] = []
+    rings: list[Points] = []
+    loss_mm = nominal_loss_mm = 0.0
+    for laser_pass in job.cell_passes:
+        cavities = laser_pass.cavities
+        assert cavities is not None
+        burnt = burnt_outlines_mm(cavities, job.seen)
+        loss_mm = max(loss_mm, float(corner_losses_mm(cavities, burnt).max()))
+        at_nominal = corner_losses_mm(cavities, burnt_outlines_mm(cavities, nominal_beam))
+        nominal_loss_mm = max(nominal_loss_mm, float(at_nominal.max()))
+        cells += cavities.cell.tolist()
+        rings += list(fewer_points(burnt) - job.origin_mm)
+    outlines = dict(zip(cells, cut_by_later(rings), strict=True))
+    causes = (
+        Cause("the kerf (laser.kerf_mm)", CORNER_SHARE * nominal_loss_mm),
+        Cause("laser.face", abs(loss_mm - nominal_loss_mm)),
+    )
+    in_order = [outlines[cell] for cell in job.layout.colored_cells.tolist()]
+    return make_pad(job.layout, "laser", in_order, causes)
+
+
+def fewer_points(outlines: Points) -> Points:
+    """(N, P, 2) outlines with fewer points on their arcs; the ends of the arcs and of the sides stay."""
+    kept = np.array([0, *range(1, ARC_POINTS + 1, ARC_STRIDE), ARC_POINTS + 1])
+    corners = outlines.shape[1] // (ARC_POINTS + 2)
+    every: Points = outlines[:, (np.arange(corners)[:, None] * (ARC_POINTS + 2) + kept).ravel()]
+    return every
 
 
 def _measure_face(job: LaserJob, beam: BeamFootprint) -> list[FaceFigures]:

@@ -1,18 +1,16 @@
-"""as-made.svg: the pattern with the cavities as the laser leaves them at the front, filled with ink, at true size.
+"""as-made.svg: the pattern as the laser leaves it at the side that the camera sees, filled with ink, at true size.
 
-The drawing is built like ``pattern.svg``, so that programs can compare and render it and the extractor can read it.
+The drawing is not mirrored: it shows the front's x to the right. It is built like ``pattern.svg``, so that programs can
+compare and render it and the extractor can read it.
 """
 
 from __future__ import annotations
 
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.laser.as_made import burnt_cell_outlines_mm
+from cmpdesign.products.laser.as_made import burnt_cell_outlines_mm, fewer_points
 from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.paths.beam import Points
-
-# Every fourth point of the outlines is drawn: chords stay within 2 micrometres of a curve of 0.125 mm radius.
-POINT_STRIDE = 4
 
 
 def as_made_svg(job: LaserJob) -> str:
@@ -27,8 +25,8 @@ def as_made_svg(job: LaserJob) -> str:
     ]
     for laser_pass in job.cell_passes:
         assert laser_pass.color is not None
-        burnt = burnt_cell_outlines_mm(laser_pass, job.front)
-        outlines = list(burnt[:, ::POINT_STRIDE] if job.setup.compensated else burnt)
+        burnt = burnt_cell_outlines_mm(laser_pass, job.seen)
+        outlines = list(fewer_points(burnt) if job.setup.compensated else burnt)
         lines.append(
             _pass_group(
                 laser_pass.name, job.layout.palette[COLORS[laser_pass.color]], outlines, low[0], high[1]

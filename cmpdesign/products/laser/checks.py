@@ -9,12 +9,14 @@ import numpy as np
 from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
+from cmpdesign.layout.side import seen_side
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
 from cmpdesign.products.laser.job import LaserJob, LaserPass
 from cmpdesign.products.laser.paths.strokes import Strokes
 
-# Largest depth of the burn into a cured neighbour, in kerfs; a deeper burn changes the neighbour's corners.
-BURN_LIMIT_KERFS = 0.5
+# Largest depth of the burn into a cured neighbour, in kerfs. At the side that the camera sees a deeper burn changes the
+# neighbour's corners; at the hidden side it may not pass through the neighbour's edge altogether.
+BURN_LIMIT_KERFS, HIDDEN_BURN_LIMIT_KERFS = 0.5, 1.0
 # Paths whose points agree to within this distance count as one path burnt twice.
 SAME_MM = 1e-3
 
@@ -52,6 +54,11 @@ def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
             "depth of the cavities in this material", setup.depth_mm, thickness, "mm", remedy
         )
     yield from _hole_findings(job)
+    if setup.depth_mm < thickness - 1e-9 and seen_side(job.layout.mirrored) == "back":
+        remedy = "cut through the sheet (leave laser.depth_mm out), or set mirrored = false: the floor hides the cells"
+        yield _error_finding(
+            "depth of cavities whose back the camera sees", setup.depth_mm, thickness, "mm", remedy
+        )
     if not setup.compensated:
         yield from _uncompensated_findings(job)
     elif min(job.back.x_mm, job.back.y_mm) <= 0:
@@ -102,11 +109,12 @@ def path_findings(job: LaserJob) -> Iterator[Finding]:
 
 def as_made_findings(job: LaserJob, figures: tuple[PassFigures, ...]) -> Iterator[Finding]:
     """Findings on the resulting geometry: webs too thin, cured neighbours burnt, assumed values."""
-    limit = job.setup.minimum_web_mm
+    limit, seen = job.setup.minimum_web_mm, seen_side(job.layout.mirrored)
     for one_pass in figures:
         for side, face, beam in (("front", one_pass.front, job.front), ("back", one_pass.back, job.back)):
             if face is not None:
-                burn_limit = BURN_LIMIT_KERFS * beam.narrow_mm
+                kerfs = BURN_LIMIT_KERFS if side == seen else HIDDEN_BURN_LIMIT_KERFS
+                burn_limit = kerfs * beam.narrow_mm
                 yield from _web_findings(f"{one_pass.name} at the {side}", face, limit, burn_limit)
     if job.setup.options.holes and len(job.fiducials_mm):
         yield from _hole_web_findings(job, limit)

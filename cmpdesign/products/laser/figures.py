@@ -76,7 +76,7 @@ def job_figures(
         "corner": setup.options.corner if setup.compensated else "plain",
         "compensated": setup.compensated,
         "order": setup.options.order,
-        "nominal_face": setup.options.face,
+        "nominal_face": job.nominal_face,
         "kerf_front_mm": [round(width, 6) for width in job.front.kerf_mm],
         "kerf_back_mm": [round(width, 6) for width in job.back.kerf_mm],
         "taper_deg": setup.taper_deg,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import Cavities, make_cavities
@@ -24,6 +25,7 @@ from cmpdesign.products.laser.setup import LaserSetup
 
 # Points of a circular path.
 CIRCLE_POINTS = 96
+Face = Literal["front", "middle", "back"]
 PassKind = Literal["holes", "cells", "outline", "coupon"]
 
 
@@ -113,6 +115,16 @@ class LaserJob:
         return self.front.at_depth(self.setup.depth_mm, self.setup.taper_deg)
 
     @property
+    def nominal_face(self) -> Face:
+        """Where cells have their nominal size: the design's face, else the side that the camera sees."""
+        return nominal_face(self.layout, self.setup)
+
+    @property
+    def seen(self) -> BeamFootprint:
+        """The beam's footprint at the side that the camera sees."""
+        return self.back if seen_side(self.layout.mirrored) == "back" else self.front
+
+    @property
     def cell_passes(self) -> tuple[LaserPass, ...]:
         return tuple(laser_pass for laser_pass in self.passes if laser_pass.kind == "cells")
 
@@ -129,11 +141,16 @@ class LaserJob:
         return Extent(left, bottom, right, top)
 
 
+def nominal_face(layout: Layout, setup: LaserSetup) -> Face:
+    """Where cells have their nominal size, see ``LaserJob.nominal_face``."""
+    return setup.options.face or seen_side(layout.mirrored)
+
+
 def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
     """Make the passes of a layout: holes, cells color by color, outline. The job is not checked here."""
     origin_mm = _job_origin_mm(layout, setup)
     front = BeamFootprint.of_kerf(setup.kerf_x_mm, setup.kerf_y_mm)
-    share = {"front": 0.0, "middle": 0.5, "back": 1.0}[setup.options.face]
+    share = {"front": 0.0, "middle": 0.5, "back": 1.0}[nominal_face(layout, setup)]
     beam = front.at_depth(share * setup.depth_mm, setup.taper_deg)
     passes: list[LaserPass] = []
     if setup.options.holes and len(layout.fiducials_mm):

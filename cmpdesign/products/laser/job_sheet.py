@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
 from cmpdesign.products.laser.figures import PassTiming
@@ -108,7 +109,7 @@ def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
         "Machine": f"{setup.machine.name}, bed {bed}, full power S{setup.machine.s_max.value:g}",
         "Material": f"{setup.material.name}, {setup.material.thickness_mm.value:g} mm",
         "Cavities": f"{setup.options.mode}, {setup.depth_mm:g} mm deep, {setup.options.corner} corners, "
-        f"nominal size at the {setup.options.face}"
+        f"nominal size at the {job.nominal_face}; the camera sees the {seen_side(job.layout.mirrored)}"
         if setup.compensated
         else f"{setup.options.mode}, {setup.depth_mm:g} mm deep",
         "Kerf": f"front {_format_kerf(job.front.kerf_mm)}, back {_format_kerf(job.back.kerf_mm)} (cuts "

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
-from cmpdesign.products.laser.as_made import measure_as_made
+from cmpdesign.products.as_made.made_pad import MadePad
+from cmpdesign.products.laser.as_made import made_pad, measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
 from cmpdesign.products.laser.checks import as_made_findings, path_findings, require_no_errors, setup_findings
 from cmpdesign.products.laser.coupon.job import coupon_job
@@ -30,6 +31,18 @@ FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
 }
 
 
+def laser_pad(design: Design, layout: Layout) -> MadePad:
+    """The pad as carved.
+
+    Raises:
+        DesignError: see ``make_laser``.
+    """
+    job = make_job(design.name, layout, complete_setup(design.laser))
+    require_no_errors(setup_findings(design, job))
+    require_no_errors(as_made_findings(job, measure_as_made(job)))
+    return made_pad(job)
+
+
 def make_laser(design: Design, layout: Layout) -> ProductFiles:
     """Make the folder ``laser/``.
 
@@ -51,4 +64,4 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
     files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings)
-    return ProductFiles(files, job_figures(job, figures, timings), warnings)
+    return ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))

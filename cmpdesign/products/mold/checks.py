@@ -11,9 +11,12 @@ import numpy as np
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.mold.clearances import LEAST_WALL_MM, clearance_findings
 from cmpdesign.products.mold.shapes.bosses import boss_features
-from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3, inset_cells
+from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
+from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3
 from cmpdesign.products.mold.stack.crown import Crown
+from cmpdesign.products.mold.stack.silicones import load_silicone, silicones
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crown_edge_mm
 
 
@@ -38,16 +41,15 @@ TOOL_LIMITS = {
 SLENDER_ERROR, SLENDER_WARNING = 3.0, 1.5
 DRAFT_MAX_DEG = 15.0
 DRAFT_WARNING_DEG = 0.5
-# Thinner webs of soft silicone tear when the plate is lifted.
-WEB_WARNING_MM = 0.05
+# Every color's cavities are filled before the next plate comes, so a web never stands free. Thinner ones close where
+# two plates are off by some micrometres.
+WEB_WARNING_MM = 0.01
 # Silicone layers whose sizes differ by more than this at the pad's edge wrinkle.
 MISMATCH_WARNING_MM = 0.1
 # Largest height of the crown over flat tips of bosses, as a share of the black layer, before the base layer bulges.
 SAG_WARNING = 0.1
 # Least thickness of a dome's silicone layers at the foot, measured across, as a share of that at the apex.
 THIN_WARNING = 0.85
-# Least wall between the moat and a pin hole.
-LEAST_WALL_MM = 0.3
 
 
 def check_mold(stack: MoldStack) -> list[Finding]:
@@ -59,7 +61,11 @@ def check_mold(stack: MoldStack) -> list[Finding]:
         *_curing_findings(stack),
         *_shape_findings(stack),
         *_unused_option_findings(stack),
+        *_side_findings(stack),
     ]
+    # Outlines have a shape only where the dimensions are possible.
+    if all(finding.severity == "warning" for finding in findings):
+        findings += clearance_findings(stack)
     return sorted(findings, key=lambda finding: finding.severity)
 
 
@@ -81,7 +87,7 @@ def min_feature_mm(stack: MoldStack) -> float:
 
 def tip_width_mm(stack: MoldStack) -> float:
     """Diameter of the inscribed circle of the narrowest boss's tip; negative if the tip vanishes."""
-    inset = stack.options.gap_mm / 2 + stack.lean * stack.thickness_mm[1]
+    inset = stack.options.gap_mm / 2 + seen_inset_mm(stack)
     return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
 
 
@@ -111,7 +117,7 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
         )
         return
     if option.gap_mm < WEB_WARNING_MM:
-        remedy = "make mold.gap_mm larger, or the black web tears"
+        remedy = "make mold.gap_mm larger, or fillings of two colors meet"
         yield Finding("mold.gap_mm", option.gap_mm, WEB_WARNING_MM, "mm", remedy, "warning")
     width, height = tip_width_mm(stack), stack.thickness_mm[1]
     if width < limit:
@@ -138,8 +144,13 @@ def _boss_findings(stack: MoldStack) -> Iterator[Finding]:
 
 def stencil_width_mm(stack: MoldStack) -> float:
     """Diameter of the inscribed circle of the narrowest stencil hole at the lower face."""
-    inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
-    return min(_inscribed_diameter_mm(stack.cells(color)) for color in stack.colors) - 2 * inset
+    return (
+        min(
+            _inscribed_diameter_mm(stack.cells(color)) - 2 * float(open_insets(stack, color).max())
+            for color in stack.colors
+        )
+        - 2 * stack.options.clearance_mm
+    )
 
 
 def _slenderness_findings(ratio: float) -> Iterator[Finding]:
@@ -156,8 +167,9 @@ def plate_web_mm(stack: MoldStack) -> tuple[float, str]:
 
     least, name = float("inf"), ""
     for color in stack.colors:
-        inset = inset_cells(stack.cells(color), stack.options.gap_mm / 2, 0.0)
-        roots = shapely.polygons([loop.points for loop in inset])
+        roots = np.array(
+            [shapely.Polygon(cavity.open.with_chords().points) for cavity in cavities(stack, color)]
+        )
         if len(roots) < 2:
             continue
         _, distances = shapely.STRtree(roots).query_nearest(roots, exclusive=True, return_distance=True)
@@ -193,6 +205,9 @@ def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
     if option.vents and option.vent_mm < min_feature_mm(stack):
         remedy = "make mold.vent_mm larger, or drill the vents"
         yield Finding("mold.vent_mm", option.vent_mm, min_feature_mm(stack), "mm", remedy, "error")
+    if not option.vents:
+        remedy = "give the lid some vents, or pour in a vacuum: air stays under it"
+        yield Finding("mold.vents", 0, 1, "", remedy, "warning")
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
         if getattr(option, field) < least:
@@ -232,6 +247,23 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
         remedy = "choose silicones that shrink alike"
         subject = "difference of the layers' shrinkage at the pad's edge"
         yield Finding(subject, mismatch, MISMATCH_WARNING_MM, "mm", remedy, "warning")
+
+
+def _side_findings(stack: MoldStack) -> Iterator[Finding]:
+    """Findings on what lies between the camera and the pattern: the base layer."""
+    base = stack.silicones[0]
+    if base.clear is None:
+        remedy = "add clear = { value = true, source = ... } to its file if light passes through it"
+        yield Finding(f"base silicone of unknown clarity ({base.name})", 1, 0, "", remedy, "warning")
+    elif not base.clear.value:
+        clear = ", ".join(name for name in silicones() if _is_clear(name))
+        remedy = f"the camera looks at the pattern through the base layer: set mold.base_silicone to {clear}"
+        yield Finding(f"base silicone that is not clear ({base.name})", 1, 0, "", remedy, "error")
+
+
+def _is_clear(name: str) -> bool:
+    clear = load_silicone(name).clear
+    return clear is not None and clear.value
 
 
 def _shape_findings(stack: MoldStack) -> Iterator[Finding]:
@@ -318,5 +350,5 @@ def facet_sag_mm(stack: MoldStack) -> float:
 
 def boss_volume_mm3(stack: MoldStack, color: int) -> float:
     """Volume of the silicone that fills a color's cavities."""
-    pairs = [(feature.root, feature.tip) for feature in boss_features(stack, stack.cells(color))]
+    pairs = [(feature.root, feature.tip) for feature in boss_features(stack, color)]
     return frusta_volume_mm3(pairs, stack.thickness_mm[1])

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from html import escape
 
 from cmpdesign.layout.checks import Finding
+from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.mold.make import mold_figures
+from cmpdesign.products.mold.make import mold_figures, pad_sizes_mm
 from cmpdesign.products.mold.parts import Part
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
 
@@ -30,6 +31,7 @@ def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings:
         f"<h1>Casting {escape(name)}</h1>",
         *(f'<p class="warning">{escape(str(finding))}</p>' for finding in findings),
         '<img class="whole" src="pictures/exploded.png" alt="all parts above each other, in the order of use">',
+        f"<p>{escape(_side_text(stack))}</p>",
         "<h2>Mix</h2>",
         _pours_html(stack),
         "<h2>Steps</h2>",
@@ -41,6 +43,20 @@ def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings:
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Casting {escape(name)}</title>'
     )
     return f"{head}<style>{_STYLE}</style></head><body>\n" + "\n".join(body) + "\n</body></html>\n"
+
+
+def _side_text(stack: MoldStack) -> str:
+    """Where the camera looks from, which layer must be clear, and how the pad widens."""
+    seen = seen_side(stack.layout.mirrored)
+    base, _, cover = (silicone.name for silicone in stack.silicones)
+    sizes = pad_sizes_mm(stack)
+    narrow, wide = (f"{sizes[face][0]:.2f} x {sizes[face][1]:.2f} mm" for face in ("back", "cover"))
+    lies = "as designed" if seen == "back" else "turned over"
+    return (
+        f"The camera sees the pattern's {seen}, through the base layer: {base} must be clear and without pigment; the "
+        f"cover ({cover}) may be pigmented. Seen from above, the pattern lies {lies}. Walls lean by "
+        f"{stack.options.draft_deg:g} degrees, so the pad widens from {narrow} at its back to {wide} at the cover."
+    )
 
 
 def _pours_html(stack: MoldStack) -> str:

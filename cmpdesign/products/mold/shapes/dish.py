@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN
-from cmpdesign.products.mold.solids.loops import Loop, Points, frustum_volume_mm3, inset_cells, polygon_loop
+from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, stencil_hole_outlines
+from cmpdesign.products.mold.shapes.cavities import cavities
+from cmpdesign.products.mold.solids.loops import Loop, Points, frustum_volume_mm3, polygon_loop
 from cmpdesign.products.mold.stack.crown import END_SLOPE, Crown
 from cmpdesign.products.mold.stack.stack import MoldStack
 
@@ -85,16 +86,15 @@ def make_bare_dish(stack: MoldStack) -> Dish:
 def make_dish(stack: MoldStack, color: int, through: bool) -> Dish:
     """The dish of a color's plate or (``through``) stencil; the number of a cell is that of its facet."""
     dish = make_bare_dish(stack)
-    option = stack.options
-    height = option.stencil_mm if through else stack.thickness_mm[1]
-    growth = (STENCIL_LEAN if through else -stack.lean) * height
-    inset = option.gap_mm / 2 + (option.clearance_mm if through else 0.0)
-    # The radius at a boss's root exceeds the tip's radius by the draft; a stencil's hole starts with the tip's radius.
-    radius = option.tip_radius_mm - min(growth, 0.0) if option.tip_radius_mm else 0.0
-    outlines = {}
-    for cell in np.flatnonzero(stack.layout.cell_color == color).tolist():
-        (start,) = inset_cells(dish.points[None, list(dish.facets[cell]), :2], inset, radius)
-        outlines[cell] = start.with_chords(), start.with_chords().offset(growth)
+    height = stack.options.stencil_mm if through else stack.thickness_mm[1]
+    if through:
+        starts = [below for below, _ in stencil_hole_outlines(stack, color)]
+    else:
+        starts = [cavity.open for cavity in cavities(stack, color)]
+    growth = STENCIL_LEAN * height if through else -stack.draft_mm
+    cells = np.flatnonzero(stack.layout.cell_color == color).tolist()
+    chorded = [start.with_chords() for start in starts]
+    outlines = {cell: (loop, loop.offset(growth)) for cell, loop in zip(cells, chorded, strict=True)}
     return replace(dish, outlines=outlines, height_mm=height)
 
 

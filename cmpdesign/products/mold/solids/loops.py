@@ -43,6 +43,10 @@ class Loop:
         """
         return Loop(self.points + offset_mm * self._corner_offsets(), self.centres)
 
+    def offset_sides(self, offsets_mm: NDArray[np.float64]) -> Loop:
+        """The polygon with side i moved outward by ``offsets_mm[i]``; all sides must be straight."""
+        return polygon_loop(inset_corners(self.points[None], -offsets_mm[None])[0])
+
     def _corner_offsets(self) -> Points:
         """(m, 2) the shift of each point when every side moves outward by one."""
         side = np.roll(self.points, -1, axis=0) - self.points
@@ -73,10 +77,11 @@ class Loop:
         shift = np.array([x_mm, y_mm])
         return Loop(self.points + shift, self.centres + shift)
 
-    def with_chords(self, radius_mm: float | None = None) -> Loop:
+    def with_chords(self, radius_mm: float | None = None, chord_deg: float | None = None) -> Loop:
         """The outline with arcs replaced by chords of at most ``FINE_DEG`` or, for small radii, ``COARSE_DEG``.
 
         ``radius_mm`` replaces each arc's own radius in this choice, so that paired outlines get paired chords.
+        ``chord_deg`` replaces the choice.
         """
         points = []
         for side, point in enumerate(self.points):
@@ -85,7 +90,8 @@ class Loop:
                 continue
             arc = self.arc(side)
             fine = (radius_mm or arc.radius_mm) >= FINE_RADIUS_MM
-            count = max(1, int(np.ceil(np.degrees(arc.sweep) / (FINE_DEG if fine else COARSE_DEG) - 1e-6)))
+            largest = chord_deg or (FINE_DEG if fine else COARSE_DEG)
+            count = max(1, int(np.ceil(np.degrees(arc.sweep) / largest - 1e-6)))
             angles = arc.first + arc.sweep * np.arange(1, count) / count
             directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
             points += list(self.centres[side] + arc.radius_mm * directions)
@@ -146,24 +152,22 @@ def rounded_rectangle(low: Points, high: Points, radius_mm: float) -> Loop:
     return rounded_polygon(corners, radius_mm)
 
 
-def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -> list[Loop]:
+def inset_cells(
+    cells: NDArray[np.float64], inset_mm: float | NDArray[np.float64], radius_mm: float
+) -> list[Loop]:
     """Move the sides of convex cells inward and round their corners.
 
     Args:
         cells: (N, k, 2) corners, counter-clockwise, mm.
-        inset_mm: distance by which the sides move inward.
+        inset_mm: distance by which the sides move inward: one, or (N, k), where side i starts at corner i.
         radius_mm: radius of the arcs at the corners; 0: sharp corners.
 
     Returns:
         One loop per cell.
     """
-    side = np.roll(cells, -1, axis=1) - cells
-    normal = (
-        np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.hypot(side[..., 0], side[..., 1])[..., None]
-    )
+    normal = _outward_normals(cells)
     before = np.roll(normal, 1, axis=1)
-    mitre = (before + normal) / (1 + (before * normal).sum(axis=-1))[..., None]
-    core = cells - (inset_mm + radius_mm) * mitre
+    core = inset_corners(cells, np.broadcast_to(inset_mm, cells.shape[:2]) + radius_mm)
     straight = np.full_like(core, np.nan)
     if radius_mm == 0:
         return [Loop(points, centres) for points, centres in zip(core, straight, strict=True)]
@@ -171,6 +175,28 @@ def inset_cells(cells: NDArray[np.float64], inset_mm: float, radius_mm: float) -
     points = np.stack([core + radius_mm * before, core + radius_mm * normal], axis=2).reshape(n, 2 * k, 2)
     centres = np.stack([core, straight], axis=2).reshape(n, 2 * k, 2)
     return [Loop(*pair) for pair in zip(points, centres, strict=True)]
+
+
+def inset_corners(cells: NDArray[np.float64], insets_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, k, 2) corners of convex cells (N, k, 2) whose side i, from corner i on, moved inward by insets (N, k)."""
+    normal = _outward_normals(cells)
+    before, inset_before = np.roll(normal, 1, axis=1), np.roll(insets_mm, 1, axis=1)
+    cosine = (before * normal).sum(axis=-1)
+    # The corner moves by a before + b normal, so that it moves by each side's inset along the side's normal.
+    scale = 1 / (1 - cosine**2)
+    a = (inset_before - insets_mm * cosine) * scale
+    b = (insets_mm - inset_before * cosine) * scale
+    corners: NDArray[np.float64] = cells - a[..., None] * before - b[..., None] * normal
+    return corners
+
+
+def _outward_normals(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, k, 2) unit normals of the sides of (N, k, 2) cells."""
+    side = np.roll(cells, -1, axis=1) - cells
+    normals: NDArray[np.float64] = (
+        np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.hypot(side[..., 0], side[..., 1])[..., None]
+    )
+    return normals
 
 
 def bounding_boxes(loops: Sequence[Loop]) -> NDArray[np.float64]:

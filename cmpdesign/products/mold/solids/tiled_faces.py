@@ -21,6 +21,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmpdesign.products.mold.solids.loops import Loop, Points, bounding_boxes, rounded_rectangle
 from cmpdesign.products.mold.solids.planar_faces import (
@@ -84,6 +85,8 @@ def choose_strip_lines(frame: Loop, features: Sequence[Loop], boxes: Points) -> 
     gaps = np.diff(events)
     wide = gaps > 2 * CORNER_CLEARANCE_MM
     candidates, width = (events[:-1] + gaps / 2)[wide], gaps[wide]
+    straight = ~_crosses_one_arc(candidates, features, boxes)
+    candidates, width = candidates[straight], width[straight]
     starts, ends = np.sort(boxes[:, 0, 1]), np.sort(boxes[:, 1, 1])
     cut = np.searchsorted(starts, candidates) - np.searchsorted(ends, candidates)
     lines: list[float] = []
@@ -96,6 +99,19 @@ def choose_strip_lines(frame: Loop, features: Sequence[Loop], boxes: Points) -> 
             return lines
         last = float(candidates[eligible][np.lexsort((-width[eligible], cut[eligible]))[0]])
         lines.append(last)
+
+
+def _crosses_one_arc(heights: Points, features: Sequence[Loop], boxes: Points) -> NDArray[np.bool_]:
+    """(N,) which heights lie between the highest (lowest) corner of a feature and the top of the arc beyond it.
+
+    A line there would cross one arc twice.
+    """
+    top = np.array([loop.points[:, 1].max() for loop in features])
+    bottom = np.array([loop.points[:, 1].min() for loop in features])
+    inside = np.zeros(len(heights), dtype=np.int64)
+    for start, end in ((top, boxes[:, 1, 1]), (boxes[:, 0, 1], bottom)):
+        inside += np.searchsorted(np.sort(start), heights) - np.searchsorted(np.sort(end), heights)
+    return inside > 0
 
 
 @dataclass

@@ -93,3 +93,14 @@ def project_on_crown(xy_mm: Points, shape: str, radius_mm: float, projection: st
     factor = np.sinc(distance / radius_mm / np.pi)
     plan: Points = xy_mm * factor[:, None]
     return plan
+
+
+def project_from_crown(plan_mm: Points, shape: str, radius_mm: float, projection: str) -> Points:
+    """The points (N, 2) of the flat pattern at places in plan; the inverse of ``project_on_crown``."""
+    if projection == "vertical":
+        return plan_mm
+    if shape == "cylinder":
+        return np.stack([radius_mm * np.arcsin(plan_mm[:, 0] / radius_mm), plan_mm[:, 1]], axis=-1)
+    sine = np.hypot(*plan_mm.T) / radius_mm
+    flat: Points = plan_mm * np.where(sine > 0, np.arcsin(sine) / np.where(sine > 0, sine, 1.0), 1.0)[:, None]
+    return flat

@@ -30,6 +30,7 @@ class Silicone(BaseModel):
         density_g_cm3, pot_life_min, cure_h: values at room temperature, for the job sheet.
         inhibited_by: materials of parts on which the silicone's surface stays sticky.
         remedy: remedy against the inhibition.
+        clear: the camera can look through a base layer of it; None: unknown.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -42,6 +43,7 @@ class Silicone(BaseModel):
     cure_h: Sourced[Positive]
     inhibited_by: Sourced[tuple[Tool, ...]]
     remedy: Line
+    clear: Sourced[bool] | None = None
 
     @property
     def scale(self) -> float:

@@ -13,7 +13,7 @@ Boss plates and stencils lie where the cover lies, one after the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from cmpdesign.design.fiducials import fiducial_positions
 from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.side import seen_side, turned_over
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.mold.solids.loops import Loop, Points, circle_loop, polygon_loop, rounded_rectangle
 from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, project_on_crown
@@ -41,7 +42,7 @@ class MoldStack:
 
     Attributes:
         options: the [mold] table.
-        layout: the pattern.
+        layout: the pattern as it lies in plan, seen from above; the camera looks at it from below.
         silicones: silicones of the base, the marker and the cover layer.
         outline_mm: (K, 2) the pad's edge at its back, convex, before shrinkage is added.
         crown: crown of a domed pad; None for a flat pad.
@@ -61,6 +62,11 @@ class MoldStack:
     def lean(self) -> float:
         """Tangent of the draft of walls."""
         return float(np.tan(np.radians(self.options.draft_deg)))
+
+    @property
+    def draft_mm(self) -> float:
+        """Distance by which a drafted wall leans over the height of the black layer."""
+        return self.lean * self.thickness_mm[1]
 
     @cached_property
     def thickness_mm(self) -> tuple[float, float, float]:
@@ -138,12 +144,18 @@ def make_stack(design: Design, layout: Layout) -> MoldStack:
         load_silicone(n) for n in (option.base_silicone, option.marker_silicone, option.cover_silicone)
     )
     four_fiducials = design.fiducials.model_copy(update={"count": 4})
-    pins = fiducial_positions(four_fiducials, layout.outline_mm)
+    marks = replace(layout, fiducials_mm=fiducial_positions(four_fiducials, layout.outline_mm))
+    pins, layout = plan_of(marks).fiducials_mm, plan_of(layout)
     diameter = option.pin_diameter_mm or design.fiducials.diameter_mm
     crown, outline = None, layout.outline_mm
     if option.crown != "none":
         crown, outline = _make_crown(option, layout, marker.scale)
     return MoldStack(option, layout, (base, marker, cover), outline, crown, pins, diameter)
+
+
+def plan_of(layout: Layout) -> Layout:
+    """The layout as it lies in a mold, seen from above: the camera, below, sees the designed side."""
+    return layout if seen_side(layout.mirrored) == "back" else turned_over(layout)
 
 
 def _make_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:

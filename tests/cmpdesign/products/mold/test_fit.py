@@ -197,7 +197,7 @@ def black_layer(name: str) -> Any:
         )  # with all colors' cavities, from the base to the open side
         layer = dished_sheet_solid(Slab(edges[0], 0.0, thickness, outer_top=edges[1]), dish)
     else:
-        pairs = [(b.tip, b.root) for color in mold.colors for b in boss_features(mold, mold.cells(color))]
+        pairs = [(b.tip, b.root) for color in mold.colors for b in boss_features(mold, color)]
         layer = make_slab_solid(Slab(edges[0], 0.0, thickness, many_through=pairs, outer_top=edges[1]))
     return moved_up(layer, mold.z_base_mm)
 

@@ -351,3 +351,31 @@ def test_the_page_about_molds_says_what_works(tmp_path: Path, monkeypatch: pytes
         if command.startswith("verify"):
             assert "at 300 dpi" in result.output
     assert {path.name for path in Path("out").iterdir()} >= {"mold", "mesh", "print", "layout.json"}
+
+
+@pytest.mark.parametrize(
+    ("mirrored", "film", "page_mirrored", "said"),
+    [
+        ("false", "none", False, "sees the front: print on the side that faces it"),
+        ("true", "none", False, "sees the back: print on the far side of a clear film"),
+        ("false", "clear", True, "sees the front: print on the far side of a clear film"),
+        ("true", "opaque", True, "sees the back: print on the side that faces it"),
+    ],
+)
+def test_a_sheet_says_where_it_is_printed_and_is_mirrored_there(
+    mirrored: str, film: str, page_mirrored: bool, said: str
+) -> None:
+    def sheet(**values: str) -> str:
+        design = load_design("honeycomb", {"layers": "2", "sheet.pads": "1", **values})
+        content = make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
+        assert isinstance(content, str)
+        return content
+
+    page = sheet(mirrored=mirrored, **{"sheet.film": film})
+    assert said in page
+
+    def cells(text: str) -> list[str]:
+        return [line for line in re.findall(r"<path d=\"[^\"]+", text)][1:14]
+
+    assert (cells(page) == cells(sheet(print_mirror="true"))) == page_mirrored
+    assert (cells(page) == cells(sheet())) != page_mirrored
