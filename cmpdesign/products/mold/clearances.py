@@ -10,12 +10,15 @@ import numpy as np
 
 from cmpdesign.layout.checks import Finding
 from cmpdesign.products.mold.parts import PIN_CHAMFER_MM, jack_holes, lid_height_mm, vent_holes
+from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, stencil_hole_outlines
+from cmpdesign.products.mold.shapes.cavities import open_insets
 from cmpdesign.products.mold.solids.loops import Loop
 from cmpdesign.products.mold.solids.slab_shells import TILE_MARGIN_MM
 from cmpdesign.products.mold.stack.stack import MoldStack
 
 # Least wall between two features of a part.
 LEAST_WALL_MM = 0.3
+LEAST_STENCIL_WEB_MM, LEAST_MOAT_MM = 0.01, 0.1
 # Least diameter of a pin between its chamfers.
 LEAST_PIN_TIP_MM = 0.4
 PINS, JACKS, VENTS, PAD = "a pin hole", "a jack screw's hole", "a vent", "the pad's opening"
@@ -50,6 +53,7 @@ def clearance_findings(stack: MoldStack) -> Iterator[Finding]:
                 named = f"{one} and another" if one == other else f"{one} and {other}"
                 subject = f"wall between {named} in {part}"
                 yield Finding(subject, distance, LEAST_WALL_MM, "mm", remedy, "error")
+    yield from _stencil_findings(stack)
     yield from _size_findings(stack)
 
 
@@ -58,11 +62,43 @@ def _size_findings(stack: MoldStack) -> Iterator[Finding]:
     if tip < LEAST_PIN_TIP_MM:
         remedy = "make mold.pin_diameter_mm (or fiducials.diameter_mm) larger"
         yield Finding("diameter of a pin between its chamfers", tip, LEAST_PIN_TIP_MM, "mm", remedy, "error")
+    option = stack.options
+    moat = option.moat_mm - 2 * stack.lean * option.moat_depth_mm
+    if moat < LEAST_MOAT_MM:
+        remedy = "make mold.moat_mm larger, or mold.moat_depth_mm or mold.draft_deg smaller"
+        yield Finding("width of the moat at its floor", moat, LEAST_MOAT_MM, "mm", remedy, "error")
     width = min(float(np.ptp(stack.edges(layer)[0].points, axis=0).min()) for layer in (0, 2))
     if stack.options.vents and width < 3 * stack.options.vent_mm:
         remedy = "make mold.vent_mm smaller, or mold.vents 0"
         yield Finding(
             "width of the pad under its vents", width, 3 * stack.options.vent_mm, "mm", remedy, "error"
+        )
+
+
+def _stencil_findings(stack: MoldStack) -> Iterator[Finding]:
+    """Errors where the holes of a stencil, which widen upwards, come too near to each other."""
+    import shapely
+
+    least = float("inf")
+    for color in stack.colors:
+        upper = [outline.with_chords() for _, outline in stencil_hole_outlines(stack, color)]
+        holes = [shapely.Polygon(loop.points) for loop in upper]
+        if len(holes) > 1:
+            _, distances = shapely.STRtree(holes).query_nearest(holes, exclusive=True, return_distance=True)
+            least = min(least, float(distances.min()))
+        if stack.crown is not None:
+            # On a dome every hole lies in its own facet.
+            widest = float(open_insets(stack, color).min()) + stack.options.clearance_mm
+            least = min(least, 2 * (widest - STENCIL_LEAN * stack.options.stencil_mm))
+    if least < LEAST_STENCIL_WEB_MM:
+        remedy = "make mold.stencil_mm smaller or mold.clearance_mm larger"
+        yield Finding(
+            "wall between two holes of a stencil's upper face",
+            least,
+            LEAST_STENCIL_WEB_MM,
+            "mm",
+            remedy,
+            "error",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -341,3 +342,43 @@ def test_fuzz_bytes(
         assert isinstance(load_layout(path), Reference)
     except LayoutError as error:
         assert str(error).isprintable()
+
+
+def made_document() -> dict[str, Any]:
+    """A pad as made whose cells look as designed."""
+    document = small_document()
+    markers, cells = document["markers"], document["cells"]
+    places = list(zip(markers["x"], markers["y"], strict=True))
+    colored = [c for c, color in zip(cells["corners"], cells["color"], strict=True) if color != "black"]
+    outlines = [[list(places[marker]) for marker in corners] for corners in colored]
+    made = {"of": document["digest"], "product": "mold", "side": "back", "outlines": outlines}
+    return document | {"as_made": made | {"covariance_mm2": [1e-4, 0.0, 1e-4]}}
+
+
+def test_a_pad_as_made_is_read() -> None:
+    document = made_document()
+    VALIDATOR.validate(document)
+    made = parse_layout(json.dumps(document)).as_made
+    assert made is not None
+    assert (made.of, made.product, made.side) == (document["digest"], "mold", "back")
+    assert made.covariance_mm2 == (1e-4, 0.0, 1e-4)
+    assert [ring.tolist() for ring in made.outlines_mm] == document["as_made"]["outlines"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"of": "abc"}, "as_made.of is 'abc'; expected the digest"),
+        ({"side": "left"}, "as_made.side is 'left'; expected one of front, back"),
+        ({"side": ["front"]}, "as_made.side is a list of 1"),
+        ({"outlines": []}, "as_made.outlines is a list of 0; expected 13 outlines"),
+        ({"outlines": [[[0, 0], [1, 0]]] * 13}, r"as_made.outlines\[0\] is a list of 2; expected at least 3"),
+        ({"outlines": [[[0, 0], [1, 0], [1, "a"]]] * 13}, r"as_made.outlines\[0\]\[2\]\[1\] is 'a'"),
+        ({"covariance_mm2": [1.0, 2.0, 1.0]}, "expected xx, xy, yy of a covariance"),
+        ({"note": "mine"}, "as_made.'note' is unknown"),
+    ],
+)
+def test_a_wrong_pad_as_made_is_one_clear_line(changes: dict[str, Any], message: str) -> None:
+    document = made_document()
+    document["as_made"] |= changes
+    assert re.search(message, refused(json.dumps(document)))

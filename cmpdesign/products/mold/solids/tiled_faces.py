@@ -228,14 +228,26 @@ class Tiler:
         members = np.flatnonzero((self.strip == strip) | (self.cut_by == strip - 1) & (strip > 0))
         reach = self.boxes[members][:, :, 0]
         reach = reach[np.argsort(reach[:, 0], kind="stable")]
+        low, high = self._line_reach(strip)
         places, count, end = [], 0, -np.inf
         for left, right in reach.tolist():
             if count >= HOLES_PER_TILE and left - end > 4 * CORNER_CLEARANCE_MM:
-                places.append(self._clear_of_corners(end, left))
-                count = 0
+                place = self._clear_of_corners(end, left)
+                if low < place < high:
+                    places.append(place)
+                    count = 0
             count += 1
             end = max(end, right)
         return places
+
+    def _line_reach(self, strip: int) -> tuple[float, float]:
+        """x between which an upright meets the lines of a strip; a slanted frame makes them shorter than the strip."""
+        low, high = -np.inf, np.inf
+        for y in self.lines[max(strip - 1, 0) : strip + 1]:
+            right, left = line_crossings(self.frame, y)
+            low = max(low, left.place[0] + CORNER_CLEARANCE_MM)
+            high = min(high, right.place[0] - CORNER_CLEARANCE_MM)
+        return low, high
 
     def _clear_of_corners(self, left: float, right: float) -> float:
         """The middle of an interval in x, or its first third if the middle is at a corner of the frame."""
