@@ -28,7 +28,9 @@ READS = {
     "extractor/layout/json_fields.py": {"json.loads"},
     "extractor/space/rig.py": {"tomllib.loads"},
     "cmpdesign/files/images.py": {"cv2.imdecode"},  # of bytes that inputs/files.py read
-    "cmpdesign/files/stated_response.py": {"Image.open"},  # of bytes that inputs/files.py read
+    "cmpdesign/products/laser/coupon/stated_response.py": {
+        "Image.open"
+    },  # of bytes that inputs/files.py read
     "cmpdesign/scene/parts/sensor.py": {"cv2.imdecode"},  # of a JPEG that it just made
     "cmpdesign/files/npz.py": {"np.load"},  # of a file that inputs/files.py opened
     "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read

@@ -46,10 +46,10 @@ def kerf(
     """Measure the kerf on a coupon, ready for the material's file."""
     from cmpdesign.errors import CmpDesignError
     from cmpdesign.files.images import read_image
-    from cmpdesign.files.stated_response import stated_response
     from cmpdesign.products.laser.coupon.design import load_coupon
     from cmpdesign.products.laser.coupon.photo import read_coupon
     from cmpdesign.products.laser.coupon.picture import PhotoError
+    from cmpdesign.products.laser.coupon.stated_response import stated_response
 
     known = parse_reading_response(response)
     cut_coupon = load_coupon(coupon)

@@ -83,7 +83,7 @@ def made_pad(job: LaserJob) -> MadePad:
         at_nominal = corner_losses_mm(cavities, burnt_outlines_mm(cavities, nominal_beam))
         nominal_loss_mm = max(nominal_loss_mm, float(at_nominal.max()))
         cells += cavities.cell.tolist()
-        rings += list(fewer_points(burnt) - job.origin_mm)
+        rings += list(drawn_outlines_mm(laser_pass, job) - job.origin_mm)
     outlines = dict(zip(cells, cut_by_later(rings), strict=True))
     causes = (
         Cause("the kerf (laser.kerf_mm)", CORNER_SHARE * nominal_loss_mm),
@@ -93,7 +93,16 @@ def made_pad(job: LaserJob) -> MadePad:
     return make_pad(job.layout, "laser", in_order, causes)
 
 
-def fewer_points(outlines: Points) -> Points:
+def drawn_outlines_mm(laser_pass: LaserPass, job: LaserJob) -> Points:
+    """(N, P, 2) outlines of a pass' cavities at the side that the camera sees, in the bed's frame, with fewer points.
+
+    Paths that are not compensated have no arcs: the shop makes the outlines what they are.
+    """
+    burnt = burnt_cell_outlines_mm(laser_pass, job.seen)
+    return _fewer_points(burnt) if job.setup.compensated else burnt
+
+
+def _fewer_points(outlines: Points) -> Points:
     """(N, P, 2) outlines with fewer points on their arcs; the ends of the arcs and of the sides stay."""
     kept = np.array([0, *range(1, ARC_POINTS + 1, ARC_STRIDE), ARC_POINTS + 1])
     corners = outlines.shape[1] // (ARC_POINTS + 2)

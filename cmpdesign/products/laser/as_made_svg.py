@@ -7,7 +7,7 @@ compare and render it and the extractor can read it.
 from __future__ import annotations
 
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.laser.as_made import burnt_cell_outlines_mm, fewer_points
+from cmpdesign.products.laser.as_made import drawn_outlines_mm
 from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserJob
 from cmpdesign.products.laser.paths.beam import Points
@@ -25,8 +25,7 @@ def as_made_svg(job: LaserJob) -> str:
     ]
     for laser_pass in job.cell_passes:
         assert laser_pass.color is not None
-        burnt = burnt_cell_outlines_mm(laser_pass, job.seen)
-        outlines = list(fewer_points(burnt) if job.setup.compensated else burnt)
+        outlines = list(drawn_outlines_mm(laser_pass, job))
         lines.append(
             _pass_group(
                 laser_pass.name, job.layout.palette[COLORS[laser_pass.color]], outlines, low[0], high[1]

@@ -15,7 +15,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.mold.checks import check_mold, require_no_errors
+from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import check_part
 from cmpdesign.products.mold.pad import CLEAR_COLOR, SKIN_COLOR, cured_stack
 from cmpdesign.products.mold.parts import Part, make_parts

@@ -11,7 +11,7 @@ from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.as_made.made_pad import MadePad
-from cmpdesign.products.mold.checks import (
+from cmpdesign.products.mold.checks.findings import (
     boss_volume_mm3,
     check_mold,
     facet_sag_mm,

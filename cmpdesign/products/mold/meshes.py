@@ -15,7 +15,7 @@ from cmpdesign.products.mesh.glb import meshes_to_glb
 from cmpdesign.products.mesh.stl import mesh_to_stl
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
-from cmpdesign.products.mold.checks import check_mold, require_no_errors
+from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import job_sheet_html
 from cmpdesign.products.mold.made_pad import made_pad

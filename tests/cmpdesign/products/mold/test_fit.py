@@ -12,7 +12,7 @@ import pytest
 
 from cmpdesign import build_layout, load_design
 from cmpdesign.products.mold import make
-from cmpdesign.products.mold.checks import facet_sag_mm
+from cmpdesign.products.mold.checks.findings import facet_sag_mm
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes.bosses import STENCIL_LEAN, boss_features
 from cmpdesign.products.mold.shapes.dish import make_dish

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from cmpdesign import build_layout, load_design
 from cmpdesign.errors import DesignError
 from cmpdesign.products.mold import make, pad, processes
-from cmpdesign.products.mold.checks import check_mold, require_no_errors
+from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
 from cmpdesign.products.mold.meshes import make_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes import caps

@@ -7,7 +7,7 @@ import pytest
 from cmpdesign import build_layout, load_design
 from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.sheet_options import SheetOptions
-from cmpdesign.products.mold.checks import check_mold
+from cmpdesign.products.mold.checks.findings import check_mold
 from cmpdesign.products.mold.make import mold_figures
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.stack.stack import make_stack

@@ -11,7 +11,7 @@ import numpy as np
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.mold.clearances import LEAST_WALL_MM, clearance_findings
+from cmpdesign.products.mold.checks.clearances import LEAST_WALL_MM, clearance_findings
 from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
 from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms, PngImagePlugin
 
-from cmpdesign.files.stated_response import profile_response, stated_response
+from cmpdesign.products.laser.coupon.stated_response import profile_response, stated_response
 
 PIXELS = Image.new("RGB", (20, 20), (90, 120, 150))
 
