@@ -340,7 +340,7 @@ def test_the_page_about_molds_says_what_works(tmp_path: Path, monkeypatch: pytes
     page = (Path(__file__).parents[4] / "docs" / "molds.md").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     commands = re.findall(r"^(?:\$ |    )cmpdesign (.*)$", page, flags=re.MULTILINE)
-    assert [command.split()[0] for command in commands] == ["build", "verify"]
+    assert [command.split()[0] for command in commands] == ["build", "check", "verify"]
     for command in commands:
         if command.startswith("verify"):
             svg = Path("out/print/sheet.svg").read_text(encoding="utf-8")
