@@ -321,6 +321,23 @@ def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
         assert max(len(wires) for wires in sheet.faces) <= 20, pattern
 
 
+def test_no_line_crosses_the_arc_at_a_tip_twice() -> None:
+    """Tips of the cells of this ellipse lie at many heights."""
+    design = load_design("digit")
+    plates = [
+        part for part in make_parts(make_stack(design, build_layout(design))) if part.name == "boss-blue"
+    ]
+    assert measure_solid(plates[0].solid).valid
+
+
+def test_uprights_stay_within_a_slanted_pad() -> None:
+    design = load_design(
+        "square", {"layers": "3", "rotation_deg": "20", "pitch_mm": "2.673", "border_mm": "0.8"}
+    )
+    for mesh, volume in pad.pad_meshes(make_stack(design, build_layout(design))):
+        assert mesh.volume_mm3() == pytest.approx(volume, rel=1e-9), mesh.name
+
+
 def test_frustum_of_circles() -> None:
     lower, upper = circle_loop(np.zeros(2), 4.0), circle_loop(np.zeros(2), 2.0)
     assert frustum_volume_mm3(lower, upper, 3.0) == pytest.approx(np.pi * 3 * (4 + 2 + 1) / 3, rel=1e-14)
