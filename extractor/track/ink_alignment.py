@@ -17,6 +17,7 @@ MIN_PIXEL_INK = 0.2  # of an ink, for a pixel to count as this ink
 MIN_INK_SHARE = 0.4  # of a cell's area that must show its ink in the window
 MAX_SHIFT = 0.35  # of a cell from its prediction, in edges
 LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again
+RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests
 MAX_SPREAD = 0.25  # of the shifts of cells that share a marker, from their mean, in edges
 MIN_VOLUME = 0.05  # sine of the angle of an ink to the plane of the two others, for unmixing
 CELL_AREA_RATIO = 3**0.5 / 4  # area of an equilateral triangle relative to the square on its edge
@@ -41,23 +42,52 @@ def align_to_inks(
     predicted_px: NDArray[np.float64],
     tables: WarmTables,
     levels_before: NDArray[np.float64],
+    shift_before: NDArray[np.float64],
 ) -> AlignedMarkers:
     """The markers moved to where the inks of their cells are, in at most two passes.
+
+    Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, alike in frames that are alike. So
+    the shift of a cell that rests is the difference from what the frame before showed at its own markers.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         predicted_px: (M, 2), NaN where not predicted.
         levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
+        shift_before: (C, 2) px, ``resting_shifts`` of the frame before.
     """
     for _ in range(2):
         shift = _measure_shifts(
             image, predicted_px, tables.corners, tables.ink, tables.nearest, levels_before
         )
+        shift = _less_resting_shifts(shift, shift_before, predicted_px[tables.corners])
         aligned: AlignedMarkers = _update_shifts_and_move_markers(predicted_px, shift, tables.corners)
         if aligned.max_shift < LARGE_SHIFT:
             break
         predicted_px = aligned.xy_px
     return aligned
+
+
+def _less_resting_shifts(
+    shift: NDArray[np.float64], shift_before: NDArray[np.float64], corner_px: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(C, 2) px, the shifts of cells with corners (C, 3, 2); of those that rest, the difference from before."""
+    change = shift - shift_before
+    edge_px = np.linalg.norm(corner_px[:, 1] - corner_px[:, 0], axis=1)
+    rests = np.linalg.norm(change, axis=1) < RESTING_SHIFT * edge_px
+    return np.where(rests[:, None], change, shift)
+
+
+def resting_shifts(
+    image: NDArray[np.uint8], xy_px: NDArray[np.float64], tables: WarmTables, levels: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(C, 2) px, the shifts of cells whose markers (M, 2) are known; 0 where they are not.
+
+    Args:
+        image, tables: as for ``align_to_inks``.
+        levels: (2, C, 3) ``CellCheck.cell_levels``, with which the next frame is aligned.
+    """
+    shift = _measure_shifts(image, xy_px, tables.corners, tables.ink, tables.nearest, levels)
+    return np.where(np.isfinite(shift), shift, 0.0)
 
 
 @compiled

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import ImageError
 from extractor.image.input import convert_to_bgr
-from extractor.image.pyramid import Pyramid
+from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
 from extractor.layout.reference import Reference
 from extractor.pipeline import Extractor, NumberedMarkers, Stages, no_markers
@@ -21,6 +21,7 @@ from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edg
 from extractor.result import Markers, Origin, Reason, Status
 from extractor.track.displacement import Rest, fit_rest
 from extractor.track.image_check import check_cells, light_levels
+from extractor.track.ink_alignment import resting_shifts
 from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
 from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
@@ -29,7 +30,7 @@ WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to
 EDGE_SAMPLING_STEP = 8  # one of this number of edges is measured for the choice of that scale
 COLD_START_INTERVAL = 200  # frames after which a cold start is done
 # Warm passes over the image of a cold start. Warm frames start from levels and blur of the frame before: without these
-# passes, equal frames after a cold start differ from it by 0.28 stated standard deviations (median), with two by 0.09.
+# passes, equal frames after a cold start differ from it by 0.18 stated standard deviations (median), with two by 0.04.
 SETTLING_PASSES = 2
 
 
@@ -86,6 +87,7 @@ class _TrackState:
         known: (M,) bool, the measured markers.
         previous_px: (M, 2) float64, the markers of the frame before; None where this was lost.
         cell_levels: (2, C, 3) float64, see ``CellCheck``; complete.
+        cell_shift_px: (C, 2) float64, px at the scale of the next check, see ``resting_shifts``.
         appearance: of the image, for refinement; None where the pattern was not drawn.
         mirrored: the image shows the pattern's back.
         expected_count: largest number of measured markers since the last cold start.
@@ -97,6 +99,7 @@ class _TrackState:
     known: NDArray[np.bool_]
     previous_px: NDArray[np.float64] | None
     cell_levels: NDArray[np.float64]
+    cell_shift_px: NDArray[np.float64]
     appearance: Appearance | None
     mirrored: bool
     expected_count: int
@@ -189,7 +192,8 @@ class Tracker:
             check = check_cells(bgr, markers.xy_px[self._tables.corners], self._tables, None)
             _fill_unseen_levels(check.cell_levels, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
-            self._update_state(markers, appearance, check.cell_levels, count, 0)
+            pyramid = self._extractor.pyramid(bgr, image.dtype)
+            self._update_state(pyramid, markers, appearance, check.cell_levels, count, 0)
             markers = self._settle(image, markers)
         return markers, StartKind.COLD
 
@@ -215,8 +219,7 @@ class Tracker:
         if bgr is None:
             return None
         pyramid = self._extractor.pyramid(bgr, image.dtype)
-        edge_px = float(short_edges(state.xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
-        level = pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
+        level = self._level_of_check(pyramid, state.xy_px)
         candidates = [level.to_level(state.xy_px)]
         if state.previous_px is not None:
             moving = level.to_level(2 * state.xy_px - state.previous_px)
@@ -228,9 +231,15 @@ class Tracker:
             return None
         complete = predict_missing_markers(tables, predicted)
         start = stages.record(
-            "prove", verify_prediction(level, complete, state.known, tables, state.cell_levels)
+            "prove",
+            verify_prediction(level, complete, state.known, tables, state.cell_levels, state.cell_shift_px),
         )
         return None if start is None else self._refine_warm_start(pyramid, state, start, stages)
+
+    def _level_of_check(self, pyramid: Pyramid, xy_px: NDArray[np.float64]) -> PyramidLevel:
+        """The image at the scale at which predictions are checked, for markers (M, 2), px."""
+        edge_px = float(short_edges(xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
+        return pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
 
     def _refine_warm_start(
         self, pyramid: Pyramid, state: _TrackState, start: WarmStart, stages: Stages
@@ -246,11 +255,12 @@ class Tracker:
         if count < MIN_KEPT_SHARE * state.expected_count:
             return None
         expected, age = max(count, state.expected_count), state.frames_since_cold + 1
-        self._update_state(markers, appearance, start.cell_levels, expected, age)
+        self._update_state(pyramid, markers, appearance, start.cell_levels, expected, age)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _update_state(
         self,
+        pyramid: Pyramid,
         markers: Markers,
         appearance: Appearance | None,
         cell_levels: NDArray[np.float64],
@@ -258,11 +268,15 @@ class Tracker:
         frames_since_cold: int,
     ) -> None:
         last = self._state
+        assert self._tables is not None
+        level = self._level_of_check(pyramid, markers.xy_px)
+        at_rest = resting_shifts(level.image, level.to_level(markers.xy_px), self._tables, cell_levels)
         self._state = _TrackState(
             xy_px=markers.xy_px,
             known=markers.status == Status.MEASURED,
             previous_px=last.xy_px if last is not None and not last.is_before_gap else None,
             cell_levels=cell_levels,
+            cell_shift_px=at_rest,
             appearance=appearance,
             mirrored=bool(markers.mirrored),
             expected_count=expected_count,

@@ -161,6 +161,7 @@ def verify_prediction(
     known: NDArray[np.bool_],
     tables: WarmTables,
     levels_before: NDArray[np.float64],
+    shift_before: NDArray[np.float64],
 ) -> WarmStart | None:
     """Move the predicted cells onto the image; None unless the image confirms enough of them.
 
@@ -169,8 +170,9 @@ def verify_prediction(
         predicted_px: (M, 2) in this level, NaN where not predicted.
         known: (M,) bool, markers of the frame before; nearly all of their cells in view must be confirmed.
         levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
+        shift_before: (C, 2) px in this level, ``resting_shifts`` of the frame before.
     """
-    aligned = align_to_inks(level.image, predicted_px, tables, levels_before)
+    aligned = align_to_inks(level.image, predicted_px, tables, levels_before, shift_before)
     check = check_cells(level.image, aligned.xy_px[tables.corners], tables, levels_before)
     by_rim = check.white_count == 0
     if check.white_elsewhere_count >= MIN_WHITE_EDGES:
