@@ -26,6 +26,7 @@ from tests.support.tracking_scenes import (
 )
 
 WRONG_PX = 0.4 * PITCH_PX
+PATTERNS = ("honeycomb", "round", "elliptical")
 
 
 def covered(rendered: Rendered, radius_px: float) -> np.ndarray:
@@ -37,7 +38,7 @@ def covered(rendered: Rendered, radius_px: float) -> np.ndarray:
     return image
 
 
-@pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
+@pytest.mark.parametrize("pattern", PATTERNS)
 def test_warm_and_cold_agree_through_large_motion(pattern: str) -> None:
     tracker, extractor = Tracker(reference(pattern)), Extractor(reference(pattern))
     starts, early, late = [], [], []
@@ -292,7 +293,8 @@ def test_light_or_focus_that_jumps_is_seen_anew(tint: tuple[float, float, float]
     assert frame.markers.stages["refine"].blur_px == pytest.approx(fresh.stages["refine"].blur_px, rel=0.03)
 
 
-def test_equal_frames_agree() -> None:
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_equal_frames_agree(pattern: str) -> None:
     """Within a tenth of the stated standard deviation, from the first frame on, which starts cold."""
     squares, stated = [], []
     for seed in range(3):
@@ -301,8 +303,8 @@ def test_equal_frames_agree() -> None:
             {"rotation_deg": 31.0, "pitch_px": 15.0},
             {"tilt_deg": 25.0, "tilt_axis_deg": 40.0},
         ):
-            image = shot(seed=seed, **changes).image
-            tracker = Tracker(reference())
+            image = shot(pattern, seed=seed, **changes).image
+            tracker = Tracker(reference(pattern))
             frames = [tracker.track(image) for _ in range(6)]
             assert [frame.start for frame in frames] == ["cold"] + ["warm"] * 5
             squares += [np.nanmean(frame.displacement_px**2) for frame in frames[1:]]
