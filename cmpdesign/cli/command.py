@@ -9,7 +9,6 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from cmpdesign.cli.interruption import repeated_interrupts
 from cmpdesign.cli.missing_library import missing_library_text
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, EXIT_INTERRUPTED, is_expected, print_error, shortened
 from cmpdesign.errors import CmpDesignError
@@ -44,8 +43,7 @@ class OneLineErrors(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            with repeated_interrupts():
-                return super().invoke(ctx)
+            return super().invoke(ctx)
         except KeyboardInterrupt:
             print_error(INTERRUPTED)
             raise typer.Exit(EXIT_INTERRUPTED) from None

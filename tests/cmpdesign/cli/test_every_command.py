@@ -91,8 +91,10 @@ def interrupted(folder: Path, *words: object, wait_s: float) -> tuple[int, str, 
     """Exit code, standard error and time to the end of a program that gets Ctrl-C as from a terminal."""
     command = [sys.executable, "-c", PROGRAM, *map(str, words)]
     process = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        # where the tests run in the background, SIGINT is ignored, and children inherit that
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
     try:
         time.sleep(wait_s)
         assert process.poll() is None, "the program ended too early for this test"
