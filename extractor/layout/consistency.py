@@ -171,14 +171,8 @@ def _check_lattice(reference: Reference) -> None:
     steps = np.where(up[:, None, None], UP_CORNERS, DOWN_CORNERS)
     # The corners are different markers, so they are the cell's if each is one of the three.
     expected = (base[:, None] + steps)[:, :, None] == corners[:, None]
-    wrong = np.flatnonzero(~expected.all(axis=3).any(axis=1).all(axis=1))
-    if len(wrong):
-        first = int(wrong[0])
-        fail(
-            f"cells.corners[{first}]",
-            str(reference.cell_corners[first].tolist()),
-            "three markers that are neighbours by their layer and index",
-        )
+    right = expected.all(axis=3).any(axis=1).all(axis=1)
+    _require_cells(reference, right, "three markers that are neighbours by their layer and index")
     step = axial[reference.edges[:, 1]] - axial[reference.edges[:, 0]]
     _require_neighbours(reference, (step[:, None] == NEIGHBOUR_STEPS).all(axis=2).any(axis=1))
 
@@ -188,16 +182,17 @@ def _check_grid(reference: Reference) -> None:
     place = np.stack([reference.layer, reference.index], axis=1)
     corners = place[reference.cell_corners]
     # Four different markers within one row and one column of each other are a cell's.
-    wrong = np.flatnonzero((np.ptp(corners, axis=1) != 1).any(axis=1))
-    if len(wrong):
-        first = int(wrong[0])
-        fail(
-            f"cells.corners[{first}]",
-            str(reference.cell_corners[first].tolist()),
-            "four markers that are neighbours by their row and column",
-        )
+    right = (np.ptp(corners, axis=1) == 1).all(axis=1)
+    _require_cells(reference, right, "four markers that are neighbours by their row and column")
     step = place[reference.edges[:, 1]] - place[reference.edges[:, 0]]
     _require_neighbours(reference, np.abs(step).sum(axis=1) == 1)
+
+
+def _require_cells(reference: Reference, right: NDArray[np.bool_], expected: str) -> None:
+    wrong = np.flatnonzero(~right)
+    if len(wrong):
+        first = int(wrong[0])
+        fail(f"cells.corners[{first}]", str(reference.cell_corners[first].tolist()), expected)
 
 
 def _require_neighbours(reference: Reference, neighbours: NDArray[np.bool_]) -> None:

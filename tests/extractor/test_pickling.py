@@ -29,7 +29,7 @@ from extractor import (
     ViewExtractor,
 )
 from extractor.draw import draw_stages
-from tests.support.tracking_scenes import moving, reference, shot
+from tests.support.tracking.scenes import moving, reference, shot
 from tests.support.view_scenes import SMALL, binocular, binocular_shot, contact, pair, pressed, rig_of
 
 ROOT = Path(__file__).parent.parent.parent

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cmpdesign.layout.checks import CAMERA_PX, Finding
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side
+from cmpdesign.patterns.colors import BLACK
 from cmpdesign.products.as_made.made_pad import MadePad, make_pad
 
 FOLDER = "as-made"
@@ -22,7 +23,6 @@ BLUR_PX = 0.8
 MIN_SHARE = 0.98
 # Largest deviation of a marker, in pitches, that no warning is given for.
 WARNING_PITCHES = 0.02
-MEASURED = 1
 # A pattern with this many colored cells is numbered however a clip cuts it: all that failed had fewer than ten.
 CERTAIN_CELLS = 40
 
@@ -82,23 +82,26 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading
     Raises:
         extractor.errors.LayoutError: the layout's cells are no triangles.
     """
+    import cv2
+
     from cmpdesign.files.layout_json import layout_to_json
     from cmpdesign.scene import Camera, Optics, Plain, Scene, render
-    from extractor import Extractor, parse_layout
+    from extractor import Extractor, Status, parse_layout
 
     nominal, camera_turn_deg, scale = pad.nominal, *_view_of(pad.nominal, camera_px)
     pitch_mm = float(nominal.parameters["pitch_mm"])
     camera = Camera(scale * pitch_mm, camera_turn_deg)
-    scene = Scene(pad.layout, camera, background=Plain(_black_rgb(nominal)), optics=Optics(BLUR_PX))
-    rendered = render(scene, size=camera_px)
+    scene = Scene(pad.layout, camera, optics=Optics(BLUR_PX))
+    rendered = render(replace(scene, background=Plain(scene.ink(BLACK))), size=camera_px)
     markers = Extractor(parse_layout(layout_to_json(replace(nominal, as_made=None)))).extract(rendered.image)
     visible = nominal.present & rendered.truth.visible
-    measured = visible & (markers.status == MEASURED)
+    measured = visible & (markers.status == Status.MEASURED)
     deviation = np.hypot(*(markers.xy_px - rendered.truth.marker_xy_px)[measured].T)
     xy_mm = np.full_like(nominal.marker_xy_mm, np.nan)
     # The pad is flat, so the map to the picture is a homography.
     assert rendered.truth.H is not None
-    xy_mm[measured] = _to_layout(rendered.truth.H, markers.xy_px[measured])
+    layout_from_image = np.linalg.inv(rendered.truth.H)
+    xy_mm[measured] = cv2.perspectiveTransform(markers.xy_px[None], layout_from_image)[0, measured]
     return PadReading(
         share=float(measured.sum() / max(visible.sum(), 1)),
         rms_px=float(np.sqrt((deviation**2).mean())) if measured.any() else float("nan"),
@@ -174,14 +177,3 @@ def _view_of(layout: Layout, camera_px: tuple[int, int]) -> tuple[float, float]:
     upright = min(camera_px[0] / width, camera_px[1] / height)
     turned = min(camera_px[0] / height, camera_px[1] / width)
     return (90.0, FILL_SHARE * turned) if turned > 1.01 * upright else (0.0, FILL_SHARE * upright)
-
-
-def _black_rgb(layout: Layout) -> tuple[float, float, float]:
-    text = layout.palette["black"].lstrip("#")
-    red, green, blue = (float(int(text[i : i + 2], 16)) for i in (0, 2, 4))
-    return red, green, blue
-
-
-def _to_layout(h_image_from_layout: NDArray[np.float64], xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    points = np.column_stack([xy_px, np.ones(len(xy_px))]) @ np.linalg.inv(h_image_from_layout).T
-    return np.asarray(points[:, :2] / points[:, 2:])

@@ -70,24 +70,9 @@ def _cells(sketch: Sketch, level: float, thickness: float, colors: tuple[str, ..
 
 def _camera(sketch: Sketch, y: float) -> None:
     middle = WIDTH / 2
-    sketch.polygon(
-        [
-            (middle - 0.3, y - 1.15),
-            (middle + 0.3, y - 1.15),
-            (middle + 0.3, y - 0.8),
-            (middle - 0.3, y - 0.8),
-        ],
-        INK,
-    )
-    sketch.polygon(
-        [
-            (middle - 0.16, y - 0.8),
-            (middle + 0.16, y - 0.8),
-            (middle + 0.22, y - 0.66),
-            (middle - 0.22, y - 0.66),
-        ],
-        INK,
-    )
+    for low, high, bottom, top in ((0.3, 0.3, 1.15, 0.8), (0.16, 0.22, 0.8, 0.66)):  # body and lens
+        corners = [(-low, -bottom), (low, -bottom), (high, -top), (-high, -top)]
+        sketch.polygon([(middle + dx, y + dy) for dx, dy in corners], INK)
     sketch.arrow((middle, y - 0.6), (middle, y - 0.08), ACCENT, 2.4)
     sketch.text((middle + 0.42, y - 0.97), "camera", 12.5, INK, anchor="start", bold=True)
 

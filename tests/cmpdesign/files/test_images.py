@@ -161,11 +161,12 @@ def test_a_claimed_size_takes_no_memory(kind: str, tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("kind", ["png", "jpg", "tiff", "bmp", "webp", "ppm"])
-@pytest.mark.parametrize("depth", [np.uint8, np.uint16])
+@pytest.mark.parametrize(
+    ("kind", "depth"),
+    [(kind, np.uint8) for kind in ("png", "jpg", "tiff", "bmp", "webp", "ppm")]
+    + [(kind, np.uint16) for kind in ("png", "tiff", "ppm")],
+)
 def test_headers_say_what_is_decoded(kind: str, depth: type, tmp_path: Path) -> None:
-    if depth is np.uint16 and kind in ("jpg", "bmp", "webp"):
-        pytest.skip("holds 8 bits")
     path = write(tmp_path / f"a.{kind}", COLOR.astype(depth))
     assert size_in_header(path.read_bytes()) == (24, 20)
     assert read_image(path).shape == (20, 24, 3)

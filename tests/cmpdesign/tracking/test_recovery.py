@@ -20,7 +20,7 @@ from cmpdesign.tracking.table import TrackTable
 from extractor import Tracker
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
-from tests.support.tracking_scenes import LAYERS, reference
+from tests.support.tracking.scenes import LAYERS, reference
 
 MARKERS = 91
 FRAMES = 23

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from extractor import FrameStatus, StartKind, Tracker
-from tests.support.tracking_scenes import errors, moving, reference
+from tests.support.tracking.scenes import errors, moving, reference
 
 ROOT = Path(__file__).parents[3]
 FRAMES = 2000

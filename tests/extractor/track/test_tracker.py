@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cmpdesign.scene import Camera, Light, Optics, Press, Rendered, composed, render
 from cmpdesign.scene.camera.plain import camera_homography
 from extractor import Extractor, FrameStatus, LayoutError, StartKind, Status, Tracker
-from tests.support.tracking_scenes import (
+from tests.support.tracking.scenes import (
     LAYERS,
     PITCH_MM,
     PITCH_PX,
