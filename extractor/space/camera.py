@@ -8,6 +8,7 @@ Distortion (k1, k2, p1, p2, k3) acts on normalised coordinates x = X / Z, y = Y 
     y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
 
 The model is valid up to the fold radius, at which the radial part turns back. Points beyond it have no picture.
+Where a window and a gel lie before the pattern, X, Y, Z are the direction in which the camera sees it, see ``medium``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import RigError
+from extractor.space.medium import (
+    Lines,
+    Medium,
+    PlacedWindow,
+    WindowPlane,
+    cross_matrix,
+    gel_depth_mm,
+    place_window,
+    refract_points,
+    refract_rays,
+)
 
 Array = NDArray[np.float64]
 
@@ -69,6 +81,9 @@ class View:
         mirrored: an odd number of mirrors between the pattern and the camera; None: by det R, False without R.
         R_camera_from_layout: (3, 3) float64, orthonormal, det -1 where mirrored; None: not known.
         t_camera_from_layout_mm: (3,) float64; None: not known.
+        medium: what light passes between the pattern and the camera; None or layers of 0 mm: air.
+        window: the window's outer face in the camera's frame; its gel then reaches to wherever the pattern is. None:
+            the window is parallel to the pattern at rest, ``gel_mm`` before it.
 
     Raises:
         RigError: a value that no camera has.
@@ -82,9 +97,12 @@ class View:
     mirrored: bool | None = None
     R_camera_from_layout: Any = None
     t_camera_from_layout_mm: Any = None
+    medium: Medium | None = None
+    window: WindowPlane | None = None
 
     def __post_init__(self) -> None:
         self._check_intrinsics()
+        self._check_window()
         rotation, shift = self.R_camera_from_layout, self.t_camera_from_layout_mm
         if (rotation is None) != (shift is None):
             raise RigError(
@@ -119,6 +137,24 @@ class View:
                 )
             object.__setattr__(self, "area_px", area)
 
+    def _check_window(self) -> None:
+        if self.medium is not None and self.medium.is_air:
+            object.__setattr__(self, "medium", None)
+        if self.window is None:
+            return
+        normal, distance_mm = np.asarray(self.window.normal, np.float64), float(self.window.distance_mm)
+        if normal.shape != (3,) or not np.isfinite(normal).all() or not normal[2] > 0:
+            raise RigError(
+                f"view {self.name!r}: window_normal is {list(self.window.normal)}; expected 3 numbers that point away "
+                "from the camera, the last one above 0"
+            )
+        if not 0 < distance_mm < np.inf:
+            raise RigError(
+                f"view {self.name!r}: window_distance_mm is {distance_mm:g}; expected a number above 0 mm"
+            )
+        x, y, z = (float(v) for v in normal / np.linalg.norm(normal))
+        object.__setattr__(self, "window", WindowPlane((x, y, z), distance_mm))
+
     def _check_pose(self, rotation: Array, shift: Array) -> None:
         prefix = f"view {self.name!r}: "
         if rotation.shape != (3, 3) or not np.allclose(
@@ -144,6 +180,15 @@ class View:
         return np.asarray(-self.R_camera_from_layout.T @ self.t_camera_from_layout_mm)
 
     @cached_property
+    def _placed_window(self) -> PlacedWindow | None:
+        """The window before this placed view; None in air."""
+        if self.medium is None:
+            return None
+        return place_window(
+            self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm
+        )
+
+    @cached_property
     def fold_radius(self) -> float:
         """The normalised radius at which the radial distortion turns back; infinite without one."""
         k = Distortion(*self.distortion)
@@ -164,7 +209,11 @@ class View:
     def linearised(self, xyz_mm: Array) -> Linearisation:
         """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
         rotated = xyz_mm @ self.R_camera_from_layout.T
+        window, seen = self._placed_window, None
         camera = rotated + self.t_camera_from_layout_mm
+        if window is not None:
+            seen = refract_points(window, rotated, self.t_camera_from_layout_mm)
+            camera = seen.xyz
         depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
         normalised = camera[:, :2] / depth[:, None]
         normalised[np.hypot(*normalised.T) >= self.fold_radius] = np.nan
@@ -173,8 +222,11 @@ class View:
         by_camera[:, 0, 0] = by_camera[:, 1, 1] = 1 / depth
         by_camera[:, :, 2] = -normalised / depth[:, None]
         by_camera = np.array(self.focal_px)[:, None] * (by_normalised @ by_camera)
-        by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
         xy_px = distorted * self.focal_px + self.centre_px
+        if seen is not None:
+            by_point = by_camera @ seen.by_point @ self.R_camera_from_layout
+            return Linearisation(xy_px, by_point, by_camera @ seen.by_pose)
+        by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
         return Linearisation(xy_px, by_camera @ self.R_camera_from_layout, by_pose)
 
     def normalised(self, xy_px: Array) -> Array:
@@ -182,11 +234,27 @@ class View:
         distorted = np.asarray((xy_px - self.centre_px) / self.focal_px)
         return undistort_points(distorted, self.distortion, self.fold_radius)
 
-    def rays(self, xy_px: Array) -> Array:
-        """(N, 3) unit vectors in the layout frame, from the camera through pixels (N, 2); NaN as ``normalised``."""
+    def rays(self, xy_px: Array) -> Lines:
+        """The lines of sight of pixels (N, 2) in the layout frame, as they are where the pattern lies.
+
+        In air all start at the camera, behind a window at its inner face; NaN as ``normalised``.
+        """
         normalised = self.normalised(xy_px)
-        direction = np.column_stack([normalised, np.ones(len(normalised))]) @ self.R_camera_from_layout
-        return np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
+        direction = np.column_stack([normalised, np.ones(len(normalised))])
+        if self._placed_window is not None:
+            lines = refract_rays(self._placed_window, direction)
+            origin_mm = (lines.origin_mm - self.t_camera_from_layout_mm) @ self.R_camera_from_layout
+            return Lines(origin_mm, lines.direction @ self.R_camera_from_layout)
+        direction = direction @ self.R_camera_from_layout
+        unit = np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
+        return Lines(np.tile(self.position_mm, (len(unit), 1)), unit)
+
+    def is_ahead(self, xyz_mm: Array) -> NDArray[np.bool_]:
+        """(N,) bool, which points (N, 3) mm of the layout frame lie before the camera, behind its window if any."""
+        if self._placed_window is None:
+            return np.asarray(xyz_mm @ self.R_camera_from_layout[2] + self.t_camera_from_layout_mm[2] > 0)
+        camera = xyz_mm @ self.R_camera_from_layout.T + self.t_camera_from_layout_mm
+        return gel_depth_mm(self._placed_window, camera) > 0
 
 
 def is_finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
@@ -199,14 +267,6 @@ def is_covariance(cov_px2: Array) -> NDArray[np.bool_]:
     safe = np.where(is_finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
     determinant = safe[..., 0, 0] * safe[..., 1, 1] - safe[..., 0, 1] * safe[..., 1, 0]
     return np.asarray((safe[..., 0, 0] > 0) & (determinant > 0))
-
-
-def cross_matrix(vectors: Array) -> Array:
-    """(N, 3, 3) the matrices [v]x of vectors (N, 3): [v]x w is the cross product of v and w."""
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = vectors.T
-    out[:, 1, 2], out[:, 2, 0], out[:, 0, 1] = -vectors.T
-    return out
 
 
 def distort_points(normalised: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:

@@ -141,24 +141,24 @@ def _intersect_rays(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """(N, 3) the points nearest to all rays, NaN where these are parallel; (V, N) bool, which pixels have rays.
 
-    Where the rays meet behind a camera, the point is that of the camera's ray on the layout's plane.
+    Where the rays meet behind a camera or before its window, the point is that of its ray on the layout's plane.
     """
     normal, right = np.zeros((xy_px.shape[1], 3, 3)), np.zeros((xy_px.shape[1], 3))
     has_ray = np.zeros(seen.shape, np.bool_)
     on_plane = np.full((len(views), xy_px.shape[1], 3), np.nan)
     for v, view in enumerate(views):
-        ray, origin = view.rays(xy_px[v]), view.position_mm
+        origin, ray = view.rays(xy_px[v])
         has_ray[v] = is_finite(ray) & seen[v]
         across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
         across[~has_ray[v]] = 0.0
         normal += across
-        right += across @ origin
-        on_plane[v] = np.where(has_ray[v, :, None], origin - ray * (origin[2] / ray[:, 2:]), np.nan)
+        right += (across @ np.where(has_ray[v, :, None], origin, 0.0)[:, :, None])[:, :, 0]
+        on_plane[v] = np.where(has_ray[v, :, None], origin - ray * (origin[:, 2:] / ray[:, 2:]), np.nan)
     regular = np.linalg.eigvalsh(normal)[:, 0] > MIN_RAY_DIVERGENCE
     xyz = np.full(right.shape, np.nan)
     xyz[regular] = np.linalg.solve(normal[regular], right[regular, :, None])[:, :, 0]
     for v, view in enumerate(views):
-        behind = has_ray[v] & (xyz @ view.R_camera_from_layout[2] + view.t_camera_from_layout_mm[2] <= 0)
+        behind = has_ray[v] & regular & ~view.is_ahead(xyz)
         xyz[behind] = on_plane[v, behind]
     return xyz, has_ray
 
