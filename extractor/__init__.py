@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from extractor.pipeline import Extractor
     from extractor.space.camera import View
     from extractor.space.field import Field
+    from extractor.space.medium import Medium, WindowPlane
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.rig import Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
@@ -46,6 +47,7 @@ __all__ = [
     "ImageError",
     "LayoutError",
     "Markers",
+    "Medium",
     "Origin",
     "PointReason",
     "PoseError",
@@ -65,6 +67,7 @@ __all__ = [
     "View",
     "ViewExtractor",
     "VirtualStatus",
+    "WindowPlane",
     "load_layout",
     "load_rig",
     "parse_layout",
@@ -76,6 +79,7 @@ _HOMES = {
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "FrameStatus": "extractor.track.tracker",
+    "Medium": "extractor.space.medium",
     "PointReason": "extractor.space.triangulation",
     "Reconstructor": "extractor.space.reconstruction",
     "Reference": "extractor.layout.reference",
@@ -89,6 +93,7 @@ _HOMES = {
     "Tracker": "extractor.track.tracker",
     "View": "extractor.space.camera",
     "ViewExtractor": "extractor.space.views",
+    "WindowPlane": "extractor.space.medium",
     "load_layout": "extractor.layout.layout_file",
     "load_rig": "extractor.space.rig",
     "parse_layout": "extractor.layout.layout_file",

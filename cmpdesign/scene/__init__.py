@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.scene.bounds.gridline_bound import cramer_rao
+from cmpdesign.scene.camera.medium import Medium, WindowPlane
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.drawing.render import Rendered, render
@@ -38,6 +39,7 @@ __all__ = [
     "Gradient",
     "Led",
     "Light",
+    "Medium",
     "Optics",
     "Paper",
     "Picture",
@@ -54,6 +56,7 @@ __all__ = [
     "Surface",
     "Truth",
     "Twist",
+    "WindowPlane",
     "colored_leds",
     "composed",
     "cramer_rao",

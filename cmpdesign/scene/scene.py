@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.scene.camera.medium import Medium
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.errors import SceneError
@@ -42,6 +43,7 @@ class Scene:
         seed: seed of all random parts; the same scene gives the same bytes.
         frame: number in a sequence; only the noise depends on it.
         warnings: reasons to doubt the parts, passed on with the image.
+        medium: window and gel between the pattern and the camera; None or layers of 0 mm: air.
     """
 
     layout: Layout
@@ -56,8 +58,11 @@ class Scene:
     seed: int = 0
     frame: int = 0
     warnings: tuple[str, ...] = ()
+    medium: Medium | None = None
 
     def __post_init__(self) -> None:
+        if self.medium is not None and self.medium.is_air:
+            object.__setattr__(self, "medium", None)
         if isinstance(self.camera, tuple) and not self.camera:
             raise SceneError("the scene has no view; give at least one Pinhole")
         for name in self.inks:

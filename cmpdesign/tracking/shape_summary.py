@@ -103,5 +103,6 @@ class ShapeStatistics:
                 for view, rms in zip(poses.views, poses.rms_px, strict=True)
             ],
             "model_px": self._reconstructor.model_px,
+            "warnings": list(self._reconstructor.warnings),
             "largest_displacement": None if self._largest.frame < 0 else self._largest._asdict(),
         }

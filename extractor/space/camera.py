@@ -184,9 +184,7 @@ class View:
         """The window before this placed view; None in air."""
         if self.medium is None:
             return None
-        return place_window(
-            self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm
-        )
+        return place_window(self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm)
 
     @cached_property
     def fold_radius(self) -> float:
@@ -254,7 +252,7 @@ class View:
         if self._placed_window is None:
             return np.asarray(xyz_mm @ self.R_camera_from_layout[2] + self.t_camera_from_layout_mm[2] > 0)
         camera = xyz_mm @ self.R_camera_from_layout.T + self.t_camera_from_layout_mm
-        return gel_depth_mm(self._placed_window, camera) > 0
+        return np.isfinite(gel_depth_mm(self._placed_window, camera))
 
 
 def is_finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:

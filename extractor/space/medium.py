@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 MAX_ITERATIONS = 50  # of Newton's method; about 5 are needed
 CONVERGED = 1e-9  # last step, of 1 + q: the error is about its square
+TOUCHING_MM = 1e-9  # rounding of a pattern that lies on the window
 MAX_THICKNESS_MM, MAX_INDEX = 1000.0, 4.0
 
 
@@ -60,7 +61,9 @@ class Medium:
                     "(silicone about 1.41, acrylic 1.49, glass 1.52)"
                 )
             if index is not None and not 1 <= index <= MAX_INDEX:
-                raise RigError(f"medium.{layer}_index is {index:g}; expected a number from 1 to {MAX_INDEX:g}")
+                raise RigError(
+                    f"medium.{layer}_index is {index:g}; expected a number from 1 to {MAX_INDEX:g}"
+                )
 
     @property
     def is_air(self) -> bool:
@@ -157,8 +160,13 @@ def place_window(medium: Medium, plane: WindowPlane | None, rotation: Array, shi
 
 
 def gel_depth_mm(window: PlacedWindow, xyz_mm: Array) -> Array:
-    """(N,) the gel between the window and points (N, 3) mm in the camera's frame; below 0 for points in the window."""
-    return np.asarray(xyz_mm @ window.normal - window.distance_mm - window.medium.window_mm)
+    """(N,) the gel between the window and points (N, 3) mm in the camera's frame.
+
+    NaN for points within the window, and for all points where the camera would stand within the medium.
+    """
+    depth = xyz_mm @ window.normal - window.distance_mm - window.medium.window_mm
+    seen = (depth >= -TOUCHING_MM) & (window.distance_mm > 0)
+    return np.asarray(np.where(seen, np.maximum(depth, 0.0), np.nan))
 
 
 def refract_points(window: PlacedWindow, rotated: Array, shift_mm: Array) -> Directions:
@@ -172,7 +180,6 @@ def refract_points(window: PlacedWindow, rotated: Array, shift_mm: Array) -> Dir
     medium, n, h = window.medium, window.normal, window.distance_mm
     camera = rotated + shift_mm
     gel = gel_depth_mm(window, camera)
-    gel = np.where((gel >= 0) & (h > 0), gel, np.nan)
     beside = camera - (camera @ n)[:, None] * n
     radius = np.linalg.norm(beside, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from extractor.errors import PoseError
 from extractor.space.camera import Array, View, is_covariance, is_finite
+from extractor.space.medium import Medium
 from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
+from extractor.space.rest_check import RestViews, rest_warning
 
 MIN_MARKERS = 6  # of a view, for a pose
 MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose
@@ -38,6 +40,7 @@ class Poses:
         misfit: RMS of the residuals in standard deviations, over the degrees of freedom; NaN with none estimated.
         rms_px: (V,) float64, RMS residual per axis.
         used: (M,) bool, the markers that were used.
+        warning: why the markers at rest contradict the views, as far as it shows; empty where they fit.
     """
 
     views: tuple[View, ...]
@@ -45,6 +48,7 @@ class Poses:
     misfit: float
     rms_px: Array
     used: NDArray[np.bool_]
+    warning: str = ""
 
 
 def estimate_poses(
@@ -64,6 +68,9 @@ def estimate_poses(
         PoseError: too few markers, collinear markers, or two poses that the image does not distinguish.
     """
     flat_mm = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
+    for view in views:
+        if view.placed and view.medium is not None and not view.is_ahead(flat_mm).all():
+            raise PoseError(_no_room_text(view))
     xy_px = np.where(is_covariance(cov_px2)[..., None], xy_px, np.nan)
     placed = [
         v if v.placed else _estimate_planar_pose(v, flat_mm, xy_px[i], cov_px2[i])
@@ -75,7 +82,8 @@ def estimate_poses(
     used = np.asarray(is_finite(known_cov, 2).any(axis=0))
     for _ in range(MAX_OUTLIER_ROUNDS):
         used_px = np.where(used[:, None], xy_px, np.nan)
-        refined = refine_poses(placed, RestMarkers(flat_mm, used_px, known_cov, spread_mm2), free)
+        rest = RestMarkers(flat_mm, used_px, known_cov, spread_mm2)
+        refined = refine_poses(placed, rest, free)
         placed = refined.views
         typical = np.nanmedian(refined.misfit) if used.any() else np.nan
         with np.errstate(invalid="ignore"):
@@ -89,7 +97,7 @@ def estimate_poses(
     misfit = float(np.sqrt(refined.chi2 / freedom)) if free.any() and freedom > 0 else float("nan")
     cov = refined.cov * max(1.0, misfit**2) if free.any() else refined.cov
     _require_one_side(placed)
-    return Poses(tuple(placed), cov, misfit, rms, used)
+    return Poses(tuple(placed), cov, misfit, rms, used, rest_warning(RestViews(placed, rest, free)))
 
 
 def _estimate_planar_pose(view: View, flat_mm: Array, xy_px: Array, cov_px2: Array) -> View:
@@ -103,12 +111,21 @@ def _estimate_planar_pose(view: View, flat_mm: Array, xy_px: Array, cov_px2: Arr
     if np.linalg.cond(scatter) > MAX_CONDITION:
         raise PoseError(f"{prefix}the markers at rest lie on a line; a pose needs a plane")
     known_px = np.where(known[:, None], xy_px, np.nan)
-    candidates = _planar_pose_candidates(flat_mm[known], normalised[known], bool(view.mirrored))
+    candidates = [
+        _behind_medium(view, *pose)
+        for pose in _planar_pose_candidates(flat_mm[known], normalised[known], bool(view.mirrored))
+    ]
     if not candidates:
         raise PoseError(f"{prefix}the markers at rest fix no pose")
+    if view.medium is not None:
+        candidates = [pose for pose in candidates if view.at(*pose).is_ahead(flat_mm[known]).all()]
+    if not candidates:
+        raise PoseError(_no_room_text(view))
     rest = RestMarkers(flat_mm, known_px[None], cov_px2[None], np.zeros((3, 3)))
     refined = [refine_poses([view.at(*pose)], rest, np.array([True])) for pose in candidates]
     refined.sort(key=lambda one: one.chi2)
+    if len(refined) == 1:
+        return refined[0].views[0]
     best, other = refined[0].views[0], refined[1].views[0]
     turn = best.R_camera_from_layout @ other.R_camera_from_layout.T
     apart_deg = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
@@ -120,6 +137,22 @@ def _estimate_planar_pose(view: View, flat_mm: Array, xy_px: Array, cov_px2: Arr
             "give R_camera_from_layout and t_camera_from_layout_mm, or a view with more perspective"
         )
     return best
+
+
+def _behind_medium(view: View, rotation: Array, shift_mm: Array) -> tuple[Array, Array]:
+    """The pose R, t of a pattern that appears at this one through the view's window and gel, near their normal."""
+    if view.medium is None:
+        return rotation, shift_mm
+    normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0 else -rotation[:, 2]
+    return rotation, shift_mm + view.medium.apparent_shift_mm * normal
+
+
+def _no_room_text(view: View) -> str:
+    medium = view.medium or Medium()
+    return (
+        f"view {view.name!r}: a gel of {medium.gel_mm:g} mm and a window of {medium.window_mm:g} mm do not fit between "
+        "the camera and the pattern at rest; check [medium], the window's plane, the focal length and the pose"
+    )
 
 
 def _planar_pose_candidates(xyz: Array, normalised: Array, mirrored: bool) -> list[tuple[Array, Array]]:

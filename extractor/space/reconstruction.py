@@ -99,6 +99,7 @@ class Reconstructor:
     Attributes:
         poses: the views with their poses, see ``Poses``.
         rest_xyz_mm: (M, 3) float64, the markers at rest.
+        warnings: what makes the results doubtful: markers at rest that contradict the rig.
 
     Raises:
         PoseError: fewer than two views, a view whose pose cannot be estimated, or views that give no depth.
@@ -126,6 +127,7 @@ class Reconstructor:
         self._gate_sigmas = gate_sigmas
         spread = np.broadcast_to(np.asarray(flatness_mm, np.float64), 3)
         self.poses = self._estimate_poses(rest, (float(spread[0]), float(spread[1]), float(spread[2])))
+        self.warnings = (self.poses.warning,) if self.poses.warning else ()
         self.model_px = 0.0 if model_px is None else model_px
         flat = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
         self._rest: Points | None = None

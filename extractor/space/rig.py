@@ -1,6 +1,6 @@
 """The rig file: the views of a sensor. TOML, one [[view]] table for each view; unknown names are refused.
 
-A scene file or a sensor file serves as a rig, too: only its [[view]] tables are read.
+A scene file or a sensor file serves as a rig, too: only its [[view]] tables and its [medium] are read.
 
 [[view]]
 name = "left"
@@ -10,6 +10,13 @@ distortion = [0.0, 0.0, 0.0, 0.0, 0.0]     # k1, k2, p1, p2, k3; may be left out
 area_px = [0, 0, 320, 480]                 # x, y, width, height; left out: the whole image
 mirrored = false                           # an odd number of mirrors in between; may be left out
 # R_camera_from_layout = [[...], [...], [...]], t_camera_from_layout_mm = [...]: left out: from the rest frame
+# window_normal = [0, 0, 1], window_distance_mm = 30.0: left out: parallel to the pattern at rest, behind the gel
+
+[medium]                                   # between pattern and camera; left out: air
+gel_mm = 4.0                               # from the pattern at rest to the window; 0: none
+gel_index = 1.41
+window_mm = 2.0
+window_index = 1.49
 """
 
 from __future__ import annotations
@@ -24,10 +31,19 @@ from extractor.errors import RigError
 from extractor.layout.json_fields import nearest_name, shown
 from extractor.layout.text_file import printable_path, read_text_file
 from extractor.space.camera import View
+from extractor.space.medium import Medium, WindowPlane
 
-NUMBER_COUNTS = {"focal_px": 2, "centre_px": 2, "distortion": 5, "area_px": 4, "t_camera_from_layout_mm": 3}
+NUMBER_COUNTS = {
+    "focal_px": 2,
+    "centre_px": 2,
+    "distortion": 5,
+    "area_px": 4,
+    "t_camera_from_layout_mm": 3,
+    "window_normal": 3,
+}
 REQUIRED_FIELDS = ("focal_px", "centre_px")
-KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout")
+KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout", "window_distance_mm")
+MEDIUM_FIELDS = ("gel_mm", "gel_index", "window_mm", "window_index")
 # What stands beside [[view]] in the files of scenes and of sensors; it says nothing about the views.
 OTHER_TABLES = (
     "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
@@ -101,25 +117,35 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
 
 def _parse_document(document: Mapping[str, Any]) -> Rig:
     for field in document:
-        if field != "view" and field not in OTHER_TABLES:
-            near = nearest_name(field, ("view", *OTHER_TABLES))
+        if field not in ("view", "medium", *OTHER_TABLES):
+            near = nearest_name(field, ("view", "medium", *OTHER_TABLES))
             _raise_rig_error(shown(field), f"unknown{near}", "[[view]] tables")
     tables = document.get("view")
     if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
         raise RigError("view is missing; expected at least one [[view]] table")
     if len(tables) > MAX_VIEWS:
         _raise_rig_error("view", f"a list of {len(tables)}", f"at most {MAX_VIEWS} [[view]] tables")
-    return Rig(tuple(_parse_view(table, index) for index, table in enumerate(tables)))
+    medium = _parse_medium(document["medium"]) if "medium" in document else None
+    return Rig(tuple(_parse_view(table, index, medium) for index, table in enumerate(tables)))
 
 
-def _parse_view(table: Mapping[str, Any], index: int) -> View:
-    prefix = f"view[{index}]."
+def _parse_medium(table: object) -> Medium:
+    if not isinstance(table, dict):
+        _raise_rig_error("medium", shown(table), f"a table of {', '.join(MEDIUM_FIELDS)}")
+    _require_known_fields(table, "medium.", MEDIUM_FIELDS)
+    return Medium(**{field: _parse_number(table[field], f"medium.{field}", False) for field in table})
+
+
+def _require_known_fields(table: Mapping[str, Any], prefix: str, known: tuple[str, ...]) -> None:
     for field in table:
-        if field not in KNOWN_FIELDS:
-            near = nearest_name(field, KNOWN_FIELDS)
-            _raise_rig_error(
-                prefix + shown(field), f"unknown{near}", f"only the fields {', '.join(KNOWN_FIELDS)}"
-            )
+        if field not in known:
+            near = nearest_name(field, known)
+            _raise_rig_error(prefix + shown(field), f"unknown{near}", f"only the fields {', '.join(known)}")
+
+
+def _parse_view(table: Mapping[str, Any], index: int, medium: Medium | None) -> View:
+    prefix = f"view[{index}]."
+    _require_known_fields(table, prefix, KNOWN_FIELDS)
     for field in REQUIRED_FIELDS:
         if field not in table:
             _raise_rig_error(prefix + field, "missing", f"{NUMBER_COUNTS[field]} numbers")
@@ -128,6 +154,14 @@ def _parse_view(table: Mapping[str, Any], index: int) -> View:
         for field, count in NUMBER_COUNTS.items()
         if field in table
     }
+    if "window_normal" in table or "window_distance_mm" in table:
+        for field in ("window_normal", "window_distance_mm"):
+            if field not in table:
+                _raise_rig_error(
+                    prefix + field, "missing", "both of window_normal and window_distance_mm, or none"
+                )
+        distance_mm = _parse_number(table["window_distance_mm"], prefix + "window_distance_mm", False)
+        values["window"] = WindowPlane(values.pop("window_normal"), distance_mm)
     name = table.get("name", f"view{index}")
     if not isinstance(name, str) or not name or not name.isprintable():
         _raise_rig_error(prefix + "name", shown(name), "a printable text")
@@ -139,7 +173,7 @@ def _parse_view(table: Mapping[str, Any], index: int) -> View:
         values["R_camera_from_layout"] = _parse_matrix(
             table["R_camera_from_layout"], prefix + "R_camera_from_layout"
         )
-    return View(name=name, **values)
+    return View(name=name, medium=medium, **values)
 
 
 def _parse_matrix(value: object, field: str) -> list[tuple[float, ...]]:
@@ -149,14 +183,17 @@ def _parse_matrix(value: object, field: str) -> list[tuple[float, ...]]:
 
 
 def _parse_numbers(value: object, field: str, count: int, whole: bool) -> tuple[float, ...]:
-    kinds = (int,) if whole else (int, float)
     if not isinstance(value, list) or len(value) != count:
         _raise_rig_error(field, shown(value), f"{count} numbers")
-    for i, item in enumerate(value):
-        if type(item) not in kinds or not -MAX_NUMBER <= item <= MAX_NUMBER:
-            kind = "a whole number" if whole else "a finite number"
-            _raise_rig_error(f"{field}[{i}]", shown(item), f"{kind} from {-MAX_NUMBER:g} to {MAX_NUMBER:g}")
-    return tuple(value)
+    return tuple(_parse_number(item, f"{field}[{i}]", whole) for i, item in enumerate(value))
+
+
+def _parse_number(value: Any, field: str, whole: bool) -> float:
+    kinds = (int,) if whole else (int, float)
+    if type(value) not in kinds or not -MAX_NUMBER <= value <= MAX_NUMBER:
+        kind = "a whole number" if whole else "a finite number"
+        _raise_rig_error(field, shown(value), f"{kind} from {-MAX_NUMBER:g} to {MAX_NUMBER:g}")
+    return value  # type: ignore[no-any-return]
 
 
 def _raise_rig_error(field: str, value: str, expected: str) -> NoReturn:

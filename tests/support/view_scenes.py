@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -64,10 +65,7 @@ def pair(half_angle_deg: float = 15.0, mirrored: tuple[bool, bool] = (False, Fal
 def unplaced(views: tuple[View, ...]) -> Rig:
     """The same views as a rig file has them: without poses."""
     return Rig(
-        tuple(
-            View(view.name, view.focal_px, view.centre_px, view.distortion, view.area_px, view.mirrored)
-            for view in views
-        )
+        tuple(replace(view, R_camera_from_layout=None, t_camera_from_layout_mm=None) for view in views)
     )
 
 
@@ -101,7 +99,7 @@ def noisy(
     appears = bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0)
     edges, virtual = len(layout.edges), layout.virtual_per_edge
     return Markers(
-        xy_px=opencv_px(view, xyz_mm) + noise,
+        xy_px=(opencv_px(view, xyz_mm) if view.medium is None else view.project(xyz_mm)) + noise,
         cov_px2=cov,
         status=np.full(count, Status.MEASURED, np.uint8),
         virtual_xy_px=np.full((edges, virtual, 2), np.nan),

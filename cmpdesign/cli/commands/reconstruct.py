@@ -19,7 +19,7 @@ from cmpdesign.cli.run_progress import (
     run_with_progress,
     summary_path,
 )
-from cmpdesign.cli.terminal import console
+from cmpdesign.cli.terminal import console, print_warning
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
@@ -135,6 +135,8 @@ def _prepare_run(options: _Options) -> TrackingRun:
     reconstructor = Reconstructor(
         views.layout, views.rig, at_rest, flatness_mm=flatness_mm, model_px=options.model_px
     )
+    for warning in reconstructor.warnings:
+        print_warning(warning)
     sink = open_sink(options.output, ShapeTable(reconstructor))
     tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
     source = open_sources(options.source, options.fps, options.max_pixels)

@@ -93,6 +93,7 @@ class Instrument:
             layout=self.layout,
             camera=self.sensor.cameras,
             surface=surface,
+            medium=self.sensor.medium,
             light=conditions.light,
             optics=Optics(conditions.blur_px),
             sensor=Sensor(noise=conditions.noise, response=self.sensor.response),

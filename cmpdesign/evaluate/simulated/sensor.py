@@ -20,7 +20,7 @@ from extractor.image.response import light_of_values
 
 if TYPE_CHECKING:
     from cmpdesign.contact import Elastomer
-    from cmpdesign.scene import Pinhole
+    from cmpdesign.scene import Medium, Pinhole
     from extractor.space.rig import Rig
 
 Positive = Annotated[float, Field(gt=0)]
@@ -97,7 +97,7 @@ class ConditionRanges(_StrictTable):
 
 
 class SensorTable(_StrictTable):
-    """The file without its [[view]] tables, which the extractor's reader checks."""
+    """The file without its [[view]] tables and its [medium], which the extractor's reader checks."""
 
     name: Name = ""
     description: Line = ""
@@ -157,7 +157,7 @@ class SimulatedSensor:
     @cached_property
     def cameras(self) -> tuple[Pinhole, ...]:
         """The views as pinholes of the renderer."""
-        from cmpdesign.scene import Pinhole
+        from cmpdesign.scene import Pinhole, WindowPlane
 
         return tuple(
             Pinhole(
@@ -168,9 +168,20 @@ class SimulatedSensor:
                 t_camera_from_layout_mm=view.t_camera_from_layout_mm,
                 area_px=view.area_px,
                 name=view.name,
+                window=WindowPlane(*view.window) if view.window else None,
             )
             for view in self.rig.views
         )
+
+    @cached_property
+    def medium(self) -> Medium | None:
+        """Window and gel between the pattern and the cameras; None: air."""
+        from cmpdesign.scene import Medium
+
+        found = self.rig.views[0].medium
+        if found is None:
+            return None
+        return Medium(found.gel_mm, found.gel_index, found.window_mm, found.window_index)
 
     @cached_property
     def elastomer(self) -> Elastomer:
@@ -238,7 +249,8 @@ def parse_sensor(text: str, where: str = "sensor") -> SimulatedSensor:
     try:
         document = parse_toml(text, where)
         rig = parse_rig(text, where)
-        document.pop("view", None)
+        for name in ("view", "medium"):
+            document.pop(name, None)
         table = SensorTable.model_validate(document)
     except (InputError, ExtractorError) as error:
         raise SensorError(str(error)) from None

@@ -3,6 +3,7 @@
     x_camera = R_camera_from_layout @ x_layout + t_camera_from_layout_mm
 
 in mm: the camera frame has x right, y down, z forward. One mirror between the view and the camera makes det R = -1.
+Through a window and a gel, the camera sees a point where its light leaves the window, see ``medium``.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.scene.camera.medium import Medium, WindowPlane, points_on_window, window_at_rest
 from cmpdesign.scene.errors import SceneError
 
 Points = NDArray[np.float64]
@@ -61,6 +63,8 @@ class Pinhole:
         t_camera_from_layout_mm: (3,) float64.
         area_px: x, y, width, height of the image's part that this view fills; None: the whole image.
         name: the view's name in messages.
+        window: the window's outer face in the camera's frame, where the scene has a medium; None: parallel to the
+            pattern at rest, behind the medium's gel.
     """
 
     focal_px: tuple[float, float]
@@ -70,6 +74,7 @@ class Pinhole:
     t_camera_from_layout_mm: Points = field(default_factory=lambda: np.array([0.0, 0.0, 50.0]))
     area_px: Area | None = None
     name: str = ""
+    window: WindowPlane | None = None
 
     def __post_init__(self) -> None:
         r = _frozen_array(self.R_camera_from_layout, (3, 3), "R_camera_from_layout")
@@ -85,6 +90,15 @@ class Pinhole:
             raise SceneError(
                 f"R_camera_from_layout is no rotation or reflection: R R^T is off the unit matrix by {error:.3g}, "
                 f"at most {ORTHOGONAL:g} is allowed; give its numbers with more digits"
+            )
+        if self.window is not None and not (
+            np.isfinite([*self.window.normal, self.window.distance_mm]).all()
+            and self.window.normal[2] > 0
+            and self.window.distance_mm > 0
+        ):
+            raise SceneError(
+                f"window_normal is {list(self.window.normal)} and window_distance_mm {self.window.distance_mm:g}; the "
+                "normal points away from the camera (its last number is above 0), and the distance is above 0 mm"
             )
         if self.area_px is not None and (min(self.area_px[:2]) < 0 or min(self.area_px[2:]) < 1):
             raise SceneError(
@@ -145,7 +159,12 @@ class Pinhole:
         Args:
             point_mm: (3,) a point of the mirror, layout frame.
             normal: (3,) the mirror's normal, of any length.
+
+        Raises:
+            SceneError: the camera has a ``window``, whose plane would be another one in the reflected frame.
         """
+        if self.window is not None:
+            raise SceneError("give the window's plane to the reflected view, in its own frame")
         point, n = np.asarray(point_mm, dtype=np.float64), np.asarray(normal, dtype=np.float64)
         n = n / np.linalg.norm(n)
         r, t = self.R_camera_from_layout, self.t_camera_from_layout_mm
@@ -223,13 +242,25 @@ def _frozen_array(value: object, shape: tuple[int, ...], name: str) -> Points:
     return array
 
 
-def project_3d(camera: Pinhole, xyz_mm: Points) -> Points:
+def project_3d(camera: Pinhole, xyz_mm: Points, medium: Medium | None = None) -> Points:
     """Project points (N, 3) mm of the layout frame to (N, 2) px of the whole image.
 
+    Args:
+        camera: the view.
+        xyz_mm: the points.
+        medium: window and gel before them; None: air.
+
     Raises:
-        SceneError: a point lies behind the camera, or beyond the radius where the distortion is defined.
+        SceneError: a point lies behind the camera or in the window, or beyond the radius where the distortion is
+            defined.
     """
-    xyz_camera = xyz_mm @ camera.R_camera_from_layout.T + camera.t_camera_from_layout_mm
+    r, t = camera.R_camera_from_layout, camera.t_camera_from_layout_mm
+    xyz_camera = xyz_mm @ r.T + t
+    if medium is not None:
+        try:
+            xyz_camera = points_on_window(medium, camera.window or window_at_rest(medium, r, t), xyz_camera)
+        except SceneError as error:
+            raise SceneError(f"{_camera_label(camera)}{error}") from None
     depth = xyz_camera[:, 2]
     if not np.all(depth > NEAREST_MM):
         if not np.isfinite(depth).all():

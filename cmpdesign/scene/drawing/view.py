@@ -208,12 +208,17 @@ def _make_surface_map(scene: Scene) -> _SurfaceMap:
 def _make_view(
     scene: Scene, camera: Camera | Pinhole, area: Area, surface_map: _SurfaceMap, size: tuple[int, int]
 ) -> SceneView:
-    if isinstance(camera, Camera) and not surface_map.spatial:
+    if isinstance(camera, Camera) and not surface_map.spatial and scene.medium is None:
         return _make_planar_view(scene, camera, area, surface_map, size)
     pinhole = camera if isinstance(camera, Pinhole) else to_pinhole(camera, scene.layout, size)
-    homography = pinhole.homography if surface_map.surface is None else None
+    straight = surface_map.surface is None and scene.medium is None
     view = SceneView(
-        surface_map, lambda xyz_mm: project_3d(pinhole, xyz_mm), area, pinhole.mirrored, homography, pinhole
+        surface_map,
+        lambda xyz_mm: project_3d(pinhole, xyz_mm, scene.medium),
+        area,
+        pinhole.mirrored,
+        pinhole.homography if straight else None,
+        pinhole,
     )
     if not view.curved:
         return view

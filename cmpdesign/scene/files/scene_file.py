@@ -167,6 +167,7 @@ def _make_parts(tables: SceneTables, file: SceneFile) -> dict[str, Any]:
     return {
         "layout": file.layout,
         "camera": _make_camera(tables),
+        "medium": tables.medium,
         "light": tables.light,
         "background": _make_background(tables, file.path),
         "optics": tables.optics,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 from types import UnionType
 from typing import Any, Literal, Self, Union, cast, get_args, get_origin, get_type_hints
@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from cmpdesign.inputs.names import nearest_name
 from cmpdesign.inputs.validation import shown_value
+from cmpdesign.scene.camera.medium import Medium, WindowPlane
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
 from cmpdesign.scene.errors import STRICT, SceneError
@@ -73,6 +74,14 @@ class ViewTable(Table):
     roll_deg: float = 0.0
     target_mm: Row = (0.0, 0.0, 0.0)
     back: bool = False
+    window_normal: Row | None = None
+    window_distance_mm: float | None = None
+
+    @model_validator(mode="after")
+    def _one_window(self) -> Self:
+        if (self.window_normal is None) != (self.window_distance_mm is None):
+            raise ValueError("window_normal and window_distance_mm go together; give both or none")
+        return self
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -94,6 +103,9 @@ class ViewTable(Table):
         Raises:
             SceneError: a value is out of range, or ``mirrored`` contradicts the pose.
         """
+        window = None
+        if self.window_normal is not None and self.window_distance_mm is not None:
+            window = WindowPlane(self.window_normal, self.window_distance_mm)
         if self.distance_mm is None:
             camera = Pinhole(
                 cast(tuple[float, float], self.focal_px),
@@ -103,6 +115,7 @@ class ViewTable(Table):
                 np.array(self.t_camera_from_layout_mm),
                 self.area_px,
                 self.name,
+                window,
             )
             reflects = bool(np.linalg.det(camera.R_camera_from_layout) < 0)
             if self.mirrored is not None and self.mirrored != reflects:
@@ -112,7 +125,7 @@ class ViewTable(Table):
                 )
             return camera
         looking = {name: getattr(self, name) for name in (*LOOKING_KEYS, "distortion", "area_px", "name")}
-        return Pinhole.looking(size, mirror=bool(self.mirrored), **looking)
+        return replace(Pinhole.looking(size, mirror=bool(self.mirrored), **looking), window=window)
 
 
 class SurfaceTable(Table):
@@ -165,6 +178,7 @@ class SceneTables(Table):
     view: tuple[ViewTable, ...] | None = None
     surface: SurfaceTable | None = None
     contact: dict[str, Any] | None = None
+    medium: Medium | None = None
     light: Light | None = None
     background: dict[str, Any] | None = None
     optics: Optics | None = None

@@ -129,9 +129,9 @@ def test_rays_lead_to_their_points() -> None:
     for view in pair(mirrored=(True, False)):
         xyz = pressed(reference().xy_mm)
         away = xyz - view.position_mm
-        np.testing.assert_allclose(
-            view.rays(view.project(xyz)), away / np.linalg.norm(away, axis=1)[:, None], atol=1e-11
-        )
+        origin_mm, direction = view.rays(view.project(xyz))
+        np.testing.assert_allclose(direction, away / np.linalg.norm(away, axis=1)[:, None], atol=1e-11)
+        np.testing.assert_array_equal(origin_mm, np.tile(view.position_mm, (len(xyz), 1)))
 
 
 def test_a_rig_file_is_read(tmp_path: Path) -> None:
