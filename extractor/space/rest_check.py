@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from extractor.errors import PoseError
 from extractor.space.camera import Array, View, is_finite
 from extractor.space.medium import Medium, WindowPlane
-from extractor.space.pose_refinement import RestMarkers, refine_poses
+from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 
 MAX_MISFIT = 3.0  # RMS residual at rest in its deviations, above which the model of the sensor is doubted
 EXPLAINED = 0.5  # share of the misfit that the likely cause may leave
-USUAL_GEL = Medium(1.0, 1.41)  # silicone, where the rig has no medium
+USUAL_GEL_INDEX, USUAL_WINDOW_INDEX = 1.41, 1.49  # silicone and acrylic, where the rig has none
 GEL_TOLERANCE_MM = 0.01
 STEPS = {"window_mm": 0.1, "gel_index": 0.01, "window_index": 0.01}
 TILT_STEP = 0.01  # rad
@@ -83,26 +84,37 @@ def _causes(found: RestViews, residual_px: Array) -> Iterator[tuple[str, float]]
 def _medium_error(found: RestViews) -> float:
     """The prediction error with the likeliest thickness of the gel, and all else of the medium linearised."""
     views, rest, free = found.views, found.rest, found.free
-    mediums = [view.medium or USUAL_GEL for view in views]
     room_mm = min(abs(float(view.position_mm[2])) for view in views)
 
-    def with_gel(gel_mm: float) -> list[View]:
-        return [
-            replace(
-                view, medium=replace(medium, gel_mm=gel_mm, gel_index=medium.gel_index or USUAL_GEL.gel_index)
-            )
-            for view, medium in zip(views, mediums, strict=True)
-        ]
+    def refined(gel_mm: float) -> RefinedPoses | None:
+        changed = [replace(view, medium=replace(_whole_medium(view), gel_mm=gel_mm)) for view in views]
+        try:
+            return refine_poses(changed, rest, free)
+        except PoseError:  # no room for this gel
+            return None
+
+    def chi2(gel_mm: float) -> float:
+        tried = refined(gel_mm)
+        return tried.chi2 if tried is not None else float("inf")
 
     best = minimize_scalar(
-        lambda gel_mm: refine_poses(with_gel(gel_mm), rest, free).chi2,
-        bounds=(0.0, 0.5 * room_mm),
-        method="bounded",
-        options={"xatol": GEL_TOLERANCE_MM},
+        chi2, bounds=(0.0, 0.5 * room_mm), method="bounded", options={"xatol": GEL_TOLERANCE_MM}
     )
-    refined = refine_poses(with_gel(float(best.x)), rest, free)
-    columns = list(_medium_columns(refined.views, rest.flat_mm))
-    return _explained_error(found._replace(views=refined.views), refined.residual_px, columns)
+    likely = refined(float(best.x))
+    if likely is None:
+        return float("inf")
+    columns = list(_medium_columns(likely.views, rest.flat_mm))
+    return _explained_error(found._replace(views=likely.views), likely.residual_px, columns)
+
+
+def _whole_medium(view: View) -> Medium:
+    """The view's medium with usual indices for what it lacks."""
+    medium = view.medium or Medium()
+    return replace(
+        medium,
+        gel_index=medium.gel_index or USUAL_GEL_INDEX,
+        window_index=medium.window_index or USUAL_WINDOW_INDEX,
+    )
 
 
 def _medium_columns(views: Sequence[View], flat_mm: Array) -> Iterator[Array]:
@@ -110,10 +122,8 @@ def _medium_columns(views: Sequence[View], flat_mm: Array) -> Iterator[Array]:
     for field, step in STEPS.items():
         changed = []
         for view in views:
-            medium = view.medium or USUAL_GEL
-            index = medium.window_index or 1.49
-            value = (getattr(replace(medium, window_index=index), field) or 1.0) + step
-            changed.append(replace(view, medium=replace(medium, **{"window_index": index, field: value})))
+            medium = _whole_medium(view)
+            changed.append(replace(view, medium=replace(medium, **{field: getattr(medium, field) + step})))
         yield _moved_px(views, changed, flat_mm)
     for axis in (0, 1):
         yield _moved_px(views, [_tilted(view, axis) for view in views], flat_mm)

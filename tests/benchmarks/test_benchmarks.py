@@ -37,6 +37,7 @@ ROOT = Path(__file__).parents[2]
         ("startup", {"conditions", "processes", "largest"}),
         ("rendering", {"conditions", "errors", "speeds"}),
         ("contact", {"conditions", "contacts", "closed_forms_percent"}),
+        ("medium", {"conditions", "results"}),
         (
             "extraction",
             {"conditions", "presets", "large", "over_pixels", "over_markers", "growth"},
@@ -56,6 +57,9 @@ def test_a_quick_run_prints_and_writes(name: str, keys: set[str], tmp_path: Path
     for scene in figures.get("accuracy", []):
         assert scene["wrong"] == 0 and scene["measured_share"] > 0.99
         assert scene["rms_inner_px"] > 0.9 * scene["bound_inner_px"]
+    short = {row["label"]: row["short_percent"] for row in figures.get("results", [])}
+    if short:
+        assert abs(short["true constants"]) < 1 < 15 < short["no medium"] < 35
 
 
 def test_the_benchmark_of_molds_runs(tmp_path: Path) -> None:

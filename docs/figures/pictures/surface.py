@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +35,10 @@ def figures() -> dict[str, bytes]:
     surface = solve(
         Elastomer(6.0, 0.2), Ball(radius_mm=20.0, centre_mm=(2.0, 1.0)), Motion(0.6, (0.4, 0.2))
     ).surface()
-    scene = Scene(
-        layout, found.scene().camera, surface, optics=found.scene().optics, sensor=found.scene().sensor
-    )
+    like = found.scene()
+    scene = Scene(layout, like.camera, surface, optics=like.optics, sensor=like.sensor, medium=like.medium)
     image = render(scene, size=found.size_px).image
-    rest = render(
-        Scene(layout, scene.camera, optics=scene.optics, sensor=scene.sensor, seed=1), size=found.size_px
-    ).image
+    rest = render(replace(scene, surface=None, seed=1), size=found.size_px).image
     views = ViewExtractor(parse_layout(layout_to_json(layout)), load_rig(RIG).without_poses())
     reconstructor = Reconstructor(views.layout, views.rig, views.extract(rest))
     shape = reconstructor.reconstruct(views.extract(image))

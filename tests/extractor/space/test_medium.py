@@ -178,7 +178,7 @@ def test_ignoring_the_medium_shortens_depth_and_is_warned_about() -> None:
     assert len(blind.warnings) == 1 and "[medium]" in blind.warnings[0]
 
 
-@pytest.mark.parametrize("cause", ["medium", "lens", "surface"])
+@pytest.mark.parametrize("cause", ["medium", "lens", "poses", "surface"])
 def test_the_likely_cause_of_a_misfit_at_rest_is_named(cause: str) -> None:
     views, rng = through(), np.random.default_rng(7)
     rig, surface = unplaced(views), flat(LAYOUT)
@@ -187,11 +187,15 @@ def test_the_likely_cause_of_a_misfit_at_rest_is_named(cause: str) -> None:
         rig = Rig(tuple(replace(view, medium=thick) for view in rig.views))
     elif cause == "lens":
         rig = Rig(tuple(replace(view, distortion=(0.05, 0.0, 0.0, 0.0, 0.0)) for view in rig.views))
+    elif cause == "poses":
+        rig = Rig(
+            tuple(view.at(view.R_camera_from_layout, view.t_camera_from_layout_mm + 0.02) for view in views)
+        )
     else:
         surface = pressed(LAYOUT.xy_mm, 0.4)
     rest = [noisy(LAYOUT, view, surface, rng, 0.003) for view in views]
     (warning,) = Reconstructor(LAYOUT, rig, rest).warnings
-    named = {"medium": "[medium]", "lens": "focal_px", "surface": "flatness_mm"}
+    named = {"medium": "[medium]", "lens": "focal_px", "poses": "--from-rest", "surface": "flatness_mm"}
     assert [key for key, text in named.items() if text in warning] == [cause]
 
 

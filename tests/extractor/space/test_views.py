@@ -168,6 +168,7 @@ def test_a_scene_file_is_a_rig_file() -> None:
         assert true.placed and view.mirrored and not rig.without_poses().views[0].placed
         np.testing.assert_allclose(view.R_camera_from_layout, true.R_camera_from_layout, atol=2e-3)
     for reconstructor in (given, placed):
+        assert not reconstructor.warnings
         shape = reconstructor.reconstruct(seen[1])
         assert (shape.status != Status.LOST).mean() > 0.98
         assert np.sqrt(np.nanmean((shape.xyz_mm - pressed.truth.marker_xyz_mm) ** 2)) < 0.003
