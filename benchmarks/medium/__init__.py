@@ -1,0 +1,1 @@
+"""``python -m benchmarks.medium``: depth through a window and a gel."""

@@ -1,0 +1,1 @@
+"""Sensors with window and gel, and the errors of their depths."""
