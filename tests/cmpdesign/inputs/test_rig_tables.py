@@ -9,7 +9,8 @@ from cmpdesign.scene.files.tables import SceneTables
 from extractor import RigError, parse_rig
 from tests.support.hostile.input_files import RIG
 
-BESIDE = {*SceneTables.model_fields, *SensorTable.model_fields} - {"view"}
+READ = {"view", "medium"}
+BESIDE = {*SceneTables.model_fields, *SensorTable.model_fields} - READ
 
 
 @pytest.mark.parametrize("name", sorted(BESIDE))
@@ -17,7 +18,7 @@ def test_tables_of_scenes_and_sensors_may_stand_beside(name: str) -> None:
     assert parse_rig(f"{name} = 1\n{RIG}").names == ("left",)
 
 
-@pytest.mark.parametrize("name", sorted(BESIDE | {"view"}))
+@pytest.mark.parametrize("name", sorted(BESIDE | READ))
 def test_what_is_nearly_their_name_is_refused(name: str) -> None:
     with pytest.raises(RigError, match=rf"'{name}q' is unknown \(did you mean {name}\?\)"):
         parse_rig(f"{name}q = 1\n{RIG}")

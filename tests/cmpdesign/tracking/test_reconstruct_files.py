@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from cmpdesign.scene import Medium, render
 from tests.support.command import refused, run
 from tests.support.layouts import small_text
 from tests.support.view_scenes import (
     HALF,
     SMALL,
     binocular,
+    binocular_scene,
     binocular_shot,
     contact,
     reference,
@@ -152,6 +155,37 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     )
     assert [view["name"] for view in summary["views"]] == ["left", "right"]
     assert all(view["rms_px"] < 0.02 and view["position_mm"][2] < 0 for view in summary["views"])
+
+
+MEDIUM = "[medium]\ngel_mm = 4.0\ngel_index = 1.41\nwindow_mm = 2.0\nwindow_index = 1.49\n"
+
+
+def test_the_rig_files_medium_is_what_the_cameras_look_through(tmp_path: Path) -> None:
+    """Frames through gel and window: right with the rig's medium, too shallow and warned about without."""
+    (tmp_path / "layout.json").write_text(small_text("honeycomb", SMALL), encoding="utf-8")
+    rig = rig_text(rig_of(binocular()))
+    (tmp_path / "frames").mkdir()
+    for k, surface in enumerate((None, contact)):
+        scene = replace(binocular_scene(surface, 60 + k), medium=Medium(4.0, 1.41, 2.0, 1.49))
+        shot = render(scene, size=(2 * HALF[0], HALF[1]))
+        cv2.imwrite(str(tmp_path / "frames" / f"{k}.png"), shot.image)
+    true_mm = shot.truth.marker_xyz_mm
+    deepest = true_mm[:, 2].argmin()
+    depths_mm, warnings = [], []
+    for text in (rig + MEDIUM, rig):
+        (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+        command = ("reconstruct", tmp_path / "layout.json", tmp_path / "rig.toml", "0", tmp_path / "frames")
+        result = run(*command, "-o", tmp_path / "a.npz")
+        assert result.exit_code == 0, result.output
+        with np.load(tmp_path / "a.npz") as table:
+            depths_mm.append(table["3D_Displacements"][1, deepest, 2])
+        summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
+        warnings.append(summary["warnings"])
+        assert all(f"warning: {line}" in result.output for line in summary["warnings"])
+        assert result.output.count("warning:") == len(summary["warnings"])
+    assert depths_mm[0] == pytest.approx(true_mm[deepest, 2], rel=0.005)
+    assert 0.15 < 1 - depths_mm[1] / true_mm[deepest, 2] < 0.35
+    assert not warnings[0] and len(warnings[1]) == 1 and "the rig has no [medium]" in warnings[1][0]
 
 
 def test_two_cameras_are_two_sources(made: Path, tmp_path: Path) -> None:

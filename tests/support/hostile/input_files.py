@@ -37,6 +37,14 @@ centre_px = [319.5, 239.5]
 distortion = [-0.1, 0.02, 0.0, 0.0, 0.0]
 area_px = [0, 0, 320, 480]
 mirrored = false
+window_normal = [0.0, 0.1, 1.0]
+window_distance_mm = 20.0
+
+[medium]
+gel_mm = 4.0
+gel_index = 1.41
+window_mm = 2.0
+window_index = 1.49
 """
 SCENE = """
 size_px = [320, 240]
@@ -56,6 +64,12 @@ noise = 2.0
 
 [inks]
 red = "#c8322d"
+
+[medium]
+gel_mm = 4.0
+gel_index = 1.41
+window_mm = 2.0
+window_index = 1.49
 
 [contact.elastomer]
 thickness_mm = 4.0
