@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -197,6 +198,16 @@ def test_the_likely_cause_of_a_misfit_at_rest_is_named(cause: str) -> None:
     (warning,) = Reconstructor(LAYOUT, rig, rest).warnings
     named = {"medium": "[medium]", "lens": "focal_px", "poses": "--from-rest", "surface": "flatness_mm"}
     assert [key for key, text in named.items() if text in warning] == [cause]
+
+
+def test_a_misfit_that_nothing_explains_is_said_to_be_unknown() -> None:
+    """Noise twenty times what the covariances state: no gel, lens, pose or touch looks like that."""
+    views, rng = through(), np.random.default_rng(9)
+    rest = [noisy(LAYOUT, view, flat(LAYOUT), rng, 0.06) for view in views]
+    sure = [replace(markers, cov_px2=markers.cov_px2 / 400) for markers in rest]
+    (warning,) = Reconstructor(LAYOUT, unplaced(views), sure).warnings
+    assert re.search(r"\b(19|20|21) times", warning) and "none that is known" in warning
+    assert not Reconstructor(LAYOUT, unplaced(views), rest).warnings
 
 
 def test_a_gel_that_does_not_fit_before_the_camera_is_refused() -> None:
