@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,8 @@ from cmpdesign.contact import Ball, Contact, Elastomer, Motion, Relief, solve
 Array = NDArray[np.float64]
 PRESSES_MM = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 LAYER = Elastomer(4.0, 0.3, 0.5, 1.0)
-RADIUS_MM, FAR_MM = 10.0, 24.0
+# Radius of the ball; from there on the finite elements are at rest; side of the area that the linear contact covers.
+RADIUS_MM, FAR_MM, SOLVED_MM = 10.0, 24.0, 64.0
 # Penetration under a pressure of one shear modulus: 0.4 um.
 PENALTY_PER_MODULUS = 2500.0
 NEWTON_TOLERANCE_MM, LARGEST_NEWTON_STEP_MM, MOST_NEWTON_STEPS = 1e-5, 0.15, 60
@@ -37,14 +37,6 @@ class Moved(NamedTuple):
 def places_mm() -> Array:
     """(N,) mm from the axis, at rest."""
     return np.linspace(0.0, 12.0, 49)
-
-
-@dataclass(frozen=True)
-class _Fields:
-    """What the forms need at every quadrature point of a state."""
-
-    gradient: Array
-    pressure: Array
 
 
 def _gradient(u: Any, r: Array) -> Array:
@@ -197,7 +189,7 @@ class Comparison(NamedTuple):
 def compare(press_mm: float, moved: Moved) -> Comparison:
     """The linear contact beside the neo-Hookean one."""
     contact = solve(
-        LAYER, Ball(RADIUS_MM), Motion(press_mm), friction=0.0, size_mm=(2 * FAR_MM, 2 * FAR_MM), grid=256
+        LAYER, Ball(RADIUS_MM), Motion(press_mm), friction=0.0, size_mm=(SOLVED_MM, SOLVED_MM), grid=256
     )
     at, rest = places_mm(), np.stack([places_mm(), 0 * places_mm()], axis=1)
     surface, markers = (relief(rest)[:, [0, 2]].T for relief in (contact.surface(), contact.marker_layer()))

@@ -183,18 +183,21 @@ def test_twist_of_a_stuck_punch_is_reissner_and_sagoci() -> None:
         assert np.concatenate([found.force_n, found.moment_nmm])[got] == pytest.approx(wanted, rel=0.015)
 
 
-def test_torque_of_a_far_twist_has_arms_and_tractions_of_one_frame() -> None:
-    """A stuck punch moves by (R - 1) x: 16 / 3 mu a^3 sin(twist). Turned arms with unturned tractions lose a quarter."""
+def test_torque_of_a_far_twist_is_what_the_support_takes() -> None:
+    """Arms and tractions of one frame, the flat layer's: near 16 / 3 mu a^3 sin(twist) for a stuck punch."""
     found = solve(
         Elastomer(THICK, 1.0),
         Punch(1.0),
-        Motion(1e-3, twist_deg=30.0),
+        Motion(0.05, twist_deg=30.0),
         friction=math.inf,
         size_mm=(2.5, 2.5),
-        grid=96,
-        steps=1,
+        grid=64,
     )
-    assert found.moment_nmm[2] == pytest.approx(16 / 9 * math.sin(math.radians(30.0)), rel=0.02)
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
+    area = (found.x_mm[1] - found.x_mm[0]) ** 2
+    torque = float(np.sum(x * found.traction_mpa[..., 1] - y * found.traction_mpa[..., 0])) * area
+    assert found.moment_nmm[2] == pytest.approx(torque, rel=1e-4)
+    assert torque == pytest.approx(16 / 9 * math.sin(math.radians(30.0)), rel=0.15)
 
 
 def test_moment_is_about_the_object_where_it_is() -> None:
@@ -315,10 +318,16 @@ def test_surface_is_the_displacement_between_and_zero_far_away() -> None:
 
 
 @pytest.mark.parametrize(
-    ("friction", "motion"), [(0.0, Motion(0.8)), (0.5, Motion(0.8)), (1.0, Motion(0.8, twist_deg=30.0))]
+    ("friction", "motion", "lost"),
+    [(0.0, Motion(0.8), 0.005), (0.5, Motion(0.8), 0.005), (1.0, Motion(0.8, twist_deg=30.0), 0.02)],
 )
-def test_surface_touches_the_object_and_keeps_its_volume(friction: float, motion: Motion) -> None:
-    """Where it presses, the surface lies on the ball, at the points' places in space; what is dented bulges up."""
+def test_surface_touches_the_object_and_keeps_its_volume(
+    friction: float, motion: Motion, lost: float
+) -> None:
+    """Where it presses, the surface lies on the ball, at the points' places in space; what is dented bulges up.
+
+    The solved area ends where some bulge is left: as much as linear theory has there.
+    """
     ball = Ball(10.0)
     found = solve(LAYER, ball, motion, friction=friction, size_mm=(44, 44), grid=176)
     x, y = np.meshgrid(found.x_mm, found.y_mm)
@@ -330,7 +339,8 @@ def test_surface_touches_the_object_and_keeps_its_volume(friction: float, motion
     x_y, x_x = np.gradient(moved[..., 0], step)
     y_y, y_x = np.gradient(moved[..., 1], step)
     volume = moved[..., 2] * (x_x * y_y - x_y * y_x)
-    assert abs(volume.sum()) < 0.005 * -volume[volume < 0].sum()
+    beyond = -found.displacement_mm[..., 2].sum()
+    assert abs(volume.sum() + beyond) < lost * -volume[volume < 0].sum()
 
 
 def test_pattern_at_the_surface_is_the_surface_and_below_it_moves_as_the_layer_does() -> None:
