@@ -1,4 +1,4 @@
-"""Linear contacts beside an incompressible neo-Hookean layer: a ball without friction, in finite elements that are round."""
+"""Linear contacts beside an incompressible neo-Hookean layer: a ball without friction, in round finite elements."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def _stiffness(u: Any, v: Any, w: Any) -> Any:
     g, du, dv = w["g"], _gradient(u, w.x[0]), _gradient(v, w.x[0])
     of_u, of_v = (np.einsum("ij...,ij...->...", g, d) for d in (du, dv))
     turned = np.einsum("il...,kl...,kj...,ij...->...", g, du, g, dv, optimize=True)
-    return (
-        w["mu"] * np.einsum("ij...,ij...->...", du, dv) - w["p"] * w["j"] * (of_u * of_v - turned)
-    ) * w.x[0]
+    return (w["mu"] * np.einsum("ij...,ij...->...", du, dv) - w["p"] * w["j"] * (of_u * of_v - turned)) * w.x[
+        0
+    ]
 
 
 @skfem.BilinearForm
@@ -96,9 +96,7 @@ def _pushing(v: Any, w: Any) -> Any:
 def _pushing_stiffness(u: Any, v: Any, w: Any) -> Any:
     inside, slope, curvature = _ball(w["u"], w)
     across = (u[1] - slope * u[0]) * (v[1] - slope * v[0])
-    return (
-        w["penalty"] * (np.where(inside > 0, across, 0.0) - inside * curvature * u[0] * v[0]) * w.x[0]
-    )
+    return w["penalty"] * (np.where(inside > 0, across, 0.0) - inside * curvature * u[0] * v[0]) * w.x[0]
 
 
 class NeoHookeanLayer:
@@ -237,7 +235,16 @@ def main() -> int:
         title=f"ball of {RADIUS_MM:g} mm without friction on {LAYER.thickness_mm:g} mm; largest errors in um of points "
         f"within {places_mm()[-1]:g} mm; pattern {LAYER.marker_depth_mm:g} mm below"
     )
-    for name in ("press", "strain", "surface, z at rest", "surface", "its height", "pattern", "volume, z at rest", "volume"):
+    for name in (
+        "press",
+        "strain",
+        "surface, z at rest",
+        "surface",
+        "its height",
+        "pattern",
+        "volume, z at rest",
+        "volume",
+    ):
         table.add_column(name, justify="right")
     for press, moved in zip(PRESSES_MM, NeoHookeanLayer().pressed(PRESSES_MM), strict=True):
         one = compare(press, moved)

@@ -16,8 +16,8 @@ class Elastomer:
         thickness_mm: h, above 0.
         young_mpa: Young's modulus, above 0. Forces are proportional to it; displacements do not depend on it.
         poisson: 0 to 0.5; silicones are nearly incompressible, 0.5.
-        marker_depth_mm: depth of the pattern below the touched surface, from 0 to below the thickness. The pattern moves
-            as the elastic layer does at that depth. Forces and the touched surface do not depend on it.
+        marker_depth_mm: depth of the pattern below the touched surface, from 0 to below the thickness. The pattern
+            moves as the elastic layer does at that depth. Forces and the touched surface do not depend on it.
 
     Raises:
         ContactError: a value out of range.

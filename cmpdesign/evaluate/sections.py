@@ -21,10 +21,9 @@ DIFFERENCES = (
     "by far more than linear theory predicts well.",
 )
 DIFFERENCES_PRECISION = (
-    "The cube's side is ten pitches of the square pattern. Where the cube lies along the square pattern's rows, its two "
-    "edges of an axis are missed alike and the error is the largest that there is; turned at random, the patterns "
-    "differ by much less, and with virtual markers the order of the patterns may change. The change of the aligned cube "
-    "is no figure for the patterns' resolution.",
+    "The cube's side is ten pitches of the square pattern. Where the cube lies along the square pattern's rows, a "
+    "whole row is missed at once. Turned at random, the patterns differ by much less, and virtual markers take most of "
+    "what is left. The change of the aligned cube says nothing of how finely a pattern resolves an edge.",
     "Under a shear the bonded layer drags its surroundings along: half of the largest movement in y lies "
     "millimetres outside the cube's face, whatever the pattern. Edge points chosen by their depth lie "
     "under the face again.",
@@ -186,8 +185,8 @@ def _edge_section(edges: Document) -> Section:
         [
             "A cube of 15 mm presses by 1 mm, or presses by 1 mm and shears by 1 mm in y, at ten places 4 mm apart. "
             "Markers that move by more than half of the largest displacement (in z, or along the shear) are its edge "
-            "points; the square around them, lying as the cube does, has the larger of their width and height. The cube lies "
-            "along the square pattern's rows, diagonal to them (45 degrees), or turned at random."
+            "points; the square around them, lying as the cube does, has the larger of their width and height. The cube "
+            "lies along the square pattern's rows, diagonal to them (45 degrees), or turned at random."
         ],
         tables=[table],
         plots=[Plot("Every place's error, and the means.", plots.plot_values(sides, "error, mm"))],

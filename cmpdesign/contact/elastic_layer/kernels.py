@@ -12,9 +12,9 @@ the surface. With a = kh, c = 3 - 4 nu and D = c cosh 2a + 2a^2 + 5 - 12 nu + 8 
 
 It is continuous in nu up to 1/2. Numerators and denominators are divided by exp(2a) / 2 to avoid overflow.
 
-At a depth d below the surface u_z for t_L has a compliance of its own, u_z = C_zz t_z - i C_zx t_L. With Papkovich's and
-Neuber's potentials 2 mu u = grad(phi + s psi) - 4 (1 - nu) psi e_z at the height s above the support, u = 0 at s = 0
-leaves two coefficients A and B, and with x = k s
+At a depth d below the surface u_z for t_L has a compliance of its own, u_z = C_zz t_z - i C_zx t_L. With Papkovich's
+and Neuber's potentials 2 mu u = grad(phi + s psi) - 4 (1 - nu) psi e_z at the height s above the support, u = 0 at
+s = 0 leaves two coefficients A and B, and with x = k s
 
     2 mu u_L = i (A (c sinh x + x cosh x) + B x sinh x)        2 mu u_z = A x sinh x + B (x cosh x - c sinh x)
 

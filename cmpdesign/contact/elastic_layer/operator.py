@@ -120,9 +120,7 @@ def interior_displacement_mm(green: GreenKernels, traction_mpa: Array) -> Array:
     waves = (
         spectrum(green.xx) * x + across * y + spectrum(green.xz, odd_x=True) * z,
         across * x + spectrum(green.yy) * y + spectrum(green.yz, odd_y=True) * z,
-        spectrum(green.zz) * z
-        - spectrum(green.zx, odd_x=True) * x
-        - spectrum(green.zy, odd_y=True) * y,
+        spectrum(green.zz) * z - spectrum(green.zx, odd_x=True) * x - spectrum(green.zy, odd_y=True) * y,
     )
     return np.stack([irfft2(wave, s=padded, workers=1)[: shape[0], : shape[1]] for wave in waves])
 

@@ -110,5 +110,5 @@ def _contact_relief(sensor_text: str, load: ContactLoad) -> Callable[[Points], P
 def place_surface(
     sensor_text: str, load: ContactLoad, centre_mm: tuple[float, float], turn_deg: float = 0.0
 ) -> PlacedSurface:
-    """The pattern under a load at a position, turned counter-clockwise; the elastic layer is the same in all directions."""
+    """The pattern under a load at a position, turned counter-clockwise: the layer is the same in all directions."""
     return PlacedSurface(_contact_relief(sensor_text, load), centre_mm, turn_deg)

@@ -360,9 +360,7 @@ def test_pattern_at_the_surface_is_the_surface_and_below_it_moves_as_the_layer_d
         moved = found.marker_layer()(points)
         assert np.abs(moved[:, :2] - points).max() <= largest[-1] * 1.01
         if depth == 0.001:
-            np.testing.assert_allclose(
-                found.marker_displacement_mm, at_surface.displacement_mm, atol=0.002
-            )
+            np.testing.assert_allclose(found.marker_displacement_mm, at_surface.displacement_mm, atol=0.002)
     assert largest[0] > 1.2 * largest[1] > 20 * largest[2] > 0
 
 
