@@ -185,7 +185,7 @@ def _edge_section(edges: Document) -> Section:
         [
             "A cube of 15 mm presses by 1 mm, or presses by 1 mm and shears by 1 mm in y, at ten places 4 mm apart. "
             "Markers that move by more than half of the largest displacement (in z, or along the shear) are its edge "
-            "points; the square around them, lying as the cube does, has the larger of their width and height. The cube "
+            "points; the square around them, lying as the cube does, has the larger of their width and height. It "
             "lies along the square pattern's rows, diagonal to them (45 degrees), or turned at random."
         ],
         tables=[table],
