@@ -30,14 +30,26 @@ def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: 
     grid, traction, displacement = problem.grid, state.traction_mpa, state.displacement_mm
     strain = largest_strain(problem.elastomer, displacement, traction, grid.step_mm)
     friction = np.hypot(traction[0], traction[1])
+    # Without friction nothing is carried along: wherever the object is, it presses only.
+    press_only = problem.friction == 0 or not state.motion.tangential
+    by_press = displacement[:2] if press_only else state.press_displacement_mm
+    markers, markers_by_press = displacement, by_press
+    if problem.elastomer.marker_depth_mm > 0:
+        markers = problem.interior_displacement_mm(traction)
+        pressed = markers if press_only else problem.interior_displacement_mm(state.press_traction_mpa)
+        markers_by_press = pressed[:2]
     fields = [
-        np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (displacement, young_mpa * traction)
+        np.ascontiguousarray(np.moveaxis(values, 0, -1))
+        for values in (displacement, by_press, markers, markers_by_press, young_mpa * traction)
     ]
     contact = Contact(
         x_mm=grid.x_mm,
         y_mm=grid.y_mm,
         displacement_mm=fields[0],
-        traction_mpa=fields[1],
+        press_displacement_mm=fields[1],
+        marker_displacement_mm=fields[2],
+        marker_press_displacement_mm=fields[3],
+        traction_mpa=fields[4],
         in_contact=state.in_contact,
         slipping=state.in_contact & (friction >= (1 - 1e-9) * state.limit_mpa),
         force_n=young_mpa * traction.sum(axis=(1, 2)) * grid.step_mm**2,
@@ -48,16 +60,24 @@ def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: 
         residual_mm=state.residual_mm,
         thickness_mm=problem.elastomer.thickness_mm,
     )
-    for values in (contact.displacement_mm, contact.traction_mpa, contact.in_contact, contact.slipping):
+    for values in (*fields, contact.in_contact, contact.slipping):
         values.setflags(write=False)
     return contact
 
 
 def _contact_moment(problem: ContactProblem, state: ContactState) -> Array:
-    """(3,) moment in N mm about the object's current centre, with lever arms in the plane of the flat surface."""
-    (x0, y0), (dx, dy) = problem.indenter.centre_mm, state.motion.shear_mm
-    x, y = problem.grid.xy_mm + state.displacement_mm[:2] - np.reshape((x0 + dx, y0 + dy), (2, 1, 1))
-    fx, fy, fz = state.traction_mpa * problem.grid.step_mm**2
+    """(3,) moment in N mm about the object's current centre, with lever arms in the plane of the flat surface.
+
+    The tractions are those of linear theory, in the directions of the flat layer, and so are the arms: a twist turns
+    neither. Both move with the centre of pressure, so that a sheared object takes its load along.
+    """
+    centre = np.add(problem.indenter.centre_mm, state.motion.shear_mm)
+    force = state.traction_mpa * problem.grid.step_mm**2
+    moved = np.zeros(2)
+    if force[2].any():
+        moved = (state.displacement_mm[:2] * force[2]).sum(axis=(1, 2)) / force[2].sum()
+    x, y = problem.grid.xy_mm + np.reshape(moved - centre, (2, 1, 1))
+    fx, fy, fz = force
     return np.array([np.sum(y * fz), -np.sum(x * fz), np.sum(x * fy - y * fx)])
 
 

@@ -20,6 +20,10 @@ class Contact:
     Attributes:
         x_mm, y_mm: the cells' centres, (nx,) and (ny,).
         displacement_mm: displacement of the surface's points, (ny, nx, 3).
+        press_displacement_mm: the part of it in x and y that the press made, without shear and twist, (ny, nx, 2).
+        marker_displacement_mm: displacement of the points of the pattern, (ny, nx, 3); without a marker depth the
+            surface's.
+        marker_press_displacement_mm: the press's part of it, (ny, nx, 2).
         traction_mpa: traction of the object on the surface, (ny, nx, 3); z is minus the pressure.
         in_contact: (ny, nx) bool.
         slipping: in contact and at the friction limit, (ny, nx) bool.
@@ -35,6 +39,9 @@ class Contact:
     x_mm: Array
     y_mm: Array
     displacement_mm: Array = field(repr=False)
+    press_displacement_mm: Array = field(repr=False)
+    marker_displacement_mm: Array = field(repr=False)
+    marker_press_displacement_mm: Array = field(repr=False)
     traction_mpa: Array = field(repr=False)
     in_contact: Mask = field(repr=False)
     slipping: Mask = field(repr=False)
@@ -47,15 +54,27 @@ class Contact:
     thickness_mm: float
 
     def surface(self) -> Relief:
-        """The surface as a smooth function of the layout frame."""
-        return make_relief(self)
+        """The touched surface as a smooth function of the layout frame."""
+        return make_relief(self, self.displacement_mm, self.press_displacement_mm)
+
+    def marker_layer(self) -> Relief:
+        """The pattern as a smooth function of the layout frame, whose z is 0 at the pattern at rest."""
+        return make_relief(self, self.marker_displacement_mm, self.marker_press_displacement_mm)
 
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """A deformed surface: maps (N, 2) mm of the flat surface to (N, 3) mm, by a bicubic spline of the displacement.
+    """A deformed surface or pattern: maps (N, 2) mm of the flat one to (N, 3) mm, by bicubic splines of displacements.
+
+    The solver reads the object's height in the place of a point, and its z is a height over that place. So z is read
+    where the press has moved a point: the surface touches the object, and no volume is lost. Read at the point's
+    place at rest, z is of first order only; a press by a ball then seems to lose a tenth of the dent's volume and more.
 
     Beyond the solved area the displacement falls smoothly to zero within one thickness (at least 6 cells).
+
+    Attributes:
+        grid: the cells of the coefficients.
+        coefficients: (5, ny, nx) of the displacement in x, y and z, and of the press's part in x and y.
     """
 
     grid: ContactGrid
@@ -63,22 +82,26 @@ class Relief:
 
     def __call__(self, xy_mm: Array, /) -> Array:
         """(N, 3) mm: deformed positions of the points (N, 2) mm of the flat surface."""
+        xy = np.asarray(xy_mm, dtype=np.float64)
+        x, y, by_press_x, by_press_y = (self._displacement(part, xy) for part in (0, 1, 3, 4))
+        z = self._displacement(2, xy + np.stack([by_press_x, by_press_y], axis=1))
+        return np.stack([xy[:, 0] + x, xy[:, 1] + y, z], axis=1)
+
+    def _displacement(self, part: int, xy_mm: Array) -> Array:
+        """(N,) mm: one of the splines at points (N, 2) mm."""
         from scipy.ndimage import map_coordinates
 
-        xy = np.asarray(xy_mm, dtype=np.float64)
-        column = (xy[:, 0] - self.grid.x_mm[0]) / self.grid.step_mm
-        row = (xy[:, 1] - self.grid.y_mm[0]) / self.grid.step_mm
-        xyz = np.empty((len(xy), 3))
-        for axis in range(3):
-            xyz[:, axis] = map_coordinates(
-                self.coefficients[axis], np.stack([row, column]), order=3, mode="constant", prefilter=False
+        column = (xy_mm[:, 0] - self.grid.x_mm[0]) / self.grid.step_mm
+        row = (xy_mm[:, 1] - self.grid.y_mm[0]) / self.grid.step_mm
+        return np.asarray(
+            map_coordinates(
+                self.coefficients[part], np.stack([row, column]), order=3, mode="constant", prefilter=False
             )
-        xyz[:, :2] += xy
-        return xyz
+        )
 
 
-def make_relief(contact: Contact) -> Relief:
-    """The spline of a contact's displacement, which falls to zero around the solved area."""
+def make_relief(contact: Contact, displacement_mm: Array, by_press_mm: Array) -> Relief:
+    """The splines of a contact's displacement (ny, nx, 3) and of the press's part (ny, nx, 2) of it."""
     from scipy.ndimage import spline_filter
 
     step = float(contact.x_mm[1] - contact.x_mm[0])
@@ -89,7 +112,8 @@ def make_relief(contact: Contact) -> Relief:
     rim_cells = len(ramp)
     ny, nx = contact.in_contact.shape
     fade = np.outer(*(np.concatenate([ramp, np.ones(n), ramp[::-1]]) for n in (ny, nx)))
-    padded = [np.pad(contact.displacement_mm[..., axis], rim_cells, mode="edge") * fade for axis in range(3)]
+    parts = np.concatenate([displacement_mm, by_press_mm], axis=2)
+    padded = [np.pad(parts[..., part], rim_cells, mode="edge") * fade for part in range(parts.shape[2])]
     outside_mm = step * (np.arange(rim_cells) + 1)
     grid = ContactGrid(
         np.concatenate([contact.x_mm[0] - outside_mm[::-1], contact.x_mm, contact.x_mm[-1] + outside_mm]),

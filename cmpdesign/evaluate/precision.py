@@ -14,12 +14,12 @@ from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surfa
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0  # press, and largest distance from the pattern's middle in x and y
 METHODS = cube.COMPARED_METHODS
-EDGE_MODES = ("press", "press_shear")
+EDGE_MODES = ("press", "press_diagonal", "press_turned", "press_shear")
 MEASURES = (
     "surface_rms_mm", "depth_rms_mm", "marker_rms_mm", "marker_median_mm", "over_sigma", "over_sigma_median",
     "covered", "measured",
 )  # fmt: skip
-VARIANTS = ("read", "with_virtual", "perfect")
+VARIANTS = ("read", "with_virtual", "perfect", "perfect_with_virtual")
 
 
 def trials(options: RunOptions) -> list[Trial]:
@@ -95,7 +95,7 @@ def summarise_edge_errors(results: Sequence[Mapping[str, Any]], mode: str) -> di
         errors = edge_errors_mm(results, method, "read")
         document[method] = round_for_json(sample_statistics(errors).mean)
     document["change_percent"] = article.change_percent(document["square"], document["multicolor"])
-    document["article_change_percent"] = article.EDGE_ERROR_CHANGE_PERCENT[mode]
+    document["article_change_percent"] = article.EDGE_ERROR_CHANGE_PERCENT.get(mode)
     document["distribution"] = {
         method: {
             "error": sample_statistics(edge_errors_mm(results, method, "read")).to_json(),

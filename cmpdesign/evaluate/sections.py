@@ -21,9 +21,9 @@ DIFFERENCES = (
     "by far more than linear theory predicts well.",
 )
 DIFFERENCES_PRECISION = (
-    "A press is seen alike: the square pattern's markers stand in rows 1.5 mm apart, the triangles' rows "
-    "are staggered, so that their edge points come nearer to the cube's edges. Read without any error, "
-    "they would show the same.",
+    "The cube's side is ten pitches of the square pattern. Where the cube lies along the square pattern's rows, a "
+    "whole row is missed at once. Turned at random, the patterns differ by much less, and virtual markers take most of "
+    "what is left. The change of the aligned cube says nothing of how finely a pattern resolves an edge.",
     "Under a shear the bonded layer drags its surroundings along: half of the largest movement in y lies "
     "millimetres outside the cube's face, whatever the pattern. Edge points chosen by their depth lie "
     "under the face again.",
@@ -168,7 +168,7 @@ def _change_rows(cases: Document) -> list[Sequence[str]]:
 
 
 def _edge_section(edges: Document) -> Section:
-    rows = _change_rows({mode.replace("_", " + "): entry for mode, entry in edges.items()})
+    rows = _change_rows({MODES[mode]: entry for mode, entry in edges.items()})
     table = Table(
         "Edge fitting error, mm: by how much the fitted square's side misses 15 mm, mean over the places.",
         ("mode", "square", "multicolor", "change", "the article"),
@@ -185,16 +185,24 @@ def _edge_section(edges: Document) -> Section:
         [
             "A cube of 15 mm presses by 1 mm, or presses by 1 mm and shears by 1 mm in y, at ten places 4 mm apart. "
             "Markers that move by more than half of the largest displacement (in z, or along the shear) are its edge "
-            "points; the square around them, lying as the cube does, has the larger of their width and height."
+            "points; the square around them, lying as the cube does, has the larger of their width and height. It "
+            "lies along the square pattern's rows, diagonal to them (45 degrees), or turned at random."
         ],
         tables=[table],
         plots=[Plot("Every place's error, and the means.", plots.plot_values(sides, "error, mm"))],
     )
 
 
+MODES = {
+    "press": "press",
+    "press_diagonal": "press, turned by 45 degrees",
+    "press_turned": "press, turned at random",
+    "press_shear": "press + shear",
+}
 VARIANTS = {
     "with_virtual": "virtual markers too",
     "perfect": "markers read without error",
+    "perfect_with_virtual": "virtual markers too, read without error",
     "mean_extent": "mean of width and height",
     "by_depth": "edge points by depth",
 }

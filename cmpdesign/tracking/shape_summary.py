@@ -23,10 +23,16 @@ class _LargestDisplacement(NamedTuple):
 
 
 class ShapeStatistics:
-    """The statistics of a reconstructor's frames."""
+    """The statistics of a reconstructor's frames.
 
-    def __init__(self, reconstructor: Reconstructor) -> None:
+    Args:
+        reconstructor: what reconstructs them.
+        marker_depth_mm: depth of the pattern below the touched surface; None: not known.
+    """
+
+    def __init__(self, reconstructor: Reconstructor, marker_depth_mm: float | None = None) -> None:
         self._reconstructor = reconstructor
+        self._marker_depth_mm = marker_depth_mm
         self._present = reconstructor.layout.present
         self._elapsed_ms: list[float] = []
         self._statuses: Counter[str] = Counter()
@@ -104,5 +110,6 @@ class ShapeStatistics:
             ],
             "model_px": self._reconstructor.model_px,
             "warnings": list(self._reconstructor.warnings),
+            "positions": {"of": "pattern", "depth_mm": self._marker_depth_mm},
             "largest_displacement": None if self._largest.frame < 0 else self._largest._asdict(),
         }

@@ -119,6 +119,7 @@ def _points_in(layout: Reference) -> int:
 
 def _prepare_run(options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
+    from cmpdesign.tracking.marker_depth import read_marker_depth_mm
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
@@ -126,7 +127,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     from cmpdesign.tracking.sources import open_sources
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
-    rig = load_rig(options.rig)
+    rig, depth_mm = load_rig(options.rig), read_marker_depth_mm(options.rig)
     if options.from_rest:
         rig = rig.without_poses()
     views = ViewExtractor(load_layout(options.layout), rig, "accurate", options.response)
@@ -140,7 +141,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     sink = open_sink(options.output, ShapeTable(reconstructor))
     tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
     source = open_sources(options.source, options.fps, options.max_pixels)
-    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor))
+    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm))
 
 
 def _read_rest_image(options: _Options) -> Any:
@@ -174,6 +175,15 @@ def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
     return [summary_path(output)]
 
 
+def _describe_positions(depth_mm: float | None) -> str:
+    """Of what the positions are: what the cameras see is the pattern, wherever it lies."""
+    if depth_mm is None:
+        return "of the pattern; RIG does not say how far below the touched surface it lies"
+    if depth_mm == 0:
+        return "of the pattern, which RIG puts on the touched surface"
+    return f"of the pattern, {depth_mm:g} mm below the touched surface; not of that surface"
+
+
 def _print_summary(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
@@ -185,6 +195,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         "views": "; ".join(f"{view['name']} {view['rms_px']:.3f} px at rest" for view in summary["views"]),
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in summary["marker_shares"].items()),
     }
+    rows["positions"] = _describe_positions(summary["positions"]["depth_mm"])
     if summary["lost_markers"]:
         lost = summary["lost_markers"].items()
         rows["not reported"] = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in lost)

@@ -105,6 +105,26 @@ class ComplianceOperator:
         return np.asarray(irfft(along, n=self.padded[1], axis=2, workers=1)[:, :, :columns])
 
 
+def interior_displacement_mm(green: GreenKernels, traction_mpa: Array) -> Array:
+    """Displacement (3, rows, columns) in mm at the kernels' depth, of a traction (3, rows, columns) in MPa."""
+    from scipy.fft import irfft2, next_fast_len, rfft2
+
+    shape = traction_mpa.shape[1:]
+    padded = tuple(int(next_fast_len(n + min(n, green.reach), real=True)) for n in shape)
+
+    def spectrum(kernel: Array, odd_y: bool = False, odd_x: bool = False) -> Spectrum:
+        return np.asarray(rfft2(_wrap_kernel(kernel, padded, odd_y, odd_x), workers=1))
+
+    x, y, z = rfft2(traction_mpa, s=padded, workers=1)
+    across = spectrum(green.xy, True, True)
+    waves = (
+        spectrum(green.xx) * x + across * y + spectrum(green.xz, odd_x=True) * z,
+        across * x + spectrum(green.yy) * y + spectrum(green.yz, odd_y=True) * z,
+        spectrum(green.zz) * z - spectrum(green.zx, odd_x=True) * x - spectrum(green.zy, odd_y=True) * y,
+    )
+    return np.stack([irfft2(wave, s=padded, workers=1)[: shape[0], : shape[1]] for wave in waves])
+
+
 def _eigenvalue_bound(spectra: KernelSpectra) -> float:
     """An upper bound of all eigenvalues in mm/MPa: of the in-plane block, then of this block with z."""
     xx, yy, zz, xy, xz, yz = spectra

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact.elastic_layer.green import green_kernels
-from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
+from cmpdesign.contact.elastic_layer.operator import ComplianceOperator, interior_displacement_mm
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.friction.admissible import CoulombTractions, PressureTractions
 from cmpdesign.contact.friction.quadratic_program import minimise
@@ -70,6 +70,7 @@ class ContactState:
         motion: the object's motion from its first touch.
         traction_mpa, displacement_mm: (3, ny, nx) float64.
         press_displacement_mm: (2, ny, nx) lateral displacement by the press alone.
+        press_traction_mpa: (3, ny, nx) the tractions that make it.
         limit_mpa: (ny, nx) the friction limit.
         iterations: how often the elastic layer's response was computed.
         residual_mm: RMS of the remaining gap.
@@ -79,6 +80,7 @@ class ContactState:
     traction_mpa: Array
     displacement_mm: Array
     press_displacement_mm: Array
+    press_traction_mpa: Array
     limit_mpa: Array
     iterations: int = 0
     residual_mm: float = 0.0
@@ -125,11 +127,17 @@ class ContactProblem:
         whole = self.operator(CellBox(slice(0, rows), slice(0, columns)))
         return whole(traction_mpa.astype(np.float32)).astype(np.float64)
 
+    def interior_displacement_mm(self, traction_mpa: Array) -> Array:
+        """Displacement (3, ny, nx) at the pattern's depth, for a depth above 0."""
+        depth_mm = self.elastomer.marker_depth_mm
+        kernels = green_kernels(self.elastomer, self.grid.step_mm, max(self.grid.shape), depth_mm)
+        return interior_displacement_mm(kernels, traction_mpa)
+
 
 def state_without_contact(motion: Motion, shape: tuple[int, int]) -> ContactState:
     """The state of the flat surface; ``shape`` is the grid's (ny, nx)."""
     zeros = np.zeros((3, *shape))
-    return ContactState(motion, zeros, zeros, zeros[:2], zeros[0])
+    return ContactState(motion, zeros, zeros, zeros[:2], zeros, zeros[0])
 
 
 def solve_increment(problem: ContactProblem, state: ContactState, motion: Motion) -> ContactState:
@@ -206,14 +214,16 @@ def _solve_in_box(
         limit[box] = solution.limit_mpa
         applications += solution.operator_applications
     displacement = problem.surface_displacement_mm(solution.traction_mpa)
-    by_press = state.press_displacement_mm
+    by_press, press_traction = state.press_displacement_mm, state.press_traction_mpa
     if is_press:
         by_press = by_press + (displacement - state.displacement_mm)[:2]
+        press_traction = press_traction + (solution.traction_mpa - state.traction_mpa)
     solved = ContactState(
         motion,
         solution.traction_mpa,
         displacement,
         by_press,
+        press_traction,
         limit,
         state.iterations + applications,
         solution.residual_gap_mm,

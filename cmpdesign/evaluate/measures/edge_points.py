@@ -49,15 +49,21 @@ def circumscribed_square_mm(xy_mm: Points, turn_deg: float = 0.0) -> float | Non
     The points' width and height along the object's axes differ, because of the pattern's spacing. The circumscribed
     square has the larger of both.
     """
-    if not len(xy_mm):
-        return None
-    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-    return float(np.ptp(xy_mm @ np.array([[cos, -sin], [sin, cos]]), axis=0).max())
+    extents = _extents_mm(xy_mm, turn_deg)
+    return float(extents.max()) if len(xy_mm) else None
 
 
-def mean_extent_mm(xy_mm: Points) -> float | None:
+def mean_extent_mm(xy_mm: Points, turn_deg: float = 0.0) -> float | None:
     """The mean of the points' width and height, a variant of the fitted square; None without points."""
-    return float(np.ptp(xy_mm, axis=0).mean()) if len(xy_mm) else None
+    return float(_extents_mm(xy_mm, turn_deg).mean()) if len(xy_mm) else None
+
+
+def _extents_mm(xy_mm: Points, turn_deg: float) -> Points:
+    """(2,) mm: width and height of points (K, 2) mm along the object's axes; zeros without points."""
+    if not len(xy_mm):
+        return np.zeros(2)
+    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    return np.asarray(np.ptp(xy_mm @ np.array([[cos, -sin], [sin, cos]]), axis=0))
 
 
 def shear_response(points: EdgePoints, shear_mm: float) -> float | None:

@@ -77,15 +77,18 @@ def solve_contact(sensor_text: str, load: ContactLoad) -> Contact:
 
 @dataclass(frozen=True, eq=False)
 class PlacedSurface:
-    """A surface with a contact at ``centre_mm``: maps (N, 2) mm to (N, 3) mm."""
+    """A surface with a contact at ``centre_mm``, turned counter-clockwise: maps (N, 2) mm to (N, 3) mm."""
 
     surface_at_origin: Callable[[Points], Points]
     centre_mm: tuple[float, float]
+    turn_deg: float = 0.0
 
     def __call__(self, xy_mm: Points, /) -> Points:
         offset = np.asarray(self.centre_mm)
-        found = self.surface_at_origin(np.asarray(xy_mm) - offset)
-        found[:, :2] += offset
+        cos, sin = np.cos(np.radians(self.turn_deg)), np.sin(np.radians(self.turn_deg))
+        turned_back = np.array([[cos, -sin], [sin, cos]])
+        found = self.surface_at_origin((np.asarray(xy_mm) - offset) @ turned_back)
+        found[:, :2] = found[:, :2] @ turned_back.T + offset
         return found
 
     def displacement_mm(self, xy_mm: Points) -> Points:
@@ -101,9 +104,11 @@ def _flat_surface(xy_mm: Points) -> Points:
 
 @lru_cache(maxsize=16)
 def _contact_relief(sensor_text: str, load: ContactLoad) -> Callable[[Points], Points]:
-    return solve_contact(sensor_text, load).surface() if load.object != REST else _flat_surface
+    return solve_contact(sensor_text, load).marker_layer() if load.object != REST else _flat_surface
 
 
-def place_surface(sensor_text: str, load: ContactLoad, centre_mm: tuple[float, float]) -> PlacedSurface:
-    """The surface under a load at a position."""
-    return PlacedSurface(_contact_relief(sensor_text, load), centre_mm)
+def place_surface(
+    sensor_text: str, load: ContactLoad, centre_mm: tuple[float, float], turn_deg: float = 0.0
+) -> PlacedSurface:
+    """The pattern under a load at a position, turned counter-clockwise: the layer is the same in all directions."""
+    return PlacedSurface(_contact_relief(sensor_text, load), centre_mm, turn_deg)

@@ -46,6 +46,15 @@ class ElastomerTable(_StrictTable):
     thickness_mm: Positive
     young_mpa: Positive
     poisson: float = Field(0.5, ge=0, le=0.5)
+    marker_depth_mm: float = Field(0.0, ge=0)
+
+    @model_validator(mode="after")
+    def _within(self) -> ElastomerTable:
+        if self.marker_depth_mm >= self.thickness_mm:
+            raise ValueError(
+                f"marker_depth_mm is {self.marker_depth_mm:g}; it must be below thickness_mm, {self.thickness_mm:g}"
+            )
+        return self
 
 
 class ContactTable(_StrictTable):
@@ -188,7 +197,7 @@ class SimulatedSensor:
         from cmpdesign.contact import Elastomer
 
         table = self.table.elastomer
-        return Elastomer(table.thickness_mm, table.young_mpa, table.poisson)
+        return Elastomer(table.thickness_mm, table.young_mpa, table.poisson, table.marker_depth_mm)
 
     def pattern(self, method: str) -> Mapping[str, Any]:
         """The design of ``square`` or ``multicolor``.

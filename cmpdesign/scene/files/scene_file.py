@@ -88,7 +88,7 @@ class SceneFile:
                 contact = next(contacts, None)
                 parts = list(_make_deformations(tables.surface, self.document))
                 if contact is not None:
-                    parts.append(contact.surface())
+                    parts.append(contact.marker_layer())
                 yield Scene(
                     **_make_parts(tables, self),
                     surface=composed(*parts) if parts else None,

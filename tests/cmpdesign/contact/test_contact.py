@@ -183,6 +183,36 @@ def test_twist_of_a_stuck_punch_is_reissner_and_sagoci() -> None:
         assert np.concatenate([found.force_n, found.moment_nmm])[got] == pytest.approx(wanted, rel=0.015)
 
 
+def test_torque_of_a_far_twist_is_what_the_support_takes() -> None:
+    """Arms and tractions of one frame, the flat layer's: near 16 / 3 mu a^3 sin(twist) for a stuck punch."""
+    found = solve(
+        Elastomer(THICK, 1.0),
+        Punch(1.0),
+        Motion(0.05, twist_deg=30.0),
+        friction=math.inf,
+        size_mm=(2.5, 2.5),
+        grid=64,
+    )
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
+    area = (found.x_mm[1] - found.x_mm[0]) ** 2
+    torque = float(np.sum(x * found.traction_mpa[..., 1] - y * found.traction_mpa[..., 0])) * area
+    assert found.moment_nmm[2] == pytest.approx(torque, rel=1e-4)
+    assert torque == pytest.approx(16 / 9 * math.sin(math.radians(30.0)), rel=0.15)
+
+
+def test_moment_is_about_the_object_where_it_is() -> None:
+    """Stuck and sheared by half its radius, a punch takes its load along; without friction it slides to a new load."""
+    for friction in (math.inf, 0.0):
+        found, pressed = (
+            solve(LAYER, Punch(2.0, 0.5), motion, friction=friction, size_mm=(14, 14), grid=56, steps=2)
+            for motion in (Motion(0.3, (0.0, 1.0)), Motion(0.3))
+        )
+        lever_mm = np.abs(found.moment_nmm[:2]) / -found.force_n[2]
+        assert lever_mm[1] < 1e-3, "nothing turns it about y"
+        assert np.abs(pressed.moment_nmm).max() < 1e-3 * -pressed.force_n[2]
+        assert lever_mm[0] < (1e-3 if friction == 0 else 0.8)
+
+
 def test_twist_is_counter_clockwise_and_far_twists_slip() -> None:
     found = solve(
         LAYER, Ball(8.0, centre_mm=(1.0, -2.0)), Motion(0.5, twist_deg=10), size_mm=(16, 16), grid=64
@@ -277,14 +307,61 @@ def test_surface_is_the_displacement_between_and_zero_far_away() -> None:
     surface = found.surface()
     x, y = np.meshgrid(found.x_mm, found.y_mm)
     nodes = np.stack([x.ravel(), y.ravel()], axis=1)
-    moved = surface(nodes) - np.concatenate([nodes, np.zeros((len(nodes), 1))], axis=1)
-    np.testing.assert_allclose(moved, found.displacement_mm.reshape(-1, 3), atol=1e-9)
+    moved = surface(nodes)[:, :2] - nodes
+    np.testing.assert_allclose(moved, found.displacement_mm[..., :2].reshape(-1, 2), atol=1e-9)
     far = np.array([[40.0, 0.0], [-9.0, 300.0]])
     np.testing.assert_allclose(surface(far), [[40, 0, 0], [-9, 300, 0]], atol=1e-12)
     line = np.stack([np.linspace(-16, 16, 4001), np.full(4001, 0.7)], axis=1)
     step = np.diff(surface(line), axis=0)[:, 1:]
     assert np.abs(np.diff(step, axis=0)).max() < 2e-4, "no jumps and no kinks, beyond the solved area neither"
     assert surface(np.empty((0, 2))).shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("friction", "motion", "lost"),
+    [(0.0, Motion(0.8), 0.005), (0.5, Motion(0.8), 0.005), (1.0, Motion(0.8, twist_deg=30.0), 0.02)],
+)
+def test_surface_touches_the_object_and_keeps_its_volume(
+    friction: float, motion: Motion, lost: float
+) -> None:
+    """Where it presses, the surface lies on the ball, at the points' places in space; what is dented bulges up.
+
+    The solved area ends where some bulge is left: as much as linear theory has there.
+    """
+    ball = Ball(10.0)
+    found = solve(LAYER, ball, motion, friction=friction, size_mm=(44, 44), grid=176)
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
+    moved = found.surface()(np.stack([x.ravel(), y.ravel()], axis=1)).reshape(*x.shape, 3)
+    touching = found.in_contact & (np.hypot(x, y) < 0.9 * np.hypot(x, y)[found.in_contact].max())
+    on_ball = ball.height_mm(moved[..., 0], moved[..., 1]) - motion.press_mm
+    assert np.abs(moved[..., 2] - on_ball)[touching].max() < 0.003
+    step = found.x_mm[1] - found.x_mm[0]
+    x_y, x_x = np.gradient(moved[..., 0], step)
+    y_y, y_x = np.gradient(moved[..., 1], step)
+    volume = moved[..., 2] * (x_x * y_y - x_y * y_x)
+    beyond = -found.displacement_mm[..., 2].sum()
+    assert abs(volume.sum() + beyond) < lost * -volume[volume < 0].sum()
+
+
+def test_pattern_at_the_surface_is_the_surface_and_below_it_moves_as_the_layer_does() -> None:
+    """The depth changes nothing but where the pattern is; near the support little moves."""
+    from dataclasses import replace
+
+    motion = Motion(0.6, (0.3, 0.0))
+    at_surface = solve(LAYER, Ball(8.0), motion, size_mm=(16, 12), grid=64)
+    np.testing.assert_array_equal(at_surface.marker_displacement_mm, at_surface.displacement_mm)
+    largest = []
+    for depth in (0.001, 1.0, 3.9):
+        found = solve(replace(LAYER, marker_depth_mm=depth), Ball(8.0), motion, size_mm=(16, 12), grid=64)
+        np.testing.assert_array_equal(found.displacement_mm, at_surface.displacement_mm)
+        np.testing.assert_array_equal(found.traction_mpa, at_surface.traction_mpa)
+        largest.append(np.abs(found.marker_displacement_mm).max())
+        points = np.array([[0.0, 0.0], [2.0, 1.0]])
+        moved = found.marker_layer()(points)
+        assert np.abs(moved[:, :2] - points).max() <= largest[-1] * 1.01
+        if depth == 0.001:
+            np.testing.assert_allclose(found.marker_displacement_mm, at_surface.displacement_mm, atol=0.002)
+    assert largest[0] > 1.2 * largest[1] > 20 * largest[2] > 0
 
 
 def test_sliding_contact_moves_on() -> None:

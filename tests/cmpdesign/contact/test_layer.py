@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from cmpdesign.contact import ContactError, Elastomer
 from cmpdesign.contact.elastic_layer.green import KERNEL_REACH_THICKNESSES, green_kernels
-from cmpdesign.contact.elastic_layer.kernels import layer_compliances
+from cmpdesign.contact.elastic_layer.kernels import interior_compliances, layer_compliances
 from cmpdesign.contact.elastic_layer.operator import ComplianceOperator
 
 Array = NDArray[np.float64]
 POISSONS = (0.0, 0.25, 0.3, 0.45, 0.49, 0.4999)
 
 
-def four_equations(kh: float, nu: float) -> tuple[float, float, float]:
-    """zz, xz, ll for h = mu = 1 from two harmonic and two Papkovich-Neuber waves, one pair from each face."""
+def four_equations(kh: float, nu: float, depth: float = 0.0) -> tuple[float, float, float, float]:
+    """zz, xz, ll, zx for h = mu = 1 from two harmonic and two Papkovich-Neuber waves, one pair from each face."""
     k, lame = kh, 2 * nu / (1 - 2 * nu)
 
     def wave(sign: int, at: float, z: float, kind: int) -> tuple[float, float, float, float]:
@@ -36,20 +36,65 @@ def four_equations(kh: float, nu: float) -> tuple[float, float, float]:
         u, w, u_z, w_z = wave(sign, at, 0.0, kind)
         matrix[2, column] = (lame + 2) * w_z - lame * k * u
         matrix[3, column] = u_z + k * w
-    top = np.array([wave(sign, at, 0.0, kind)[:2] for sign, at, kind in waves]).T
-    u_of_tz, w_of_tz = top @ np.linalg.solve(matrix, [0, 0, 1, 0])
+    here = np.array([wave(sign, at, -depth, kind)[:2] for sign, at, kind in waves]).T
+    u_of_tz, w_of_tz = here @ np.linalg.solve(matrix, [0, 0, 1, 0])
     # t_x = i times the unit load makes u_x = i U, so U is the compliance along.
-    u_of_tx, w_of_tx = top @ np.linalg.solve(matrix, [0, 0, 0, 1])
-    assert w_of_tx == pytest.approx(u_of_tz, rel=1e-6, abs=1e-12 / k)
-    return float(w_of_tz), float(u_of_tz), float(u_of_tx)
+    u_of_tx, w_of_tx = here @ np.linalg.solve(matrix, [0, 0, 0, 1])
+    if depth == 0:
+        assert w_of_tx == pytest.approx(u_of_tz, rel=1e-6, abs=1e-12 / k)
+    return float(w_of_tz), float(u_of_tz), float(u_of_tx), float(w_of_tx)
 
 
 @pytest.mark.parametrize("nu", POISSONS)
 def test_closed_form_solves_the_four_equations(nu: float) -> None:
     for kh in (0.03, 0.3, 1.0, 3.0, 30.0, 699.0, 1e4):
         c = layer_compliances(np.array([kh]), Elastomer(1.0, 2 * (1 + nu), nu))
-        found = (c.zz[0], c.xz[0], c.ll[0])
+        found = (c.zz[0], c.xz[0], c.ll[0], c.zx[0])
         np.testing.assert_allclose(found, four_equations(kh, nu), rtol=1e-6, atol=1e-9 / max(kh, 1))
+
+
+@pytest.mark.parametrize("nu", POISSONS)
+def test_interior_solves_the_four_equations(nu: float) -> None:
+    for kh in (0.03, 0.3, 1.0, 3.0, 30.0, 300.0):
+        for depth in (0.01, 0.2, 0.5, 0.97):
+            c = interior_compliances(np.array([kh]), Elastomer(1.0, 2 * (1 + nu), nu), depth)
+            found = (c.zz[0], c.xz[0], c.ll[0], c.zx[0])
+            np.testing.assert_allclose(
+                found, four_equations(kh, nu, depth), rtol=1e-5, atol=1e-9 / max(kh, 1)
+            )
+
+
+@pytest.mark.parametrize("nu", (*POISSONS, 0.5))
+def test_interior_is_the_surface_at_depth_0_and_at_rest_at_the_support(nu: float) -> None:
+    k = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 50)])
+    elastomer = Elastomer(2.0, 1.0, nu)
+    surface = layer_compliances(k, elastomer)
+    for one, other in zip(interior_compliances(k, elastomer, 0.0), surface, strict=True):
+        assert (np.abs(one - other) < 1e-11 * surface.ll).all()
+    for values in interior_compliances(k, elastomer, 2.0):
+        assert np.abs(values).max() == 0
+
+
+@pytest.mark.parametrize("nu", (*POISSONS, 0.5))
+def test_interior_of_a_thick_layer_is_that_of_the_half_space(nu: float) -> None:
+    """Boussinesq's and Cerruti's solutions, wave by wave."""
+    mu, k, depth = 3.0, np.array([0.5, 3.0, 20.0]), 0.3
+    c = interior_compliances(k, Elastomer(1e3, 2 * mu * (1 + nu), nu), depth)
+    y = k * depth
+    decay = np.exp(-y) / (2 * mu * k)
+    np.testing.assert_allclose(c.zz, decay * (2 - 2 * nu + y), rtol=1e-9)
+    np.testing.assert_allclose(c.ll, decay * (2 - 2 * nu - y), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(c.xz, decay * (y - 1 + 2 * nu), rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(c.zx, -decay * (y + 1 - 2 * nu), rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(c.sh, 2 * decay, rtol=1e-12)
+
+
+def test_interior_keeps_the_volume_below_it_and_uniform_loads_their_strain() -> None:
+    k = np.array([0.0])
+    below = interior_compliances(k, Elastomer(2.0, 3.0), 0.5)
+    assert below.zz[0] == 0 and below.ll[0] == below.sh[0] == pytest.approx(1.5)
+    drained = interior_compliances(k, Elastomer(2.0, 2.0, 0.0), 0.5)
+    assert drained.zz[0] == pytest.approx(1.5 / 2.0)
 
 
 @pytest.mark.parametrize("nu", (*POISSONS, 0.5))
@@ -222,8 +267,10 @@ def test_fourier_sum_is_the_plain_sum() -> None:
         ((1.0, float("nan"), 0.5), "young_mpa is nan"),
         ((1.0, 1.0, 0.51), "poisson is 0.51; it must be from 0 to 0.5"),
         ((1.0, 1.0, -0.1), "poisson is -0.1"),
+        ((1.0, 1.0, 0.5, 1.0), "marker_depth_mm is 1; it must be from 0 to below thickness_mm, 1"),
+        ((1.0, 1.0, 0.5, -0.1), "marker_depth_mm is -0.1"),
     ],
 )
-def test_impossible_layers(values: tuple[float, float, float], words: str) -> None:
+def test_impossible_layers(values: tuple[float, ...], words: str) -> None:
     with pytest.raises(ContactError, match=words):
         Elastomer(*values)

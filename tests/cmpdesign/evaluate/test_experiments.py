@@ -16,7 +16,7 @@ from cmpdesign.cli import app
 from cmpdesign.evaluate.measures.pressed_cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
 from cmpdesign.evaluate.reliability import METHODS, is_successful, judge_places
 from cmpdesign.evaluate.simulated.conditions import mean_conditions, sample_conditions
-from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface
+from cmpdesign.evaluate.simulated.contacts import ContactLoad, PlacedSurface, place_surface
 from cmpdesign.evaluate.simulated.instrument import instrument_for_method
 from cmpdesign.evaluate.simulated.sensor import SensorError, load_sensor, parse_sensor
 from tests.support.sensors import small_sensor_text
@@ -80,6 +80,14 @@ def test_reliability(sensor_file: Path, tmp_path: Path) -> None:
     assert "other conditions" in evaluate(*arguments[:-1], 6, code=2)
 
 
+def test_a_turned_contact_is_the_contact_turned() -> None:
+    """Turned by a quarter, what moved along x moves along y."""
+    slope = PlacedSurface(lambda xy: np.column_stack([xy + [[0.1, 0.0]], 0.01 * xy[:, 0]]), (1.0, 2.0))
+    turned = PlacedSurface(slope.surface_at_origin, (1.0, 2.0), 90.0)
+    np.testing.assert_allclose(slope.displacement_mm(np.array([[4.0, 2.0]])), [[0.1, 0, 0.03]], atol=1e-12)
+    np.testing.assert_allclose(turned.displacement_mm(np.array([[1.0, 5.0]])), [[0, 0.1, 0.03]], atol=1e-12)
+
+
 def test_precision(sensor_file: Path, tmp_path: Path) -> None:
     evaluate("precision", "-o", tmp_path, "--trials", 1, "--workers", 1, "--sensor", sensor_file)
     document = report(tmp_path)
@@ -88,6 +96,11 @@ def test_precision(sensor_file: Path, tmp_path: Path) -> None:
         assert one["article_change_percent"] == change
         assert all(isinstance(one[method], float) for method in ("square", "multicolor"))
         assert one["change_percent"] == pytest.approx(100 * (one["multicolor"] / one["square"] - 1), abs=0.01)
+    edges = document["edge_fit_error_mm"]
+    assert list(edges) == ["press", "press_diagonal", "press_turned", "press_shear"]
+    for mode in ("press_diagonal", "press_turned"):
+        assert edges[mode]["article_change_percent"] is None
+        assert set(edges[mode]["variants"]) >= {"with_virtual", "perfect", "perfect_with_virtual"}
     assert list(document["shape_error_mm"]) == ["rest", "ball", "ring", "cylinder", "rib", "wedge"]
     for methods in document["shape_error_mm"].values():
         assert methods["multicolor"]["measured"]["mean"] > 0.5

@@ -291,6 +291,20 @@ def test_a_contact_is_pressed_into_the_surface(written, layout: Layout) -> None:
     assert deep.warnings and render(deep, size=SIZE).warnings == deep.warnings
 
 
+def test_a_pattern_below_the_touched_surface_moves_as_the_layer_does_there(written, layout: Layout) -> None:  # type: ignore[no-untyped-def]
+    from cmpdesign.contact import Ball, Elastomer, Motion, solve
+
+    deep = Elastomer(2, 0.2, marker_depth_mm=0.5)
+    contact = solve(deep, Ball(3.0), Motion(0.1), friction=0.5, size_mm=(8, 8), grid=32)
+    text = BALL.replace("young_mpa = 0.2", "young_mpa = 0.2, marker_depth_mm = 0.5")
+    assert text != BALL
+    surface = written(text).scene().surface
+    assert surface is not None
+    moved = surface(layout.marker_xy_mm)
+    np.testing.assert_allclose(moved, contact.marker_layer()(layout.marker_xy_mm), atol=1e-9)
+    assert -0.07 < surface(np.zeros((1, 2)))[0, 2] < -0.02
+
+
 def test_a_moving_contact_remembers_its_way(written, layout: Layout) -> None:  # type: ignore[no-untyped-def]
     """Pressed, dragged to the side and back: friction leaves a part of the drag behind."""
     way = (

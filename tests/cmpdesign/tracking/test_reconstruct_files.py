@@ -148,6 +148,7 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     assert summary["frames"] == {
         "declared": 4, "read": 4, "tracked": 3, "lost": 1, "unreadable": 0, "other_size": 0
     }  # fmt: skip
+    assert summary["positions"] == {"of": "pattern", "depth_mm": None}
     assert summary["marker_shares"] == {"measured": 0.75, "repaired": 0.0, "lost": 0.25}
     assert summary["lost_markers"] == {"one_view": MARKERS}
     assert 0.1 < summary["sigma_um"][2] < 2 and summary["largest_displacement"]["mm"] == pytest.approx(
