@@ -1,0 +1,113 @@
+"""The trial of one rule: pictures read by a copy of the reader without it, and their scores."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
+from benchmarks.suites.ablation.rules import Rule
+from benchmarks.suites.ablation.worker import Reading
+from benchmarks.support.code_copy import ROOT, copy_package, replace_text
+from extractor import Status
+
+WRONG_POSITION, SAME_PLACE = (
+    0.5,
+    0.3,
+)  # in the shortest edges: beyond it a position is wrong; at a marker's place
+
+
+class PictureScore(NamedTuple):
+    """Counts of markers in one picture.
+
+    Attributes:
+        wrong_ids: reported at the place of another marker, or in a picture without a pattern.
+        wrong_positions: reported more than half of the shortest edge from their place, but at no other's.
+        lost: visible, not reported.
+        visible: visible ones.
+        measured: measured, not wrong.
+        squared_px2: the sum of their squared errors, both axes.
+        ms: processor time; NaN after an exception.
+    """
+
+    wrong_ids: int
+    wrong_positions: int
+    lost: int
+    visible: int
+    measured: int
+    squared_px2: float
+    ms: float
+
+    @property
+    def wrong(self) -> int:
+        """Wrong ids and wrong positions."""
+        return self.wrong_ids + self.wrong_positions
+
+
+def read_without(rule: Rule | None, pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
+    """The scores of the pictures, read by a copy of the reader without the rule; None is the full reader.
+
+    Raises:
+        ValueError: the rule's text does not occur exactly once.
+        RuntimeError: the copy cannot be run.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        root = Path(name)
+        copy_package("extractor", root)
+        if rule is not None:
+            replace_text(rule.module, rule.text, rule.without, root)
+        command = [sys.executable, "-m", "benchmarks.suites.ablation.worker", name, preset, str(root / "out")]
+        paths = os.pathsep.join((name, str(ROOT)))
+        result = subprocess.run(
+            [*command, *(str(picture.path) for picture in pictures)],
+            cwd=root,
+            env={**os.environ, "PYTHONPATH": paths},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode != 0:
+            raise RuntimeError(f"without {rule.name if rule else 'any change'}: {result.stderr[-2000:]}")
+        readings = [Reading(*entry) for entry in pickle.loads((root / "out").read_bytes())]
+    return [
+        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
+    ]
+
+
+def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:
+    """The score of a reading against the pattern in the picture that it is nearest to."""
+    reported = reading.status != Status.LOST
+    if not truths:
+        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, reading.ms)
+    scores = [_score_pattern(reading, truth) for truth in truths]
+    return min(scores, key=lambda score: (score.wrong, score.lost))
+
+
+def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
+    reported = reading.status != Status.LOST
+    error_px = np.linalg.norm(reading.xy_px - truth.xy_px, axis=1)
+    wrong = reported & ~(error_px <= WRONG_POSITION * truth.edge_px)
+    known = np.flatnonzero(np.isfinite(truth.xy_px).all(axis=1))
+    wrong_ids = 0
+    for marker in np.flatnonzero(wrong):
+        distance_px = np.linalg.norm(truth.xy_px[known] - reading.xy_px[marker], axis=1)
+        nearest = known[distance_px.argmin()]
+        wrong_ids += bool(nearest != marker and distance_px.min() < SAME_PLACE * truth.edge_px[nearest])
+    right = (reading.status == Status.MEASURED) & ~wrong
+    return PictureScore(
+        wrong_ids=wrong_ids,
+        wrong_positions=int(wrong.sum()) - wrong_ids,
+        lost=int((truth.visible & ~reported).sum()),
+        visible=int(truth.visible.sum()),
+        measured=int(right.sum()),
+        squared_px2=float((error_px[right] ** 2).sum()),
+        ms=reading.ms,
+    )
