@@ -5,7 +5,7 @@
 
 A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (a whole number becomes one more,
 another half as much again). The faults are made in a copy of the checkout. Compiled code is cached by file, so the
-copy's caches of what imports the broken module are emptied.
+copy's caches of what uses the broken function are emptied.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.support.code_copy import PACKAGES, ROOT, path_of, remove_caches
+from benchmarks.support.code_copy import PACKAGES, ROOT, path_of, replace_source
 
 SWAPPED: dict[type, type] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Lt: ast.GtE, ast.GtE: ast.Lt,
@@ -111,8 +111,7 @@ def notices(place: Place, root: Path, limit_s: float) -> str:
     """What the tests say of one fault: "noticed by ..." or "not noticed"."""
     path = path_of(place.module, root)
     text = path.read_text(encoding="utf-8")
-    path.write_text(broken(text, place), encoding="utf-8")
-    remove_caches(place.module, root)
+    replace_source(place.module, broken(text, place), root)
     files = sorted((root / "tests").rglob("test_*.py"), key=lambda file: relevance(file, place, root))
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, files)]
     try:
@@ -122,7 +121,7 @@ def notices(place: Place, root: Path, limit_s: float) -> str:
     except subprocess.TimeoutExpired:
         return f"not noticed in {limit_s:.0f} s"
     finally:
-        path.write_text(text, encoding="utf-8")
+        replace_source(place.module, text, root)
     if result.returncode == 0:
         return "not noticed"
     said = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]

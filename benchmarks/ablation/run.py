@@ -8,7 +8,9 @@ over pictures) above zero, or if it saves a wrong id. A rule whose purpose is th
 pictures made to provoke wrong ids, and stays if it saves one. Without a seed, that of the commit's hash is taken.
 
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
-shortest edge off. Differences are "without the rule" minus "with it". Time is the ratio of processor times.
+shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
+are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
+processor times.
 """
 
 from __future__ import annotations
@@ -33,16 +35,17 @@ SUITES: dict[Kind, tuple[str, ...]] = {"accuracy": POOLED, "no wrong id": (PROVO
 PICTURES = 60  # of each suite
 HEAD = (
     f"{'rule':<22}{'stage':<11}{'kind':<13}{'pictures':>9}{'touched':>8}{'ids':>9}{'positions':>10}"
-    f"{'lost':>8}{'difference and interval':>27}{'RMS px':>9}{'difference and interval':>32}{'time':>6}  verdict"
+    f"{'lost':>8}{'difference, 95 %':>27}{'RMS px':>9}{'difference in %, 95 %':>27}{'typical':>9}"
+    f"{'difference in %, 95 %':>27}{'z':>12}{'time':>6}  verdict"
 )
 
 
 def scores_by_suite(
-    rule: Rule | None, pictures: Sequence[KeptPicture], preset: str
+    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str
 ) -> dict[str, list[PictureScore]]:
-    """The scores without the rule, by suite."""
+    """The scores without the rules, by suite."""
     found: dict[str, list[PictureScore]] = {picture.suite: [] for picture in pictures}
-    for picture, score in zip(pictures, read_without(rule, pictures, preset), strict=True):
+    for picture, score in zip(pictures, read_without(rules, pictures, preset), strict=True):
         found[picture.suite].append(score)
     return found
 
@@ -51,11 +54,11 @@ def try_rules(
     rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
 ) -> Iterable[Comparison]:
     """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules."""
-    full = scores_by_suite(None, pictures, preset)
+    full = scores_by_suite((), pictures, preset)
 
     def try_rule(rule: Rule) -> Comparison:
         own = [picture for picture in pictures if picture.suite in SUITES[rule.kind]]
-        without = scores_by_suite(rule, own, preset)
+        without = scores_by_suite((rule,), own, preset)
         suites = list(without)
         return compare(
             rule,
@@ -72,8 +75,10 @@ def comparison_line(found: Comparison) -> str:
     return (
         f"{found.rule.name:<22}{found.rule.stage:<11}{found.rule.kind:<13}{found.pictures:>9}{found.touched:>8}"
         f"{_pair(found.wrong_ids):>9}{_pair(found.wrong_positions):>10}"
-        f"{found.lost.full:>8.0f}{_interval(found.lost, 0):>27}"
-        f"{found.rms_px.full:>9.4f}{_interval(found.rms_px, 5):>32}{found.time_ratio:>6.2f}  {found.verdict}"
+        f"{found.lost.full:>8.0f}{_interval(found.lost, 1.0, 0):>27}"
+        f"{found.rms_px.full:>9.4f}{_interval(found.rms_px, 100 / found.rms_px.full, 2):>27}"
+        f"{found.typical_px.full:>9.4f}{_interval(found.typical_px, 100 / found.typical_px.full, 2):>27}"
+        f"{found.z[0]:>6.2f}>{found.z[1]:.2f}{found.time_ratio:>7.2f}  {found.verdict}"
     )
 
 
@@ -81,12 +86,14 @@ def _pair(counts: tuple[int, int]) -> str:
     return f"{counts[0]}>{counts[1]}"
 
 
-def _interval(change: Change, digits: int) -> str:
-    return f"{change.difference:+.{digits}f} [{change.low:+.{digits}f}, {change.high:+.{digits}f}]"
+def _interval(change: Change, unit: float, digits: int) -> str:
+    """The difference and its interval, times the unit."""
+    value, low, high = (unit * number for number in (change.difference, change.low, change.high))
+    return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
 
 
 def _row(found: Comparison) -> dict[str, object]:
-    changes = {name: getattr(found, name)._asdict() for name in ("wrong", "lost", "rms_px")}
+    changes = {name: getattr(found, name)._asdict() for name in ("wrong", "lost", "rms_px", "typical_px")}
     named = {"rule": found.rule.name, "stage": found.rule.stage, "kind": found.rule.kind}
     return {**found._asdict(), **changes, **named, "verdict": found.verdict}
 

@@ -50,7 +50,10 @@ class Comparison(NamedTuple):
         pictures: how many were read; ``touched`` of them came out differently.
         wrong_ids, wrong_positions: summed.
         ids_saved: wrong ids that only the reader without the rule reports; ``ids_cost``: that only the full one does.
-        wrong, lost, rms_px: the figures that are judged.
+        wrong, lost: the counts that are judged.
+        rms_px: of all measured markers together, which gross errors and poor pictures rule.
+        typical_px: the geometric mean of the pictures' RMS, in which every picture counts the same.
+        z: sqrt(mean d2 / 2) of all reported markers that are not wrong, with and without; not judged.
         time_ratio: median over pictures of the processor time without the rule over that with it.
     """
 
@@ -64,7 +67,14 @@ class Comparison(NamedTuple):
     wrong: Change
     lost: Change
     rms_px: Change
+    typical_px: Change
+    z: tuple[float, float]
     time_ratio: float
+
+    @property
+    def judged(self) -> tuple[Change, ...]:
+        """The figures by which a rule for accuracy is judged."""
+        return (self.wrong, self.lost, self.rms_px, self.typical_px)
 
     @property
     def verdict(self) -> Verdict:
@@ -72,13 +82,14 @@ class Comparison(NamedTuple):
         saves_ids = self.ids_saved > self.ids_cost
         if self.rule.kind == "no wrong id":
             return "keep" if saves_ids else "goes"
-        is_worse = any(change.is_worse for change in (self.wrong, self.lost, self.rms_px))
+        is_worse = any(change.is_worse for change in self.judged)
         return "keep" if saves_ids or is_worse else "goes"
 
 
 def compare(rule: Rule, full: Sequence[PictureScore], without: Sequence[PictureScore]) -> Comparison:
     """Compare the scores of the same pictures, at least one."""
     ids = np.array([(b.wrong_ids - a.wrong_ids) for a, b in zip(full, without, strict=True)])
+    both = [pair for pair in zip(full, without, strict=True) if min(one.squared_px2 for one in pair) > 0]
     ratios = [b.ms / a.ms for a, b in zip(full, without, strict=True) if a.ms > 0 and math.isfinite(b.ms)]
     return Comparison(
         rule=rule,
@@ -91,6 +102,8 @@ def compare(rule: Rule, full: Sequence[PictureScore], without: Sequence[PictureS
         wrong=_change(full, without, lambda score: (score.wrong, 0.0), _total),
         lost=_change(full, without, lambda score: (score.lost, 0.0), _total),
         rms_px=_change(full, without, lambda score: (score.squared_px2, 2.0 * score.measured), _root),
+        typical_px=_change(*_columns(both), _log_of_rms, _exponential),
+        z=(_z(full), _z(without)),
         time_ratio=float(np.median(ratios)) if ratios else math.nan,
     )
 
@@ -104,11 +117,33 @@ def _change(
     """The figure of the summed terms (2,) of all pictures, and the interval of its difference."""
     before, after = (np.array([terms(score) for score in scores]) for scores in (full, without))
     pictures = len(before)
+    if pictures == 0:
+        return Change(math.nan, math.nan, math.nan, math.nan)
     times = np.random.default_rng(SEED).multinomial(pictures, np.full(pictures, 1 / pictures), RESAMPLES)
     difference = figure(times @ after) - figure(times @ before)
     low, high = np.nanpercentile(difference, INTERVAL_PERCENT) if pictures > 1 else (math.nan, math.nan)
     ones = np.ones((1, pictures))
     return Change(float(figure(ones @ before)[0]), float(figure(ones @ after)[0]), float(low), float(high))
+
+
+def _columns(
+    pairs: Sequence[tuple[PictureScore, PictureScore]],
+) -> tuple[list[PictureScore], list[PictureScore]]:
+    return [before for before, _ in pairs], [after for _, after in pairs]
+
+
+def _z(scores: Sequence[PictureScore]) -> float:
+    reported = sum(score.reported for score in scores)
+    return math.sqrt(sum(score.d2 for score in scores) / (2 * reported)) if reported else math.nan
+
+
+def _log_of_rms(score: PictureScore) -> tuple[float, float]:
+    return 0.5 * math.log(score.squared_px2 / (2.0 * score.measured)), 1.0
+
+
+def _exponential(sums: Floats) -> Floats:
+    """The exponential of the mean: the first sums (N, 2) over the second ones."""
+    return np.exp(sums[:, 0] / sums[:, 1])
 
 
 def _total(sums: Floats) -> Floats:

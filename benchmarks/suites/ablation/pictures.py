@@ -13,11 +13,16 @@ from numpy.typing import NDArray
 from benchmarks.suites.ablation.provoking import provoking_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.suites import suites_by_name
+from benchmarks.suites.stress.conditions import BY_NAME
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, cached_layout
+from benchmarks.suites.stress.kinds import StressCase, make_frame
+from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 
 POOLED = ("plain", "stress", "damage", "scatter", "camera")
 PROVOKING = "provoking"
+RANDOM_DRAWS = 16  # pictures of random damage per kind and pattern
 
 
 class PatternTruth(NamedTuple):
@@ -54,8 +59,26 @@ def sampled_cases(suite: str, count: int, seed: int) -> list[CalibrationCase]:
     if suite == PROVOKING:
         return list(islice(provoking_cases(seed), count))
     cases = list(suites_by_name()[suite](False, seed))
+    if suite == "damage":
+        cases += random_damage_cases(seed)
     chosen = np.random.default_rng([seed, 5]).permutation(len(cases))[:count]
     return [cases[number] for number in sorted(chosen)]
+
+
+def random_damage_cases(seed: int) -> list[CalibrationCase]:
+    """Damage of any color and size on deformed surfaces, all kinds and patterns."""
+    own = [
+        StressCase(kind.name, kind.steps[0], pattern, (seed + 104729 * draw) % 2**31)
+        for draw in range(RANDOM_DRAWS)
+        for kind in RANDOM_KINDS
+        for pattern in PATTERNS
+    ]
+    frames = [make_frame(case, BY_NAME[case.kind]) for case in own]
+    return [
+        CalibrationCase(case.kind, cached_layout(case.pattern), frame.shoot)
+        for case, frame in zip(own, frames, strict=True)
+        if isinstance(frame, PatternFrame)
+    ]
 
 
 def keep_pictures(suite: str, count: int, seed: int, folder: Path) -> Iterator[KeptPicture]:

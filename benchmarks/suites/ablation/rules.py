@@ -456,7 +456,7 @@ COMPLETE = (
         "pass",
     ),
     Rule(
-        "agreed, unexplained",
+        "agreed unexplained",
         "the tolerance is slightly narrower where triangles agree and synthesis explains nothing",
         "accuracy",
         "extractor.complete.consistency_filter",

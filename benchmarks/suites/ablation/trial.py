@@ -1,4 +1,4 @@
-"""The trial of one rule: pictures read by a copy of the reader without it, and their scores."""
+"""The trial of rules: pictures read by a copy of the reader without them, and their scores."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import numpy as np
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rules import Rule
 from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.support.code_copy import ROOT, copy_package, replace_text
 from extractor import Status
 
@@ -35,6 +36,8 @@ class PictureScore(NamedTuple):
         visible: visible ones.
         measured: measured, not wrong.
         squared_px2: the sum of their squared errors, both axes.
+        reported: reported, not wrong.
+        d2: the sum of their squared errors over stated covariances.
         ms: processor time; NaN after an exception.
     """
 
@@ -44,6 +47,8 @@ class PictureScore(NamedTuple):
     visible: int
     measured: int
     squared_px2: float
+    reported: int
+    d2: float
     ms: float
 
     @property
@@ -52,17 +57,17 @@ class PictureScore(NamedTuple):
         return self.wrong_ids + self.wrong_positions
 
 
-def read_without(rule: Rule | None, pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
-    """The scores of the pictures, read by a copy of the reader without the rule; None is the full reader.
+def read_without(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
+    """The scores of the pictures, read by a copy of the reader without these rules; without none it is the full reader.
 
     Raises:
-        ValueError: the rule's text does not occur exactly once.
+        ValueError: a rule's text does not occur exactly once.
         RuntimeError: the copy cannot be run.
     """
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
         copy_package("extractor", root)
-        if rule is not None:
+        for rule in rules:
             replace_text(rule.module, rule.text, rule.without, root)
         command = [sys.executable, "-m", "benchmarks.suites.ablation.worker", name, preset, str(root / "out")]
         paths = os.pathsep.join((name, str(ROOT)))
@@ -75,7 +80,8 @@ def read_without(rule: Rule | None, pictures: Sequence[KeptPicture], preset: str
             check=False,
         )
         if result.returncode != 0:
-            raise RuntimeError(f"without {rule.name if rule else 'any change'}: {result.stderr[-2000:]}")
+            names = ", ".join(rule.name for rule in rules) or "any change"
+            raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
         readings = [Reading(*entry) for entry in pickle.loads((root / "out").read_bytes())]
     return [
         score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
@@ -86,7 +92,7 @@ def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureSc
     """The score of a reading against the pattern in the picture that it is nearest to."""
     reported = reading.status != Status.LOST
     if not truths:
-        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, reading.ms)
+        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, reading.ms)
     scores = [_score_pattern(reading, truth) for truth in truths]
     return min(scores, key=lambda score: (score.wrong, score.lost))
 
@@ -101,13 +107,16 @@ def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
         distance_px = np.linalg.norm(truth.xy_px[known] - reading.xy_px[marker], axis=1)
         nearest = known[distance_px.argmin()]
         wrong_ids += bool(nearest != marker and distance_px.min() < SAME_PLACE * truth.edge_px[nearest])
-    right = (reading.status == Status.MEASURED) & ~wrong
+    right, measured = reported & ~wrong, (reading.status == Status.MEASURED) & ~wrong
+    d2 = squared_distances(reading.xy_px[right] - truth.xy_px[right], reading.cov_px2[right])
     return PictureScore(
         wrong_ids=wrong_ids,
         wrong_positions=int(wrong.sum()) - wrong_ids,
         lost=int((truth.visible & ~reported).sum()),
         visible=int(truth.visible.sum()),
-        measured=int(right.sum()),
-        squared_px2=float((error_px[right] ** 2).sum()),
+        measured=int(measured.sum()),
+        squared_px2=float((error_px[measured] ** 2).sum()),
+        reported=int(right.sum()),
+        d2=float(d2[np.isfinite(d2)].sum()),
         ms=reading.ms,
     )

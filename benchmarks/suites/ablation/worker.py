@@ -23,12 +23,14 @@ class Reading(NamedTuple):
 
     Attributes:
         xy_px: (M, 2) float64, NaN where lost.
+        cov_px2: (M, 2, 2) float64, the stated covariances, NaN where lost.
         status: (M,) uint8, a ``Status`` each.
         ms: processor time.
         raised: the text of an exception; empty without.
     """
 
     xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
     status: NDArray[np.uint8]
     ms: float
     raised: str = ""
@@ -57,11 +59,12 @@ def main(folder: str, preset: str, out: str, *pictures: str) -> None:
         try:
             markers = own.extract(image)
         except Exception as error:
-            lost = np.zeros(len(own.layout.layer), np.uint8)
-            readings.append(Reading(np.full((len(lost), 2), np.nan), lost, float("nan"), repr(error)))
+            count = len(own.layout.layer)
+            xy_px, cov_px2 = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
+            readings.append(Reading(xy_px, cov_px2, np.zeros(count, np.uint8), float("nan"), repr(error)))
             continue
         ms = 1e3 * (time.process_time() - started)
-        readings.append(Reading(markers.xy_px, np.asarray(markers.status), ms))
+        readings.append(Reading(markers.xy_px, markers.cov_px2, np.asarray(markers.status), ms))
     Path(out).write_bytes(pickle.dumps([tuple(reading) for reading in readings]))
 
 
