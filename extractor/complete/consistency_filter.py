@@ -25,8 +25,6 @@ from extractor.refine.estimate import RefinedMarkers
 MAX_ROUNDS = 40  # of rejection; each round drops the worst marker of every neighbourhood
 # Distances between a marker and its prediction, and deviations, are in units of the edge.
 MAX_DISTANCE = 0.15  # from the prediction by two rings
-MAX_TOLERANCE = 0.18  # replaces MAX_DISTANCE at most, where the surface is so bent that
-TOLERANCE_SIGMAS = 6.0  # standard deviations of the prediction exceed MAX_DISTANCE
 OUTER_TOLERANCE = 0.12, 0.3  # smallest and largest distance for the outermost layer; in between
 OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations of the prediction
 MAX_OUTER_DISTANCE = 0.35  # of the shortest edge at the marker, for the outermost layer
@@ -38,7 +36,6 @@ MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesi
 MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
 MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
 MAX_UNEXPLAINED_DISTANCE = 0.06  # of a marker that is obstructed
-MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 
 
 class ConsistentMarkers(NamedTuple):
@@ -180,11 +177,11 @@ def _update_rejecting_outliers(xy, cov, tolerance_px, evidence, tables):  # type
             doubtful[m] = not np.isnan(xy[m, 0]) and is_neighbour_outlier(
                 xy, m, tolerance_px[m], tables.ring_weights, neighbours
             )
-        predicted, variance, leverage, support = predict_markers(xy, doubtful, tables.marker_mm, neighbours)
+        predicted, variance, leverage, _ = predict_markers(xy, doubtful, tables.marker_mm, neighbours)
         for m in np.flatnonzero(doubtful):
             distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
             sigma = np.sqrt(variance[m] * (1 + leverage[m]))
-            misfit[m] = _misfit_ratio(m, distance, sigma, support[m], evidence)
+            misfit[m] = _misfit_ratio(m, distance, sigma, evidence)
         worst = np.zeros(count, np.bool_)
         for m in np.flatnonzero(misfit > 1.0):
             worst[m] = True
@@ -202,7 +199,7 @@ def _update_rejecting_outliers(xy, cov, tolerance_px, evidence, tables):  # type
 
 
 @compiled
-def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-untyped-def]
+def _misfit_ratio(m, distance, sigma, evidence):  # type: ignore[no-untyped-def]
     """The distance of a marker from its prediction over the allowed distance.
 
     It is infinite where neither triangles nor neighbours confirm the marker, or the prediction is too uncertain. The
@@ -212,7 +209,6 @@ def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-unt
     Args:
         distance: from the prediction, px.
         sigma: standard deviation of the prediction, px.
-        support: number of known neighbours.
     """
     edge_px, explained, agreed = evidence.edge_px[m], evidence.explained[m], evidence.agreed[m]
     is_intact = evidence.is_intact[m]
@@ -223,8 +219,6 @@ def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-unt
         allowed = MAX_UNEXPLAINED_DISTANCE
     elif not explained:
         allowed = MAX_AGREED_UNEXPLAINED_DISTANCE
-    elif support >= MILD_SUPPORT:
-        allowed = clamp(TOLERANCE_SIGMAS * sigma / edge_px, MAX_DISTANCE, MAX_TOLERANCE)
     max_deviation = MAX_PREDICTED_DEVIATION if confirmed else MAX_UNEXPLAINED_DISTANCE
     if not (explained or is_intact or sigma < max_deviation * edge_px):
         return np.inf

@@ -432,14 +432,6 @@ COMPLETE = (
         "pass",
     ),
     Rule(
-        "bent tolerance",
-        "the tolerance is wider where two rings fit badly",
-        "accuracy",
-        "extractor.complete.consistency_filter",
-        "allowed = clamp(TOLERANCE_SIGMAS * sigma / edge_px, MAX_DISTANCE, MAX_TOLERANCE)",
-        "pass",
-    ),
-    Rule(
         "intact tolerance",
         "the tolerance is wider where all triangles of a marker agree",
         "accuracy",
