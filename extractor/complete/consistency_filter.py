@@ -1,10 +1,9 @@
 """Stage 8, first half: markers that contradict their neighbours are dropped.
 
-Three rules:
+Two rules:
 
 - A marker must lie where the map of its two rings puts it.
 - A marker of the outermost layer must lie where the layers inside put it.
-- A marker of the rim that refinement moved far from its triangles must have come nearer to where its neighbours put it.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from extractor.layout.lattice_tables import Lattice
 from extractor.layout.neighbour_tables import MIN_QUADRATIC_NEIGHBOURS
 from extractor.localmap.neighbour_prediction import is_neighbour_outlier, predict_markers
-from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.numeric.bilinear import clamp
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.estimate import RefinedMarkers
@@ -28,10 +27,6 @@ MAX_DISTANCE = 0.15  # from the prediction by two rings
 OUTER_TOLERANCE = 0.12, 0.3  # smallest and largest distance for the outermost layer; in between
 OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations of the prediction
 MAX_OUTER_DISTANCE = 0.35  # of the shortest edge at the marker, for the outermost layer
-MAX_REFINEMENT_SHIFT = 0.12  # by refinement at the rim, where
-MAX_GRIDLINE_BEND = 0.02  # gridlines may bend by more than this
-MAX_UNCERTAIN_SHIFT = 0.065  # by refinement at the rim, where
-UNCERTAIN_DEVIATION = 0.018  # the marker's own deviation is larger than this
 MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesis explains nothing
 MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
 MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
@@ -58,16 +53,12 @@ class MarkerEvidence(NamedTuple):
 
     Attributes:
         explained: (M,) bool, synthesis explains the image around the marker.
-        bend_deviation_px: (M,) float64, deviation by which the marker's gridlines may bend.
-        initial_px: (M, 2) float64, the place before refinement.
         edge_px: (M,) float64, the mean edge at the marker.
         agreed: (M,) bool, all triangles of the marker, or at least two, were found and agree.
         is_intact: (M,) bool, all triangles of the marker, and at least two, were found and agree.
     """
 
     explained: NDArray[np.bool_]
-    bend_deviation_px: NDArray[np.float64]
-    initial_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     agreed: NDArray[np.bool_]
     is_intact: NDArray[np.bool_]
@@ -86,8 +77,6 @@ def reject_inconsistent_markers(
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
     evidence = MarkerEvidence(
         explained=refined.explained,
-        bend_deviation_px=refined.bend_deviation_px,
-        initial_px=places.xy_px,
         edge_px=places.edge_px,
         agreed=places.agreed,
         is_intact=places.is_intact,
@@ -106,14 +95,11 @@ def _update_rejecting_inconsistent(xy, cov, evidence, tables, size):  # type: ig
             edge_px[m] = _shortest_edge(xy, m, first_ring, edge_px[m])
         tolerance = MAX_DISTANCE if explained[m] else MAX_AGREED_UNEXPLAINED_DISTANCE * agreed[m]
         tolerance_px[m] = edge_px[m] * tolerance
-    judged = MarkerEvidence(
-        explained, evidence.bend_deviation_px, evidence.initial_px, edge_px, agreed, evidence.is_intact
-    )
-    if _is_consistent(xy, cov, tolerance_px, judged, tables, size):
+    judged = MarkerEvidence(explained, edge_px, agreed, evidence.is_intact)
+    if _is_consistent(xy, tolerance_px, judged, tables, size):
         return edge_px, True
     _update_rejecting_outliers(xy, cov, tolerance_px, judged, tables)
     _update_rejecting_outer_outliers(xy, cov, edge_px, tables)
-    _update_shifted_markers(xy, cov, _shifted_rim_markers(xy, cov, judged, tables.is_rim), judged, tables)
     return edge_px, False
 
 
@@ -133,9 +119,9 @@ def _shortest_edge(xy, m, first_ring, edge_px):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_consistent(xy, cov, tolerance_px, evidence, tables, size):  # type: ignore[no-untyped-def]
+def _is_consistent(xy, tolerance_px, evidence, tables, size):  # type: ignore[no-untyped-def]
     """Whether every marker of the pattern is known and no rule could drop one, which is the usual case."""
-    edge_px, present, is_rim = evidence.edge_px, tables.present, tables.is_rim
+    edge_px, present = evidence.edge_px, tables.present
     weights, neighbours = tables.ring_weights, tables.neighbours
     inward_weights, inward_neighbours = tables.inward_weights, tables.inward_neighbours
     for m in range(xy.shape[0]):
@@ -151,8 +137,6 @@ def _is_consistent(xy, cov, tolerance_px, evidence, tables, size):  # type: igno
         if inward_neighbours[m, 0] >= 0 and is_neighbour_outlier(
             xy, m, OUTER_TOLERANCE[0] * edge_px[m], inward_weights, inward_neighbours
         ):
-            return False
-        if is_rim[m] and _is_shifted(xy, cov, m, evidence):
             return False
     return True
 
@@ -250,66 +234,3 @@ def _update_rejecting_outer_outliers(xy, cov, edge_px, tables):  # type: ignore[
         distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
         rejected[m] = distance > limit and support[m] >= MIN_QUADRATIC_NEIGHBOURS
     xy[rejected], cov[rejected] = np.nan, np.nan
-
-
-@compiled
-def _update_shifted_markers(xy, cov, shifted, evidence, tables):  # type: ignore[no-untyped-def]
-    """Keep, restore or drop the uncertain rim markers that refinement moved far from their triangles.
-
-    Where two gridlines end that may bend, the corner between them may slide along both. A shifted marker (``shifted``
-    (M,) bool) stays where refinement took it nearer to where the neighbours put it. Otherwise it returns to its
-    triangles, or becomes NaN where the neighbours contradict these. Where triangles do not agree, the initial place
-    was a guess: the marker then stays near to where the neighbours put it, with half the distance added as deviation.
-    """
-    if not shifted.any():
-        return
-    marker_mm, start, edge_px, agreed = (
-        tables.marker_mm,
-        evidence.initial_px,
-        evidence.edge_px,
-        evidence.agreed,
-    )
-    predicted, _, _, support = predict_markers(xy, shifted, marker_mm, tables.neighbours)
-    # at the corners of the rim two rings hold too few markers for a quadratic; the layers inside hold enough
-    few = shifted & (support < MIN_QUADRATIC_NEIGHBOURS)
-    if few.any():
-        inward, _, _, inward_support = predict_markers(xy, few, marker_mm, tables.inward_neighbours)
-        for m in np.flatnonzero(few):
-            predicted[m], support[m] = inward[m], inward_support[m]
-    for m in np.flatnonzero(shifted):
-        after = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
-        before = np.hypot(start[m, 0] - predicted[m, 0], start[m, 1] - predicted[m, 1])
-        limit, known = MAX_DISTANCE * edge_px[m], support[m] >= MIN_QUADRATIC_NEIGHBOURS
-        if known and after < limit and (after < before or not agreed[m]):
-            if not after < before:
-                cov[m, 0, 0] += 0.25 * after**2
-                cov[m, 1, 1] += 0.25 * after**2
-        elif known and before < limit and agreed[m]:
-            xy[m] = start[m]
-            cov[m] = np.eye(2) * (AGREED_DEVIATION * edge_px[m]) ** 2
-        else:
-            xy[m], cov[m] = np.nan, np.nan
-
-
-@inlined_no_refcount
-def _is_shifted(xy, cov, m, evidence):  # type: ignore[no-untyped-def]
-    """Whether a marker lies far from its initial place, and is uncertain or has gridlines that may bend."""
-    edge_px, start = evidence.edge_px[m], evidence.initial_px
-    variance = cov[m, 0, 0] + cov[m, 1, 1]
-    if variance > (UNCERTAIN_DEVIATION * edge_px) ** 2:
-        limit = MAX_UNCERTAIN_SHIFT
-    elif evidence.bend_deviation_px[m] > MAX_GRIDLINE_BEND * edge_px:
-        limit = MAX_REFINEMENT_SHIFT
-    else:
-        return False
-    dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-    return dx * dx + dy * dy > (limit * edge_px) ** 2
-
-
-@compiled
-def _shifted_rim_markers(xy, cov, evidence, is_rim):  # type: ignore[no-untyped-def]
-    """(M,) bool, the shifted markers of the rim."""
-    shifted = np.zeros(xy.shape[0], np.bool_)
-    for m in range(xy.shape[0]):
-        shifted[m] = is_rim[m] and _is_shifted(xy, cov, m, evidence)
-    return shifted

@@ -50,7 +50,6 @@ class RingTables(NamedTuple):
         inward_neighbours, inward_weights: (M, 18) int32 and float64, see ``Lattice``.
         first_ring: (M, 6) int32, the six markers around each marker.
         present: (M,) bool, the markers that touch a colored or white cell.
-        is_rim: (M,) bool, the markers that have fewer than six present neighbours.
         layers: number of layers.
     """
 
@@ -61,7 +60,6 @@ class RingTables(NamedTuple):
     inward_weights: NDArray[np.float64]
     first_ring: NDArray[np.int32]
     present: NDArray[np.bool_]
-    is_rim: NDArray[np.bool_]
     layers: int
 
 
@@ -140,7 +138,6 @@ class Lattice:
             inward_weights=self.inward_weights,
             first_ring=self.first_ring,
             present=self.present,
-            is_rim=self.is_rim,
             layers=self.layers,
         )
 

@@ -416,14 +416,6 @@ COMPLETE = (
         "pass\n",
     ),
     Rule(
-        "shifted rim",
-        "a rim marker that refinement moved far from its triangles is checked, put back or dropped",
-        "accuracy",
-        "extractor.complete.consistency_filter",
-        "_update_shifted_markers(xy, cov, _shifted_rim_markers(xy, cov, judged, tables.is_rim), judged, tables)",
-        "pass",
-    ),
-    Rule(
         "shortest edge",
         "tolerances are of the shortest edge where triangles do not agree",
         "accuracy",
