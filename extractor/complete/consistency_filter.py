@@ -1,9 +1,6 @@
 """Stage 8, first half: markers that contradict their neighbours are dropped.
 
-Two rules:
-
-- A marker must lie where the map of its two rings puts it.
-- A marker of the outermost layer must lie where the layers inside put it.
+A marker must lie where the map of its two rings puts it.
 """
 
 from __future__ import annotations
@@ -14,19 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.lattice_tables import Lattice
-from extractor.layout.neighbour_tables import MIN_QUADRATIC_NEIGHBOURS
 from extractor.localmap.neighbour_prediction import is_neighbour_outlier, predict_markers
 from extractor.numbering.marker_places import InitialMarkers
-from extractor.numeric.bilinear import clamp
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.estimate import RefinedMarkers
 
 MAX_ROUNDS = 40  # of rejection; each round drops the worst marker of every neighbourhood
 # Distances between a marker and its prediction, and deviations, are in units of the edge.
 MAX_DISTANCE = 0.15  # from the prediction by two rings
-OUTER_TOLERANCE = 0.12, 0.3  # smallest and largest distance for the outermost layer; in between
-OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations of the prediction
-MAX_OUTER_DISTANCE = 0.35  # of the shortest edge at the marker, for the outermost layer
 MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesis explains nothing
 MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
 MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
@@ -96,10 +88,9 @@ def _update_rejecting_inconsistent(xy, cov, evidence, tables, size):  # type: ig
         tolerance = MAX_DISTANCE if explained[m] else MAX_AGREED_UNEXPLAINED_DISTANCE * agreed[m]
         tolerance_px[m] = edge_px[m] * tolerance
     judged = MarkerEvidence(explained, edge_px, agreed, evidence.is_intact)
-    if _is_consistent(xy, tolerance_px, judged, tables, size):
+    if _is_consistent(xy, tolerance_px, tables, size):
         return edge_px, True
     _update_rejecting_outliers(xy, cov, tolerance_px, judged, tables)
-    _update_rejecting_outer_outliers(xy, cov, edge_px, tables)
     return edge_px, False
 
 
@@ -119,11 +110,9 @@ def _shortest_edge(xy, m, first_ring, edge_px):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_consistent(xy, tolerance_px, evidence, tables, size):  # type: ignore[no-untyped-def]
+def _is_consistent(xy, tolerance_px, tables, size):  # type: ignore[no-untyped-def]
     """Whether every marker of the pattern is known and no rule could drop one, which is the usual case."""
-    edge_px, present = evidence.edge_px, tables.present
-    weights, neighbours = tables.ring_weights, tables.neighbours
-    inward_weights, inward_neighbours = tables.inward_weights, tables.inward_neighbours
+    present, weights, neighbours = tables.present, tables.ring_weights, tables.neighbours
     for m in range(xy.shape[0]):
         x, y = xy[m, 0], xy[m, 1]
         if np.isnan(x):
@@ -133,10 +122,6 @@ def _is_consistent(xy, tolerance_px, evidence, tables, size):  # type: ignore[no
         if not is_inside_image(x, y, size):
             return False
         if is_neighbour_outlier(xy, m, tolerance_px[m], weights, neighbours):
-            return False
-        if inward_neighbours[m, 0] >= 0 and is_neighbour_outlier(
-            xy, m, OUTER_TOLERANCE[0] * edge_px[m], inward_weights, inward_neighbours
-        ):
             return False
     return True
 
@@ -210,27 +195,3 @@ def _misfit_ratio(m, distance, sigma, evidence):  # type: ignore[no-untyped-def]
     if np.isfinite(ratio):
         return ratio
     return 0.0 if agreed else np.inf
-
-
-@compiled
-def _update_rejecting_outer_outliers(xy, cov, edge_px, tables):  # type: ignore[no-untyped-def]
-    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
-
-    An acute corner there belongs to few cells, and ink that ran out moves the marker together with its neighbours.
-    """
-    neighbours, weights = tables.inward_neighbours, tables.inward_weights
-    rejected = np.zeros(edge_px.shape[0], np.bool_)
-    for m in np.flatnonzero((neighbours[:, 0] >= 0) & ~np.isnan(xy[:, 0])):
-        # only markers beyond the smallest tolerance are predicted
-        rejected[m] = is_neighbour_outlier(xy, m, OUTER_TOLERANCE[0] * edge_px[m], weights, neighbours)
-    if not rejected.any():
-        return
-    predicted, variance, _, support = predict_markers(xy, rejected, tables.marker_mm, neighbours)
-    for m in np.flatnonzero(rejected):
-        # a quadratic that fits the layers inside badly predicts the outermost layer badly
-        sigmas = OUTER_TOLERANCE_SIGMAS * np.sqrt(variance[m]) / edge_px[m]
-        allowed = clamp(sigmas, OUTER_TOLERANCE[0], OUTER_TOLERANCE[1]) * edge_px[m]
-        limit = min(allowed, MAX_OUTER_DISTANCE * _shortest_edge(xy, m, tables.first_ring, edge_px[m]))
-        distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
-        rejected[m] = distance > limit and support[m] >= MIN_QUADRATIC_NEIGHBOURS
-    xy[rejected], cov[rejected] = np.nan, np.nan

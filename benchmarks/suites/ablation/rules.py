@@ -408,14 +408,6 @@ COMPLETE = (
         "pass",
     ),
     Rule(
-        "outer outliers",
-        "a marker of the outermost layer that the layers inside contradict is dropped",
-        "accuracy",
-        "extractor.complete.consistency_filter",
-        "_update_rejecting_outer_outliers(xy, cov, edge_px, tables)\n",
-        "pass\n",
-    ),
-    Rule(
         "shortest edge",
         "tolerances are of the shortest edge where triangles do not agree",
         "accuracy",
