@@ -143,7 +143,7 @@ def _log_of_rms(score: PictureScore) -> tuple[float, float]:
 
 def _exponential(sums: Floats) -> Floats:
     """The exponential of the mean: the first sums (N, 2) over the second ones."""
-    return np.exp(sums[:, 0] / sums[:, 1])
+    return np.asarray(np.exp(sums[:, 0] / sums[:, 1]))
 
 
 def _total(sums: Floats) -> Floats:
