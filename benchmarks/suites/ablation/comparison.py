@@ -73,17 +73,14 @@ class Comparison(NamedTuple):
 
     @property
     def judged(self) -> tuple[Change, ...]:
-        """The figures by which a rule for accuracy is judged."""
+        """The figures by which a rule is judged, besides the ids that it saves."""
         return (self.wrong, self.lost, self.rms_px, self.typical_px)
 
     @property
     def verdict(self) -> Verdict:
-        """ "keep" for a rule that saves more ids than it costs, or without which wrong, lost or RMS are worse."""
+        """A rule stays that saves more ids than it costs, or without which wrong, lost or RMS are worse."""
         saves_ids = self.ids_saved > self.ids_cost
-        if self.rule.kind == "no wrong id":
-            return "keep" if saves_ids else "goes"
-        is_worse = any(change.is_worse for change in self.judged)
-        return "keep" if saves_ids or is_worse else "goes"
+        return "keep" if saves_ids or any(change.is_worse for change in self.judged) else "goes"
 
 
 def compare(rule: Rule, full: Sequence[PictureScore], without: Sequence[PictureScore]) -> Comparison:
