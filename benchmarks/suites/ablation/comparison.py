@@ -118,7 +118,8 @@ def _change(
         return Change(math.nan, math.nan, math.nan, math.nan)
     times = np.random.default_rng(SEED).multinomial(pictures, np.full(pictures, 1 / pictures), RESAMPLES)
     difference = figure(times @ after) - figure(times @ before)
-    low, high = np.nanpercentile(difference, INTERVAL_PERCENT) if pictures > 1 else (math.nan, math.nan)
+    known = difference[np.isfinite(difference)] if pictures > 1 else np.empty(0)
+    low, high = np.percentile(known, INTERVAL_PERCENT) if len(known) else (math.nan, math.nan)
     ones = np.ones((1, pictures))
     return Change(float(figure(ones @ before)[0]), float(figure(ones @ after)[0]), float(low), float(high))
 

@@ -58,31 +58,35 @@ class PictureScore(NamedTuple):
 
 
 def read_without(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
-    """The scores of the pictures, read by a copy of the reader without these rules; without none it is the full reader.
+    """The scores of the pictures, read by a copy of the reader without these rules.
+
+    Without any rule this checkout's own reader reads them, which leaves its compiled functions to the copies.
 
     Raises:
         ValueError: a rule's text does not occur exactly once.
-        RuntimeError: the copy cannot be run.
+        RuntimeError: the reader cannot be run.
     """
     with tempfile.TemporaryDirectory() as name:
-        root = Path(name)
-        copy_package("extractor", root)
+        folder, out = Path(name) if rules else ROOT, Path(name) / "readings"
+        if rules:
+            copy_package("extractor", folder)
         for rule in rules:
-            replace_text(rule.module, rule.text, rule.without, root)
-        command = [sys.executable, "-m", "benchmarks.suites.ablation.worker", name, preset, str(root / "out")]
-        paths = os.pathsep.join((name, str(ROOT)))
+            replace_text(rule.module, rule.text, rule.without, folder)
+        names = ", ".join(rule.name for rule in rules) or "any change"
         result = subprocess.run(
-            [*command, *(str(picture.path) for picture in pictures)],
-            cwd=root,
-            env={**os.environ, "PYTHONPATH": paths},
+            [
+                *(sys.executable, "-m", "benchmarks.suites.ablation.worker", str(folder), preset, str(out)),
+                *(str(picture.path) for picture in pictures),
+            ],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))},
             capture_output=True,
             text=True,
             check=False,
         )
         if result.returncode != 0:
-            names = ", ".join(rule.name for rule in rules) or "any change"
             raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
-        readings = [Reading(*entry) for entry in pickle.loads((root / "out").read_bytes())]
+        readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
     return [
         score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
     ]
