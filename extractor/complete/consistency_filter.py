@@ -20,7 +20,6 @@ MAX_ROUNDS = 40  # of rejection; each round drops the worst marker of every neig
 # Distances between a marker and its prediction, and deviations, are in units of the edge.
 MAX_DISTANCE = 0.15  # from the prediction by two rings
 MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesis explains nothing
-MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
 MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
 MAX_UNEXPLAINED_DISTANCE = 0.06  # of a marker that is obstructed
 
@@ -172,8 +171,7 @@ def _misfit_ratio(m, distance, sigma, evidence):  # type: ignore[no-untyped-def]
     """The distance of a marker from its prediction over the allowed distance.
 
     It is infinite where neither triangles nor neighbours confirm the marker, or the prediction is too uncertain. The
-    allowed distance is smaller where synthesis does not explain the image; the neighbours must then be known. It is
-    larger where all triangles agree.
+    allowed distance is smaller where synthesis does not explain the image; the neighbours must then be known.
 
     Args:
         distance: from the prediction, px.
@@ -182,9 +180,7 @@ def _misfit_ratio(m, distance, sigma, evidence):  # type: ignore[no-untyped-def]
     edge_px, explained, agreed = evidence.edge_px[m], evidence.explained[m], evidence.agreed[m]
     is_intact = evidence.is_intact[m]
     confirmed, allowed = explained or agreed, MAX_DISTANCE
-    if is_intact:
-        allowed = MAX_AGREED_DISTANCE
-    elif not confirmed:
+    if not confirmed:
         allowed = MAX_UNEXPLAINED_DISTANCE
     elif not explained:
         allowed = MAX_AGREED_UNEXPLAINED_DISTANCE

@@ -416,14 +416,6 @@ COMPLETE = (
         "pass",
     ),
     Rule(
-        "intact tolerance",
-        "the tolerance is wider where all triangles of a marker agree",
-        "accuracy",
-        "extractor.complete.consistency_filter",
-        "allowed = MAX_AGREED_DISTANCE",
-        "pass",
-    ),
-    Rule(
         "unexplained",
         "the tolerance is narrower where synthesis does not explain the image",
         "accuracy",
