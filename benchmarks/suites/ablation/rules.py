@@ -38,14 +38,6 @@ class Rule(NamedTuple):
 
 PIPELINE = (
     Rule(
-        "missed",
-        "a finer scale where recognition at a reduced one missed small cells",
-        "accuracy",
-        "extractor.pipeline",
-        "elif scale == 1 or self._is_complete(pyramid, found, scale, stages):",
-        "else:",
-    ),
-    Rule(
         "small pattern",
         "a small pattern in a large image numbered by the centers of its cells",
         "accuracy",
