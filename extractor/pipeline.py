@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
-Stages: image, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, missed (at reduced scales
-only), place, refine, repair, virtual. A warm start of the tracker goes from image over predict and prove to refine.
+Stages: image, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, place, refine, repair,
+virtual. A warm start of the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ from extractor.layout.topology import topology_of
 from extractor.numbering.gaps.detached_cells import number_detached_cells
 from extractor.numbering.lattice_walk import Numbering, number_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
-from extractor.numbering.missed_cells import count_missed_cells
 from extractor.numbering.small_pattern import fit_predicted_triangles, is_small_pattern_possible
 from extractor.presets import PRESETS, Preset
 from extractor.refine.estimate import Appearance
@@ -40,7 +39,6 @@ from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
-MAX_MISSED_SHARE = 0.01  # of the pattern's cells that recognition at a reduced scale may miss
 MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
 MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
@@ -203,14 +201,13 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Reason:
-        """Stages 1 to 7 at the first scale that suffices, from coarse to fine; else the reason at the finest scale."""
+        """Stages 1 to 7 at the coarsest scale that numbers cells; else the reason at the finest scale."""
         reason = Reason.NO_COLOR
         for scale in _recognition_scales(pyramid.size):
             found = self._number_cells_at(pyramid, scale, stages)
-            if isinstance(found, Reason):
-                reason = found
-            elif scale == 1 or self._is_complete(pyramid, found, scale, stages):
+            if not isinstance(found, Reason):
                 return found
+            reason = found
         return reason
 
     def _number_cells_at(self, pyramid: Pyramid, scale: int, stages: Stages) -> NumberedCells | Reason:
@@ -259,12 +256,6 @@ class Extractor:
         if numbering.doubt is None:
             numbering = stages.record("attach", number_detached_cells(cells, numbering, self._lattice))
         return NumberedCells(cells, numbering) if numbering.doubt is None else numbering.doubt
-
-    def _is_complete(self, pyramid: Pyramid, found: NumberedCells, scale: int, stages: Stages) -> bool:
-        """Whether a finer scale would number hardly more cells than have been numbered."""
-        cells, numbering = found.cells, found.numbering
-        missed = count_missed_cells(pyramid.level(1).image, cells, numbering, self._lattice, scale)
-        return int(stages.record("missed", missed)) <= MAX_MISSED_SHARE * len(self._lattice.ink)
 
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:

@@ -5,7 +5,7 @@
 
 A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (a whole number becomes one more,
 another half as much again). The faults are made in a copy of the checkout. Compiled code is cached by file, so the
-copy's caches of what imports the broken module are emptied.
+copy's caches of what uses the broken function are emptied.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import argparse
 import ast
 import os
 import random
-import re
 import shutil
 import subprocess
 import sys
@@ -23,7 +22,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).parent.parent
+from benchmarks.support.code_copy import PACKAGES, ROOT, path_of, replace_source
+
 SWAPPED: dict[type, type] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Lt: ast.GtE, ast.GtE: ast.Lt,
     ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -43,11 +43,6 @@ class Place(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.module}:{self.function}:{self.k}"
-
-
-def path_of(module: str, root: Path) -> Path:
-    path = root / module.replace(".", "/")
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
 def functions(text: str) -> Iterator[ast.FunctionDef]:
@@ -104,7 +99,7 @@ def broken(text: str, place: Place) -> str:
 def places(root: Path) -> list[Place]:
     """Every place of both packages."""
     found = []
-    for package in ("extractor", "cmpdesign"):
+    for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
             module = ".".join(path.relative_to(root).with_suffix("").parts)
             for function in functions(path.read_text(encoding="utf-8")):
@@ -112,35 +107,11 @@ def places(root: Path) -> list[Place]:
     return found
 
 
-def users(module: str, root: Path) -> set[str]:
-    """The module and all that import it, directly or not: what was compiled with it inlined."""
-    texts = {
-        ".".join(path.relative_to(root).with_suffix("").parts): path.read_text(encoding="utf-8")
-        for package in ("extractor", "cmpdesign")
-        for path in (root / package).rglob("*.py")
-    }
-    found, new = set(), {module}
-    while new:
-        found |= new
-        imports = [
-            rf"from {re.escape(name)} import|from {re.escape(package)} import .*\b{leaf}\b"
-            for name in new
-            for package, _, leaf in [name.rpartition(".")]
-        ]
-        word = re.compile("|".join(imports))
-        new = {other for other, text in texts.items() if word.search(text)} - found
-    return found
-
-
 def notices(place: Place, root: Path, limit_s: float) -> str:
     """What the tests say of one fault: "noticed by ..." or "not noticed"."""
     path = path_of(place.module, root)
     text = path.read_text(encoding="utf-8")
-    path.write_text(broken(text, place), encoding="utf-8")
-    for module in users(place.module, root):
-        source = path_of(module, root)
-        for cache in (source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ic]"):
-            cache.unlink()
+    replace_source(place.module, broken(text, place), root)
     files = sorted((root / "tests").rglob("test_*.py"), key=lambda file: relevance(file, place, root))
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, files)]
     try:
@@ -150,7 +121,7 @@ def notices(place: Place, root: Path, limit_s: float) -> str:
     except subprocess.TimeoutExpired:
         return f"not noticed in {limit_s:.0f} s"
     finally:
-        path.write_text(text, encoding="utf-8")
+        replace_source(place.module, text, root)
     if result.returncode == 0:
         return "not noticed"
     said = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]

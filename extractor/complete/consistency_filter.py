@@ -1,10 +1,6 @@
 """Stage 8, first half: markers that contradict their neighbours are dropped.
 
-Three rules:
-
-- A marker must lie where the map of its two rings puts it.
-- A marker of the outermost layer must lie where the layers inside put it.
-- A marker of the rim that refinement moved far from its triangles must have come nearer to where its neighbours put it.
+A marker must lie where the map of its two rings puts it.
 """
 
 from __future__ import annotations
@@ -15,30 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.lattice_tables import Lattice
-from extractor.layout.neighbour_tables import MIN_QUADRATIC_NEIGHBOURS
 from extractor.localmap.neighbour_prediction import is_neighbour_outlier, predict_markers
-from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
-from extractor.numeric.bilinear import clamp
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.numeric.compilation import compiled, inlined_no_refcount
 from extractor.refine.estimate import RefinedMarkers
 
 MAX_ROUNDS = 40  # of rejection; each round drops the worst marker of every neighbourhood
 # Distances between a marker and its prediction, and deviations, are in units of the edge.
 MAX_DISTANCE = 0.15  # from the prediction by two rings
-MAX_TOLERANCE = 0.18  # replaces MAX_DISTANCE at most, where the surface is so bent that
-TOLERANCE_SIGMAS = 6.0  # standard deviations of the prediction exceed MAX_DISTANCE
-OUTER_TOLERANCE = 0.12, 0.3  # smallest and largest distance for the outermost layer; in between
-OUTER_TOLERANCE_SIGMAS = 10.0  # standard deviations of the prediction
-MAX_OUTER_DISTANCE = 0.35  # of the shortest edge at the marker, for the outermost layer
-MAX_REFINEMENT_SHIFT = 0.12  # by refinement at the rim, where
-MAX_GRIDLINE_BEND = 0.02  # gridlines may bend by more than this
-MAX_UNCERTAIN_SHIFT = 0.065  # by refinement at the rim, where
-UNCERTAIN_DEVIATION = 0.018  # the marker's own deviation is larger than this
 MAX_AGREED_UNEXPLAINED_DISTANCE = 0.14  # where two triangles agree and synthesis explains nothing
-MAX_AGREED_DISTANCE = 0.3  # where all triangles agree: only sharp bends explain such a distance
 MAX_PREDICTED_DEVIATION = 0.12  # of the prediction of a marker that only two triangles confirm
 MAX_UNEXPLAINED_DISTANCE = 0.06  # of a marker that is obstructed
-MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 
 
 class ConsistentMarkers(NamedTuple):
@@ -61,16 +44,12 @@ class MarkerEvidence(NamedTuple):
 
     Attributes:
         explained: (M,) bool, synthesis explains the image around the marker.
-        bend_deviation_px: (M,) float64, deviation by which the marker's gridlines may bend.
-        initial_px: (M, 2) float64, the place before refinement.
         edge_px: (M,) float64, the mean edge at the marker.
         agreed: (M,) bool, all triangles of the marker, or at least two, were found and agree.
         is_intact: (M,) bool, all triangles of the marker, and at least two, were found and agree.
     """
 
     explained: NDArray[np.bool_]
-    bend_deviation_px: NDArray[np.float64]
-    initial_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     agreed: NDArray[np.bool_]
     is_intact: NDArray[np.bool_]
@@ -89,8 +68,6 @@ def reject_inconsistent_markers(
     xy, cov = refined.xy_px.copy(), refined.cov_px2.copy()
     evidence = MarkerEvidence(
         explained=refined.explained,
-        bend_deviation_px=refined.bend_deviation_px,
-        initial_px=places.xy_px,
         edge_px=places.edge_px,
         agreed=places.agreed,
         is_intact=places.is_intact,
@@ -109,14 +86,10 @@ def _update_rejecting_inconsistent(xy, cov, evidence, tables, size):  # type: ig
             edge_px[m] = _shortest_edge(xy, m, first_ring, edge_px[m])
         tolerance = MAX_DISTANCE if explained[m] else MAX_AGREED_UNEXPLAINED_DISTANCE * agreed[m]
         tolerance_px[m] = edge_px[m] * tolerance
-    judged = MarkerEvidence(
-        explained, evidence.bend_deviation_px, evidence.initial_px, edge_px, agreed, evidence.is_intact
-    )
-    if _is_consistent(xy, cov, tolerance_px, judged, tables, size):
+    judged = MarkerEvidence(explained, edge_px, agreed, evidence.is_intact)
+    if _is_consistent(xy, tolerance_px, tables, size):
         return edge_px, True
     _update_rejecting_outliers(xy, cov, tolerance_px, judged, tables)
-    _update_rejecting_outer_outliers(xy, cov, edge_px, tables)
-    _update_shifted_markers(xy, cov, _shifted_rim_markers(xy, cov, judged, tables.is_rim), judged, tables)
     return edge_px, False
 
 
@@ -136,11 +109,9 @@ def _shortest_edge(xy, m, first_ring, edge_px):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_consistent(xy, cov, tolerance_px, evidence, tables, size):  # type: ignore[no-untyped-def]
+def _is_consistent(xy, tolerance_px, tables, size):  # type: ignore[no-untyped-def]
     """Whether every marker of the pattern is known and no rule could drop one, which is the usual case."""
-    edge_px, present, is_rim = evidence.edge_px, tables.present, tables.is_rim
-    weights, neighbours = tables.ring_weights, tables.neighbours
-    inward_weights, inward_neighbours = tables.inward_weights, tables.inward_neighbours
+    present, weights, neighbours = tables.present, tables.ring_weights, tables.neighbours
     for m in range(xy.shape[0]):
         x, y = xy[m, 0], xy[m, 1]
         if np.isnan(x):
@@ -150,12 +121,6 @@ def _is_consistent(xy, cov, tolerance_px, evidence, tables, size):  # type: igno
         if not is_inside_image(x, y, size):
             return False
         if is_neighbour_outlier(xy, m, tolerance_px[m], weights, neighbours):
-            return False
-        if inward_neighbours[m, 0] >= 0 and is_neighbour_outlier(
-            xy, m, OUTER_TOLERANCE[0] * edge_px[m], inward_weights, inward_neighbours
-        ):
-            return False
-        if is_rim[m] and _is_shifted(xy, cov, m, evidence):
             return False
     return True
 
@@ -180,11 +145,11 @@ def _update_rejecting_outliers(xy, cov, tolerance_px, evidence, tables):  # type
             doubtful[m] = not np.isnan(xy[m, 0]) and is_neighbour_outlier(
                 xy, m, tolerance_px[m], tables.ring_weights, neighbours
             )
-        predicted, variance, leverage, support = predict_markers(xy, doubtful, tables.marker_mm, neighbours)
+        predicted, variance, leverage, _ = predict_markers(xy, doubtful, tables.marker_mm, neighbours)
         for m in np.flatnonzero(doubtful):
             distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
             sigma = np.sqrt(variance[m] * (1 + leverage[m]))
-            misfit[m] = _misfit_ratio(m, distance, sigma, support[m], evidence)
+            misfit[m] = _misfit_ratio(m, distance, sigma, evidence)
         worst = np.zeros(count, np.bool_)
         for m in np.flatnonzero(misfit > 1.0):
             worst[m] = True
@@ -202,29 +167,23 @@ def _update_rejecting_outliers(xy, cov, tolerance_px, evidence, tables):  # type
 
 
 @compiled
-def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-untyped-def]
+def _misfit_ratio(m, distance, sigma, evidence):  # type: ignore[no-untyped-def]
     """The distance of a marker from its prediction over the allowed distance.
 
     It is infinite where neither triangles nor neighbours confirm the marker, or the prediction is too uncertain. The
-    allowed distance is smaller where synthesis does not explain the image; the neighbours must then be known. It is
-    larger where all triangles agree.
+    allowed distance is smaller where synthesis does not explain the image; the neighbours must then be known.
 
     Args:
         distance: from the prediction, px.
         sigma: standard deviation of the prediction, px.
-        support: number of known neighbours.
     """
     edge_px, explained, agreed = evidence.edge_px[m], evidence.explained[m], evidence.agreed[m]
     is_intact = evidence.is_intact[m]
     confirmed, allowed = explained or agreed, MAX_DISTANCE
-    if is_intact:
-        allowed = MAX_AGREED_DISTANCE
-    elif not confirmed:
+    if not confirmed:
         allowed = MAX_UNEXPLAINED_DISTANCE
     elif not explained:
         allowed = MAX_AGREED_UNEXPLAINED_DISTANCE
-    elif support >= MILD_SUPPORT:
-        allowed = clamp(TOLERANCE_SIGMAS * sigma / edge_px, MAX_DISTANCE, MAX_TOLERANCE)
     max_deviation = MAX_PREDICTED_DEVIATION if confirmed else MAX_UNEXPLAINED_DISTANCE
     if not (explained or is_intact or sigma < max_deviation * edge_px):
         return np.inf
@@ -232,90 +191,3 @@ def _misfit_ratio(m, distance, sigma, support, evidence):  # type: ignore[no-unt
     if np.isfinite(ratio):
         return ratio
     return 0.0 if agreed else np.inf
-
-
-@compiled
-def _update_rejecting_outer_outliers(xy, cov, edge_px, tables):  # type: ignore[no-untyped-def]
-    """Set to NaN the markers of the outermost layer that do not lie where the layers inside put them.
-
-    An acute corner there belongs to few cells, and ink that ran out moves the marker together with its neighbours.
-    """
-    neighbours, weights = tables.inward_neighbours, tables.inward_weights
-    rejected = np.zeros(edge_px.shape[0], np.bool_)
-    for m in np.flatnonzero((neighbours[:, 0] >= 0) & ~np.isnan(xy[:, 0])):
-        # only markers beyond the smallest tolerance are predicted
-        rejected[m] = is_neighbour_outlier(xy, m, OUTER_TOLERANCE[0] * edge_px[m], weights, neighbours)
-    if not rejected.any():
-        return
-    predicted, variance, _, support = predict_markers(xy, rejected, tables.marker_mm, neighbours)
-    for m in np.flatnonzero(rejected):
-        # a quadratic that fits the layers inside badly predicts the outermost layer badly
-        sigmas = OUTER_TOLERANCE_SIGMAS * np.sqrt(variance[m]) / edge_px[m]
-        allowed = clamp(sigmas, OUTER_TOLERANCE[0], OUTER_TOLERANCE[1]) * edge_px[m]
-        limit = min(allowed, MAX_OUTER_DISTANCE * _shortest_edge(xy, m, tables.first_ring, edge_px[m]))
-        distance = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
-        rejected[m] = distance > limit and support[m] >= MIN_QUADRATIC_NEIGHBOURS
-    xy[rejected], cov[rejected] = np.nan, np.nan
-
-
-@compiled
-def _update_shifted_markers(xy, cov, shifted, evidence, tables):  # type: ignore[no-untyped-def]
-    """Keep, restore or drop the uncertain rim markers that refinement moved far from their triangles.
-
-    Where two gridlines end that may bend, the corner between them may slide along both. A shifted marker (``shifted``
-    (M,) bool) stays where refinement took it nearer to where the neighbours put it. Otherwise it returns to its
-    triangles, or becomes NaN where the neighbours contradict these. Where triangles do not agree, the initial place
-    was a guess: the marker then stays near to where the neighbours put it, with half the distance added as deviation.
-    """
-    if not shifted.any():
-        return
-    marker_mm, start, edge_px, agreed = (
-        tables.marker_mm,
-        evidence.initial_px,
-        evidence.edge_px,
-        evidence.agreed,
-    )
-    predicted, _, _, support = predict_markers(xy, shifted, marker_mm, tables.neighbours)
-    # at the corners of the rim two rings hold too few markers for a quadratic; the layers inside hold enough
-    few = shifted & (support < MIN_QUADRATIC_NEIGHBOURS)
-    if few.any():
-        inward, _, _, inward_support = predict_markers(xy, few, marker_mm, tables.inward_neighbours)
-        for m in np.flatnonzero(few):
-            predicted[m], support[m] = inward[m], inward_support[m]
-    for m in np.flatnonzero(shifted):
-        after = np.hypot(xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1])
-        before = np.hypot(start[m, 0] - predicted[m, 0], start[m, 1] - predicted[m, 1])
-        limit, known = MAX_DISTANCE * edge_px[m], support[m] >= MIN_QUADRATIC_NEIGHBOURS
-        if known and after < limit and (after < before or not agreed[m]):
-            if not after < before:
-                cov[m, 0, 0] += 0.25 * after**2
-                cov[m, 1, 1] += 0.25 * after**2
-        elif known and before < limit and agreed[m]:
-            xy[m] = start[m]
-            cov[m] = np.eye(2) * (AGREED_DEVIATION * edge_px[m]) ** 2
-        else:
-            xy[m], cov[m] = np.nan, np.nan
-
-
-@inlined_no_refcount
-def _is_shifted(xy, cov, m, evidence):  # type: ignore[no-untyped-def]
-    """Whether a marker lies far from its initial place, and is uncertain or has gridlines that may bend."""
-    edge_px, start = evidence.edge_px[m], evidence.initial_px
-    variance = cov[m, 0, 0] + cov[m, 1, 1]
-    if variance > (UNCERTAIN_DEVIATION * edge_px) ** 2:
-        limit = MAX_UNCERTAIN_SHIFT
-    elif evidence.bend_deviation_px[m] > MAX_GRIDLINE_BEND * edge_px:
-        limit = MAX_REFINEMENT_SHIFT
-    else:
-        return False
-    dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-    return dx * dx + dy * dy > (limit * edge_px) ** 2
-
-
-@compiled
-def _shifted_rim_markers(xy, cov, evidence, is_rim):  # type: ignore[no-untyped-def]
-    """(M,) bool, the shifted markers of the rim."""
-    shifted = np.zeros(xy.shape[0], np.bool_)
-    for m in range(xy.shape[0]):
-        shifted[m] = is_rim[m] and _is_shifted(xy, cov, m, evidence)
-    return shifted

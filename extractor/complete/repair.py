@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.complete.consistency_filter import MILD_SUPPORT, is_inside_image, reject_inconsistent_markers
+from extractor.complete.consistency_filter import is_inside_image, reject_inconsistent_markers
 from extractor.complete.layer_arcs import predict_by_layer
 from extractor.complete.uncertain_markers import find_uncertain_markers, update_by_fusion
 from extractor.layout.lattice_tables import Lattice
@@ -30,6 +30,7 @@ from extractor.result import Status
 MAX_IMPLIED_DISTANCE = 0.1  # between the place that cells imply and the prediction by markers
 IMPLIED_DEVIATION = 0.02  # of a place that cells imply
 BORDER_WIDTH = 0.25  # of the image's border, which cuts cells; cells there imply nothing
+MILD_SUPPORT = 10  # known neighbours of two rings that make an omission mild
 MAX_REPAIRED_DEVIATION = 0.08  # of a repaired marker: three such deviations stay below a quarter of an edge
 MAX_FITTED_DEVIATION = 0.05  # of a fitted marker: a layer's quadratic is wrong where the surface is bent
 MIN_RIM_SUPPORT = 6  # known neighbours of a lost marker that cells imply

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates, marker_id
 from extractor.layout.neighbour_tables import (
     FIRST_RING,
-    inward_neighbour_table,
     neighbour_table,
     ring_weights,
 )
@@ -47,21 +46,16 @@ class RingTables(NamedTuple):
     Attributes:
         marker_mm: (M, 2) float64, layout frame.
         neighbours, ring_weights: (M, 18) int32 and float64, see ``Lattice``.
-        inward_neighbours, inward_weights: (M, 18) int32 and float64, see ``Lattice``.
         first_ring: (M, 6) int32, the six markers around each marker.
         present: (M,) bool, the markers that touch a colored or white cell.
-        is_rim: (M,) bool, the markers that have fewer than six present neighbours.
         layers: number of layers.
     """
 
     marker_mm: NDArray[np.float64]
     neighbours: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
-    inward_neighbours: NDArray[np.int32]
-    inward_weights: NDArray[np.float64]
     first_ring: NDArray[np.int32]
     present: NDArray[np.bool_]
-    is_rim: NDArray[np.bool_]
     layers: int
 
 
@@ -78,10 +72,7 @@ class Lattice:
         axial: (U, 2) int32, the cells' (q, r).
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each marker, -1 outside the pattern.
-        inward_neighbours: (M, 18) int32, for markers of the outermost layer the nearest markers of the other layers,
-            else -1.
-        ring_weights, inward_weights: (M, 18) float64, weights of ``neighbours`` and of ``inward_neighbours`` that
-            give a marker's place; 0 where the neighbours are too few.
+        ring_weights: (M, 18) float64, weights of ``neighbours`` that give a marker's place; 0 where these are too few.
         present: (M,) bool, the markers that touch a colored or white cell.
     """
 
@@ -93,9 +84,7 @@ class Lattice:
     axial: NDArray[np.int32]
     layer: NDArray[np.int32]
     neighbours: NDArray[np.int32]
-    inward_neighbours: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
-    inward_weights: NDArray[np.float64]
     present: NDArray[np.bool_]
 
     @cached_property
@@ -136,11 +125,8 @@ class Lattice:
             marker_mm=self.marker_mm,
             neighbours=self.neighbours,
             ring_weights=self.ring_weights,
-            inward_neighbours=self.inward_neighbours,
-            inward_weights=self.inward_weights,
             first_ring=self.first_ring,
             present=self.present,
-            is_rim=self.is_rim,
             layers=self.layers,
         )
 
@@ -172,7 +158,6 @@ def lattice_of(reference: Reference) -> Lattice:
     inked = np.flatnonzero((reference.cell_color != BLACK) & (reference.cell_color != WHITE))
     corners = reference.cell_corners[inked]
     neighbours = neighbour_table(coordinates, int(reference.layer.max()))
-    inward_neighbours = inward_neighbour_table(coordinates, reference.layer)
     lower_left = corners[np.arange(len(inked)), coordinates.sum(axis=1)[corners].argmin(axis=1)]
     return Lattice(
         layers=int(reference.layer.max()),
@@ -183,9 +168,7 @@ def lattice_of(reference: Reference) -> Lattice:
         axial=coordinates[lower_left],
         layer=reference.layer,
         neighbours=neighbours,
-        inward_neighbours=inward_neighbours,
         ring_weights=ring_weights(reference.xy_mm, neighbours),
-        inward_weights=ring_weights(reference.xy_mm, inward_neighbours),
         present=reference.present,
     )
 

@@ -36,19 +36,6 @@ def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     return np.asarray(_neighbour_ids(axial, layers))
 
 
-def inward_neighbour_table(axial: NDArray[np.int32], layer: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(M, 18) int32: for markers of the outermost layer, the nearest markers of the other layers; else -1."""
-    from scipy.spatial import cKDTree
-
-    table = np.full((len(layer), len(RING_STEPS)), -1, np.int32)
-    outer, inner = np.flatnonzero(layer == layer.max()), np.flatnonzero(layer < layer.max())
-    count = min(len(RING_STEPS), len(inner))
-    xy = axial @ np.array([[1.0, 0.0], [0.5, 0.75**0.5]])
-    nearest = cKDTree(xy[inner]).query(xy[outer], count)[1].reshape(len(outer), -1)
-    table[outer, :count] = inner[nearest]
-    return table
-
-
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
     """(M, 18) float64 weights of the neighbours ``table`` (M, 18) whose weighted sum is a marker's place.
 

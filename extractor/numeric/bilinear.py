@@ -82,13 +82,3 @@ def fill_patch_mean(flat, height, width, x, y, radius, out):  # type: ignore[no-
     share = 1.0 / (7 * SUBPIXEL_STEPS * SUBPIXEL_STEPS)
     out[0], out[1], out[2] = s0 * share, s1 * share, s2 * share
     return True
-
-
-@compiled
-def clamp(value, low, high):  # type: ignore[no-untyped-def]
-    """The value limited to low and high; NaN stays NaN."""
-    if value < low:
-        return low
-    if value > high:
-        return high
-    return value

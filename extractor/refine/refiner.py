@@ -53,15 +53,14 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
-from extractor.refine.synthesis_steps import SMALL_BLUR, WIDE_BLUR, SynthesisSolver
+from extractor.refine.synthesis_steps import SynthesisSolver
 
 SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first
+SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next
 SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur
-# A first step may be taken where usual gridlines have so many pixels, and the blur so much of what the preset asks for.
-COARSE_EDGE_PX, COARSE_BLUR = 4.5, 0.9
 # Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
 UNEXPLAINED_NOISE_RATIO = 3.0
 
@@ -106,7 +105,7 @@ class Refiner:
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(estimate.measured), np.nan)
             estimate, contrasts, places = self._first_estimate(pyramid.level(scale), places, xy)
-        return self._final_steps(pyramid.level(scale), estimate, contrasts, places, short_edge, pyramid)
+        return self._final_steps(pyramid.level(scale), estimate, contrasts, places, short_edge)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """The factor by which an image with this blur and these edges is reduced."""
@@ -172,7 +171,6 @@ class Refiner:
         contrasts: EdgeContrasts,
         places: InitialMarkers,
         edge_px: float,
-        pyramid: Pyramid | None = None,
     ) -> RefinedMarkers:
         """The last round of profiles, or synthesis where the blur asks for it.
 
@@ -180,8 +178,6 @@ class Refiner:
             view: the image.
             estimate, contrasts: after the first round of profiles.
             places, edge_px: the places and a short edge, of the full image.
-            pyramid: allows a first step at twice the scale, where blur and usual gridlines allow that and only short
-                gridlines do not.
         """
         topology, schedule = self._topology, self._schedule
         places, edge_px = places_in_view(view, places), edge_px / view.scale
@@ -191,12 +187,8 @@ class Refiner:
         start = with_pattern_moved(topology, estimate)
         if estimate.sigma < schedule.sharp_blur_share * edge_px and view.scale < schedule.cheap_reduction:
             return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
-        coarser = start.sigma >= 2 * COARSE_BLUR * schedule.reduction_blur_px
-        blurred = coarser or start.sigma >= WIDE_BLUR * edge_px
-        usual_px, spent = median_edge(start.xy, topology.edges) if blurred else edge_px, 0.0
-        if pyramid and coarser and usual_px >= 2 * COARSE_EDGE_PX:
-            start, spent = self._coarse_step(view, start, pyramid.level(2 * view.scale))
-        estimate = self._synthesis_solver.steps(view, start, schedule, edge_px, usual_px, spent)
+        usual_px = median_edge(start.xy, topology.edges)
+        estimate = self._synthesis_solver.steps(view, start, schedule.steps, usual_px)
         return self._accept_or_recover(view, estimate, contrasts, places)
 
     def _final_profiles(
@@ -213,16 +205,6 @@ class Refiner:
         xy[outliers], cov[outliers] = np.nan, np.nan
         update_obstructed_markers(xy, cov, suspect, start_places(places))
         return self._refined_markers(view, estimate, xy, cov, ~suspect, places)
-
-    def _coarse_step(
-        self, view: PyramidLevel, estimate: Estimate, coarse: PyramidLevel
-    ) -> tuple[Estimate, float]:
-        """The estimate after a first step in a coarser view, and the effort.
-
-        The markers start nearer then, for a fraction of a step.
-        """
-        stepped, spent = self._synthesis_solver.first_step(coarse, rescaled(estimate, view, coarse))
-        return with_pattern_moved(self._topology, rescaled(stepped, coarse, view)), spent
 
     def _accept_or_recover(
         self, view: PyramidLevel, estimate: Estimate, contrasts: EdgeContrasts, places: InitialMarkers

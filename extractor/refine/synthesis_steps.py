@@ -1,8 +1,4 @@
-"""Steps by synthesis: the pattern is drawn and compared with the image; again only around markers that still move.
-
-One step is nearly enough. Where a marker stepped far, its gridlines were not where they were read, and their sums hold
-no longer: a step is taken around it, between all other markers, whose sums stay valid.
-"""
+"""Steps by synthesis: the pattern is drawn and compared with the image, and all markers are solved."""
 
 from __future__ import annotations
 
@@ -15,7 +11,6 @@ from numpy.typing import NDArray
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
-from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import DrawingBuffers, Synthesis, allocate_drawing_buffers, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_misfit
@@ -27,7 +22,6 @@ from extractor.refine.measure.gridline_weights import (
     update_for_blur,
     weigh_gridlines,
 )
-from extractor.refine.partial_step import partial_step
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
     BendingPrior,
@@ -40,44 +34,18 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.solve.convergence import (
     WIDE_BLUR_REMAINDER,
-    ConvergenceRule,
-    bent_share,
     convergence_covariance,
-    median_deviation,
-    step_effort,
-    unconverged_markers,
 )
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.ink_levels import level_change
 from extractor.refine.synthesis.residual_kernel import A, B
 
-BLUR_TOLERANCE = 0.03  # relative error of the blur of a drawing that is kept
-LEVEL_TOLERANCE = (
-    0.006  # likewise, of the levels. Both may be larger where the markers' deviation explains it:
-)
-BLUR_NOISE_FACTOR, LEVEL_NOISE_FACTOR = (
-    0.75,
-    0.18,
-)  # relative error per deviation of a marker in units of the blur
-MAX_BLUR_TOLERANCE = 0.2  # relative error of the blur that no deviation explains
-SMALL_BLUR = 0.12  # of a short edge; above that, blur, levels and places converge together;
-MIN_BEND = 0.02  # of an edge, and where gridlines bend by more,
-MAX_BENT_SHARE = 0.25  # of them, each step bends others. Then
-HARD_EFFORT = 1.5  # times the effort is allowed
 WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
 # (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
-WIDE_PATIENCE = 2  # steps there at least, after which no fewer markers move,
-WIDE_EFFORT = 0.6  # and share of the effort that is allowed in images of
-USUAL_PIXELS = 640 * 480  # and more in larger ones, which take longer anyway
-MAX_STEPS = 10
-MAX_EXPLAINED_NOISE = 2.0  # times the noise inside the cells, in a drawing that explains all but dirt
-MAX_BUFFERS = 2  # kept, for images of so many shapes: a frame, and its coarser view
-MAX_PARTIAL_SHARE = 0.7  # of the markers that are drawn again; above, everything is
-MAX_PARTIAL_SHARE_DIRTY = 0.45  # of them, once dirt has moved some: dirt moves so many, too
+MAX_BUFFERS = 2  # kept, for images of so many shapes
 NO_CLEARANCE = np.empty((0, 4))
 
 
@@ -134,92 +102,24 @@ class SynthesisSolver:
             kept[shape] = allocate_drawing_buffers(shape, self._topology)
         return kept[shape]
 
-    def first_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, float]:
-        """The estimate after a first step from everything, and the effort.
-
-        No gridline may bend: far from the markers' places, gridlines would take up the error of the markers.
-        """
-        estimate, drawing = self._full_step(view, _without_bending(estimate))
-        return _overlap_corrected(estimate, drawing), step_effort(drawing.edge_px)
-
-    def steps(
-        self,
-        view: PyramidLevel,
-        estimate: Estimate,
-        schedule: Schedule,
-        edge_px: float,
-        usual_px: float,
-        spent: float = 0.0,
-    ) -> Estimate:
-        """The estimate after steps until it converges, or as many as a preset allows.
+    def steps(self, view: PyramidLevel, estimate: Estimate, count: int, usual_px: float) -> Estimate:
+        """The estimate after a number of steps, each over all markers.
 
         Args:
             view: the image.
             estimate: with its pattern where the last step left the markers.
-            schedule: of the preset.
-            edge_px, usual_px: a short edge in the view, and a usual one, if these are much blurred.
-            spent: the effort of a step that has already been taken.
+            count: number of steps.
+            usual_px: a usual edge in the view.
         """
-        begun = spent > 0.0
         wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
-        estimate, drawing = self._full_step(view, self._with_bending(estimate, wide_blur))
-        drawn_edge_px, least_moving, idle_steps, dirt_found = drawing.edge_px, len(estimate.xy), 0, False
-        effort_share = _wide_blur_effort_share(view) if wide_blur else 1.0
-        patience = max(schedule.patience, WIDE_PATIENCE) if wide_blur else schedule.patience
-        spent += step_effort(drawn_edge_px)
-        for step in range(MAX_STEPS - 1):
-            corrected = _overlap_corrected(estimate, drawing)
-            slow = not wide_blur and _converges_slowly(estimate, edge_px)
-            allowed = schedule.max_synthesis_effort * (HARD_EFFORT if slow else effort_share)
-            if (begun or step > 0) and spent + step_effort(drawn_edge_px, 0.0) > allowed:
-                break
-            redrawn, moving, dirty = self._unconverged(corrected, drawing, schedule, wide_blur)
-            changed = _has_appearance_changed(estimate, drawing, schedule.converged_deviations) and (
-                wide_blur or not dirty
-            )
-            count = np.count_nonzero(redrawn)
-            everything = bool(changed or count > MAX_PARTIAL_SHARE * len(redrawn))
-            spent += step_effort(drawn_edge_px, None if everything else count / len(redrawn))
-            # what moves no fewer markers again and again is nothing that a drawing could explain
-            idle_steps = idle_steps + 1 if moving >= least_moving and not changed else 0
-            dirt_found = dirt_found or dirty
-            by_dirt = dirty or (dirt_found and count > MAX_PARTIAL_SHARE_DIRTY * len(redrawn))
-            ended = idle_steps == patience or (
-                by_dirt and not everything and step >= schedule.max_steps_in_dirt
-            )
-            if not (everything or moving) or ended or ((begun or step > 0) and spent > allowed):
-                break
-            least_moving = min(least_moving, len(estimate.xy) if changed else moving)
-            if everything:
-                moved = with_pattern_moved(self._topology, corrected)
-                estimate, drawing = self._full_step(view, self._with_bending(moved, wide_blur))
-            else:
-                estimate = estimate._replace(reliable=corrected.reliable)
-                estimate, drawing = self._partial_step(view, estimate, drawing, redrawn, wide_blur)
-        else:
-            corrected = _overlap_corrected(estimate, drawing)
-        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawn_edge_px) ** 2 if wide_blur else 0.0
-        cov = convergence_covariance(corrected.measured - drawing.xy, drawing.sigma, remaining)
-        return corrected._replace(convergence_cov_px2=cov)
-
-    def _unconverged(
-        self, estimate: Estimate, drawing: Synthesis, schedule: Schedule, wide_blur: bool
-    ) -> tuple[NDArray[np.bool_], int, bool]:
-        """``UnconvergedMarkers`` after a step."""
-        assert estimate.reading is not None
-        rule = ConvergenceRule(
-            converged_blur_share=schedule.converged_blur_share,
-            sigma=drawing.sigma,
-            converged_deviations=schedule.converged_deviations,
-            max_moving_share=schedule.max_moving_share,
-            max_partial_share=1.0 if wide_blur else schedule.max_partial_share,
-            max_partial_share_in_dirt=schedule.max_partial_share_in_dirt,
-            explained=estimate.noise < MAX_EXPLAINED_NOISE * estimate.pixel_noise,
-        )
-        moves = estimate.measured, drawing.xy, estimate.normalized_steps
-        tables = estimate.reading.weight, self._topology.spokes, self._topology.edges
-        unconverged: tuple[NDArray[np.bool_], int, bool] = unconverged_markers(*moves, rule, *tables)
-        return unconverged
+        for step in range(count):
+            if step > 0:
+                estimate = with_pattern_moved(self._topology, estimate)
+            stepped, drawing = self._full_step(view, self._with_bending(estimate, wide_blur))
+            estimate = _overlap_corrected(stepped, drawing)
+        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
+        cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)
+        return estimate._replace(convergence_cov_px2=cov)
 
     def _with_bending(self, estimate: Estimate, wide_blur: bool) -> Estimate:
         """The estimate with the roughness that lets its gridlines bend; with none where the blur is wide.
@@ -232,18 +132,6 @@ class SynthesisSolver:
         """A step from everything."""
         drawing = draw_pattern(view, self._topology, estimate, self.buffers(view.image.shape))
         return self._update_estimate(estimate, drawing), drawing
-
-    def _partial_step(
-        self,
-        view: PyramidLevel,
-        estimate: Estimate,
-        drawing: Synthesis,
-        redrawn: NDArray[np.bool_],
-        wide_blur: bool,
-    ) -> tuple[Estimate, Synthesis]:
-        """A step around the markers to draw again (M,) bool, with the sums of all others as they were."""
-        buffers = self.buffers(view.image.shape)
-        return partial_step(view, self._topology, estimate, drawing, redrawn, buffers, wide_blur)
 
     def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
         """The estimate after the step that the sums of the drawing ask for."""
@@ -304,29 +192,3 @@ def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:
     measured = estimate.measured + missing / (1.0 - missing) * (estimate.measured - drawing.xy)
     reliable = np.where(np.isnan(estimate.reliable), np.nan, measured)
     return estimate._replace(measured=measured, reliable=reliable)
-
-
-def _wide_blur_effort_share(view: PyramidLevel) -> float:
-    """The share of the preset's effort that is allowed where blur is wide."""
-    pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
-    return float(min(WIDE_EFFORT * max(pixels / USUAL_PIXELS, 1.0), 1.0))
-
-
-def _converges_slowly(estimate: Estimate, edge_px: float) -> bool:
-    """Whether some gridlines are much blurred for their length, or many are bent; ``edge_px`` is a short edge."""
-    if estimate.sigma > SMALL_BLUR * edge_px:
-        return True
-    return bool(bent_share(estimate.bend, MIN_BEND * edge_px) > MAX_BENT_SHARE)
-
-
-def _has_appearance_changed(estimate: Estimate, drawing: Synthesis, converged_deviations: float) -> bool:
-    """Whether blur or levels of the estimate differ from those drawn, by more than the noise that
-    ``converged_deviations`` standard deviations of a marker make."""
-    blur = abs(estimate.sigma - drawing.sigma) / drawing.sigma
-    levels = level_change(drawing.levels.cell, estimate.levels.cell)
-    if blur < BLUR_TOLERANCE and levels < LEVEL_TOLERANCE:
-        return False
-    noise = converged_deviations * median_deviation(estimate.information.diagonal) / drawing.sigma
-    max_blur = min(max(BLUR_TOLERANCE, BLUR_NOISE_FACTOR * noise), MAX_BLUR_TOLERANCE)
-    max_levels = max(LEVEL_TOLERANCE, LEVEL_NOISE_FACTOR * noise)
-    return bool(blur > max_blur or levels > max_levels)

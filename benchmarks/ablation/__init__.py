@@ -1,0 +1,1 @@
+"""``python -m benchmarks.ablation``: what each rule of the reader is worth."""

@@ -1,0 +1,148 @@
+"""What each rule of the reader is worth: every rule switched off in a copy of the reader, over the same pictures.
+
+    python -m benchmarks.ablation [--rule NAME ...] [--preset NAME] [--pictures N] [--seed S] [--json FILE]
+
+A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
+that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
+it wrong markers, lost markers or the RMS of measured markers rise by 2 % or more, with a paired 95 % interval above
+zero (bootstrap over pictures). Without a seed, that of the commit's hash is taken.
+
+Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
+shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
+are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
+processor times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from benchmarks.suites.ablation.comparison import Change, Comparison, compare
+from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
+from benchmarks.suites.ablation.rules import BY_NAME, RULES, Kind, Rule
+from benchmarks.suites.ablation.trial import PictureScore, read_without
+from benchmarks.suites.camera.cases import commit_seed
+from benchmarks.support.machine import conditions_text, write_json
+from extractor.presets import PRESETS
+
+SUITES: dict[Kind, tuple[str, ...]] = {"accuracy": POOLED, "no wrong id": (PROVOKING,)}
+PICTURES = 60  # of each suite
+HEAD = (
+    f"{'rule':<22}{'stage':<11}{'kind':<13}{'pictures':>9}{'touched':>8}{'ids':>9}{'positions':>10}"
+    f"{'lost':>8}{'difference, 95 %':>27}{'RMS px':>9}{'difference in %, 95 %':>27}{'typical':>9}"
+    f"{'difference in %, 95 %':>27}{'z':>12}{'time':>6}  verdict"
+)
+
+
+def scores_by_suite(
+    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str
+) -> dict[str, list[PictureScore]]:
+    """The scores without the rules, by suite."""
+    found: dict[str, list[PictureScore]] = {picture.suite: [] for picture in pictures}
+    for picture, score in zip(pictures, read_without(rules, pictures, preset), strict=True):
+        found[picture.suite].append(score)
+    return found
+
+
+def try_rules(
+    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
+) -> Iterable[Comparison]:
+    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules."""
+    full = scores_by_suite((), pictures, preset)
+
+    def try_rule(rule: Rule) -> Comparison:
+        own = [picture for picture in pictures if picture.suite in SUITES[rule.kind]]
+        without = scores_by_suite((rule,), own, preset)
+        suites = list(without)
+        return compare(
+            rule,
+            [score for suite in suites for score in full[suite]],
+            [score for suite in suites for score in without[suite]],
+        )
+
+    with ThreadPoolExecutor(processes) as pool:
+        yield from pool.map(try_rule, rules)
+
+
+def comparison_line(found: Comparison) -> str:
+    """The line of a rule below ``HEAD``."""
+    return (
+        f"{found.rule.name:<22}{found.rule.stage:<11}{found.rule.kind:<13}{found.pictures:>9}{found.touched:>8}"
+        f"{_pair(found.wrong_ids):>9}{_pair(found.wrong_positions):>10}"
+        f"{found.lost.full:>8.0f}{_interval(found.lost, 1.0, 0):>27}"
+        f"{found.rms_px.full:>9.4f}{_interval(found.rms_px, 100 / found.rms_px.full, 2):>27}"
+        f"{found.typical_px.full:>9.4f}{_interval(found.typical_px, 100 / found.typical_px.full, 2):>27}"
+        f"{found.z[0]:>6.2f}>{found.z[1]:.2f}{found.time_ratio:>7.2f}  {found.verdict}"
+    )
+
+
+def _pair(counts: tuple[int, int]) -> str:
+    return f"{counts[0]}>{counts[1]}"
+
+
+def _interval(change: Change, unit: float, digits: int) -> str:
+    """The difference and its interval, times the unit."""
+    value, low, high = (unit * number for number in (change.difference, change.low, change.high))
+    return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
+
+
+def _row(found: Comparison) -> dict[str, object]:
+    changes = {name: getattr(found, name)._asdict() for name in ("wrong", "lost", "rms_px", "typical_px")}
+    named = {"rule": found.rule.name, "stage": found.rule.stage, "kind": found.rule.kind}
+    return {**found._asdict(), **changes, **named, "verdict": found.verdict}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Draw the pictures, read them with the full reader and without each rule, print the table."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.ablation", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument(
+        "--rule", action="append", choices=tuple(BY_NAME), metavar="NAME", help="all by default"
+    )
+    parser.add_argument("--preset", choices=tuple(PRESETS), default="balanced")
+    parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of each suite")
+    parser.add_argument("--seed", type=int, metavar="S", help="of all random choices")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
+    parser.add_argument("--processes", type=int, default=1, metavar="N", help="rules tried at the same time")
+    parser.add_argument("--list", action="store_true", help="print the rules, try none")
+    options = parser.parse_args(arguments)
+    rules = [BY_NAME[name] for name in options.rule] if options.rule else list(RULES)
+    if options.list:
+        print("\n".join(f"{rule.name:<22}{rule.stage:<11}{rule.kind:<13}{rule.purpose}" for rule in rules))
+        return 0
+    if options.pictures < 1:
+        parser.error(f"--pictures is {options.pictures}; it must be 1 or more")
+    try:
+        seed = commit_seed() if options.seed is None else options.seed
+    except ValueError as error:
+        parser.error(str(error))
+    if seed < 0:
+        parser.error(f"--seed is {seed}; it must be 0 or more")
+    started, found = time.perf_counter(), []
+    suites = list(dict.fromkeys(suite for rule in rules for suite in SUITES[rule.kind]))
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = [
+            picture
+            for suite in suites
+            for picture in keep_pictures(suite, options.pictures, seed, Path(folder))
+        ]
+        print(HEAD, flush=True)
+        for comparison in try_rules(rules, pictures, options.preset, options.processes):
+            found.append(comparison)
+            print(comparison_line(comparison), flush=True)
+    print(f"{len(pictures)} pictures, seed {seed}, {options.preset}; {time.perf_counter() - started:.0f} s")
+    print(conditions_text())
+    if options.json:
+        write_json(options.json, {"seed": seed, "rows": [_row(comparison) for comparison in found]})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""The trial of rules: pictures read by a copy of the reader without them, and their scores."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
+from benchmarks.suites.ablation.rules import Rule
+from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.scoring.calibration import squared_distances
+from benchmarks.support.code_copy import ROOT, copy_package, replace_text
+from extractor import Status
+
+WRONG_POSITION, SAME_PLACE = (
+    0.5,
+    0.3,
+)  # in the shortest edges: beyond it a position is wrong; at a marker's place
+
+
+class PictureScore(NamedTuple):
+    """Counts of markers in one picture.
+
+    Attributes:
+        wrong_ids: reported at the place of another marker, or in a picture without a pattern.
+        wrong_positions: reported more than half of the shortest edge from their place, but at no other's.
+        lost: visible, not reported.
+        visible: visible ones.
+        measured: measured, not wrong.
+        squared_px2: the sum of their squared errors, both axes.
+        reported: reported, not wrong.
+        d2: the sum of their squared errors over stated covariances.
+        ms: processor time; NaN after an exception.
+    """
+
+    wrong_ids: int
+    wrong_positions: int
+    lost: int
+    visible: int
+    measured: int
+    squared_px2: float
+    reported: int
+    d2: float
+    ms: float
+
+    @property
+    def wrong(self) -> int:
+        """Wrong ids and wrong positions."""
+        return self.wrong_ids + self.wrong_positions
+
+
+def read_without(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
+    """The scores of the pictures, read by a copy of the reader without these rules.
+
+    Without any rule this checkout's own reader reads them, which leaves its compiled functions to the copies.
+
+    Raises:
+        ValueError: a rule's text does not occur exactly once.
+        RuntimeError: the reader cannot be run.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder, out = Path(name) if rules else ROOT, Path(name) / "readings"
+        if rules:
+            copy_package("extractor", folder)
+        for rule in rules:
+            replace_text(rule.module, rule.text, rule.without, folder)
+        names = ", ".join(rule.name for rule in rules) or "any change"
+        result = subprocess.run(
+            [
+                *(sys.executable, "-m", "benchmarks.suites.ablation.worker", str(folder), preset, str(out)),
+                *(str(picture.path) for picture in pictures),
+            ],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode != 0:
+            raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
+        readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
+    return [
+        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
+    ]
+
+
+def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:
+    """The score of a reading against the pattern in the picture that it is nearest to."""
+    reported = reading.status != Status.LOST
+    if not truths:
+        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, reading.ms)
+    scores = [_score_pattern(reading, truth) for truth in truths]
+    return min(scores, key=lambda score: (score.wrong, score.lost))
+
+
+def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
+    reported = reading.status != Status.LOST
+    error_px = np.linalg.norm(reading.xy_px - truth.xy_px, axis=1)
+    wrong = reported & ~(error_px <= WRONG_POSITION * truth.edge_px)
+    known = np.flatnonzero(np.isfinite(truth.xy_px).all(axis=1))
+    wrong_ids = 0
+    for marker in np.flatnonzero(wrong):
+        distance_px = np.linalg.norm(truth.xy_px[known] - reading.xy_px[marker], axis=1)
+        nearest = known[distance_px.argmin()]
+        wrong_ids += bool(nearest != marker and distance_px.min() < SAME_PLACE * truth.edge_px[nearest])
+    right, measured = reported & ~wrong, (reading.status == Status.MEASURED) & ~wrong
+    d2 = squared_distances(reading.xy_px[right] - truth.xy_px[right], reading.cov_px2[right])
+    return PictureScore(
+        wrong_ids=wrong_ids,
+        wrong_positions=int(wrong.sum()) - wrong_ids,
+        lost=int((truth.visible & ~reported).sum()),
+        visible=int(truth.visible.sum()),
+        measured=int(measured.sum()),
+        squared_px2=float((error_px[measured] ** 2).sum()),
+        reported=int(right.sum()),
+        d2=float(d2[np.isfinite(d2)].sum()),
+        ms=reading.ms,
+    )
