@@ -5,10 +5,11 @@
 Every marker of a pad is moved by a normal scatter, in px per axis at edges of 20 px. Twelve pictures of the pad at
 rest, each in a pose of its own (any turn, tilts up to 25 degrees, edges of 18 to 21 px), tell the layout as made.
 Other pictures show the pad at rest, and then pressed and twisted before a camera that has not moved. "position" is of
-the markers in the picture of the contact, "displacement" is the difference of the two readings. The pictures are those of the standard scene: 640 x 480 px, blur 1 px, sRGB, noise 2/255. "/ bound" is the RMS error over
-the exact Cramer-Rao bound of free markers, of both pictures together. z is the RMS error over the stated covariance per
-axis: 1 is right. The places are those of the learnt layout, in um. All figures are pooled over patterns and pads; 95 %
-intervals are by bootstrap over pictures. Without a seed, it comes from the commit's hash.
+the markers in the picture of the contact, "displacement" is the difference of the two readings. The pictures are those
+of the standard scene: 640 x 480 px, blur 1 px, sRGB, noise 2/255. "/ bound" is the RMS error over the exact Cramer-Rao
+bound of free markers. z is the RMS error over the stated covariance per axis: 1 is right. The places are those of the
+learnt layout, in um. All figures are pooled over patterns and pads; 95 % intervals are by bootstrap over pictures.
+Without a seed, it comes from the commit's hash.
 """
 
 from __future__ import annotations

@@ -15,8 +15,10 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
-    from extractor import LearntLayout
+    from extractor import LearntLayout, Reference
 
+# RMS per axis; of a pad that is made well it is a hundredth, and a lens that shows straight lines straight adds nothing.
+MAX_USUAL_SCATTER_PITCHES = 0.1
 NOT_DETERMINED = "position, turn, size, shear and perspective of the whole pad; fitted to the nominal places"
 
 
@@ -79,8 +81,21 @@ def _print_figures(learnt: LearntLayout) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console().print(table)
+    scatter = learnt.scatter_mm / _mean_edge_mm(learnt.layout)
+    if scatter > MAX_USUAL_SCATTER_PITCHES:
+        print_warning(
+            f"the markers lie {scatter:.2f} pitches per axis from their nominal places, limit "
+            f"{MAX_USUAL_SCATTER_PITCHES:g}; check that LAYOUT is this pad's, unless the lens distorts strongly"
+        )
     if measured < present:
         print_warning(
             f"{present - measured} of {present} markers are measured in no picture and stay at their nominal places; "
             "show the whole pad in some pictures"
         )
+
+
+def _mean_edge_mm(layout: Reference) -> float:
+    import numpy as np
+
+    ends = layout.xy_mm[layout.edges]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
