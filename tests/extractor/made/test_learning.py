@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -88,20 +89,23 @@ def test_displacements_of_a_scattered_pad_reach_the_bound() -> None:
     assert unlearnt > 1.15 * of_bound and unlearnt_z > 2
 
 
-def test_pictures_are_read_as_with_the_true_layout() -> None:
+@pytest.mark.parametrize("preset", ["balanced", "accurate"])
+def test_pictures_are_read_as_with_the_true_layout(preset: Literal["balanced", "accurate"]) -> None:
     errors, z = {}, {}
     layouts = {
         "nominal": reference(nominal_layout()), "learnt": learnt().layout, "true": reference(made_layout()),
     }  # fmt: skip
-    seen = [pad_picture(number, PRESS) for number in range(200, 204)]
+    seen = [pad_picture(number, PRESS) for number in range(200, 206)]
     for name, layout in layouts.items():
-        extractor = Extractor(layout)
+        extractor = Extractor(layout, preset)
         read = [extractor.extract(picture.image) for picture in seen]
         error = np.concatenate([m.xy_px - s.truth.marker_xy_px for m, s in zip(read, seen, strict=True)])
         cov = np.concatenate([markers.cov_px2 for markers in read])
         errors[name], z[name] = np.sqrt((error**2).mean()), np.sqrt(squared_distances(error, cov).mean() / 2)
     assert errors["learnt"] < 1.05 * errors["true"] < 0.6 * errors["nominal"]
-    assert 0.9 < z["learnt"] < 1.2 < 2 < z["nominal"]
+    assert z["learnt"] < 1.05 * z["true"] < 0.6 * z["nominal"]
+    # How true the covariances of "balanced" are, with any layout, is the reader's affair.
+    assert preset == "balanced" or 0.9 < z["learnt"] < 1.2
 
 
 def test_the_same_pictures_give_the_same_layout() -> None:

@@ -17,7 +17,7 @@ from cmpdesign.inputs.files import MOST_PIXELS
 if TYPE_CHECKING:
     from extractor import LearntLayout, Reference
 
-# RMS per axis; of a pad that is made well it is a hundredth, and a lens that shows straight lines straight adds nothing.
+# RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
 MAX_USUAL_SCATTER_PITCHES = 0.1
 NOT_DETERMINED = "position, turn, size, shear and perspective of the whole pad; fitted to the nominal places"
 
