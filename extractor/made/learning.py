@@ -167,11 +167,9 @@ def _as_made(layout: Reference, found: Adjustment, side: str) -> Reference:
 
 
 def _rounded(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariances of so many digits that every run of a machine writes the same ones; still positive definite."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        largest = np.abs(covariance).max(axis=(1, 2), keepdims=True)
-        unit = 10.0 ** (np.floor(np.log10(largest)) - COVARIANCE_DIGITS + 1)
-        return np.asarray(np.round(covariance / unit) * unit + 0.0)
+    """Covariances of so many digits that every run of a machine writes the same ones."""
+    values = [float(f"{value:.{COVARIANCE_DIGITS - 1}e}") for value in covariance.ravel().tolist()]
+    return np.array(values).reshape(covariance.shape)
 
 
 def _learnt(layout: Reference, made: Reference, found: Adjustment, read: Sequence[Markers]) -> LearntLayout:

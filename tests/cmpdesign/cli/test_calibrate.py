@@ -28,7 +28,11 @@ def test_the_layout_as_made_is_written(folder: Path, tmp_path: Path) -> None:
         "calibrate", "pattern", folder / "layout.json", folder / "rest", "-o", tmp_path / "made.json"
     )
     assert result.exit_code == 0 and result.stderr == "", result.output
-    for words in ("10 of the front", "127 of 127 measured", "position, turn, size, shear and perspective"):
+    for words in (
+        "10 of the front",
+        "127 of 127 measured",
+        "position, turn, size, shear, perspective of the whole pad",
+    ):
         assert words in result.stdout
     assert result.stdout.endswith(f"wrote {tmp_path / 'made.json'}\n")
     made = load_layout(tmp_path / "made.json")

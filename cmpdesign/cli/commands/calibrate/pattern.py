@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
 MAX_USUAL_SCATTER_PITCHES = 0.1
-NOT_DETERMINED = "position, turn, size, shear and perspective of the whole pad; fitted to the nominal places"
+NOT_DETERMINED = "position, turn, size, shear, perspective of the whole pad"
 
 
 def pattern(
@@ -69,7 +69,7 @@ def _print_figures(learnt: LearntLayout) -> None:
     present, measured = int(learnt.layout.present.sum()), int(learnt.measured.sum())
     rows = {
         "pictures": f"{len(learnt.picture_z)} of the {made.side}, "
-        f"{learnt.picture_share.min():.1%} or more of the markers measured in each",
+        f"at least {learnt.picture_share.min():.1%} of the markers measured in each",
         "residuals": f"{learnt.z:.2f} stated deviations; worst picture {learnt.picture_z[worst]:.2f}, "
         f"{learnt.picture_rms_px[worst]:.4f} px per axis",
         "markers": f"{measured} of {present} measured",
