@@ -15,6 +15,7 @@ The rooms (folders and modules) in their order; a room imports only rooms before
 - ``refine``: all markers solved together, by profiles and synthesis.
 - ``complete``: repair of lost markers, and virtual markers.
 - ``pipeline``: the stages in their order, from an image to markers. ``draw`` shows their results.
+- ``made``: places of the markers on one pad, learnt from pictures at rest.
 - ``track``: sequences of images. ``space``: surfaces from two or more views.
 """
 
@@ -22,12 +23,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from extractor.errors import ExtractorError, ImageError, LayoutError, PoseError, RigError
+from extractor.errors import ExtractorError, ImageError, LayoutError, PoseError, RestError, RigError
 from extractor.result import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
     from extractor.layout.layout_file import load_layout, parse_layout
     from extractor.layout.reference import Reference
+    from extractor.made.learning import LearntLayout, learn_layout
     from extractor.pipeline import Extractor
     from extractor.space.camera import View
     from extractor.space.field import Field
@@ -46,6 +48,7 @@ __all__ = [
     "FrameStatus",
     "ImageError",
     "LayoutError",
+    "LearntLayout",
     "Markers",
     "Medium",
     "Origin",
@@ -55,6 +58,7 @@ __all__ = [
     "Reconstructor",
     "Reference",
     "Rest",
+    "RestError",
     "Rig",
     "RigError",
     "Shape",
@@ -68,6 +72,7 @@ __all__ = [
     "ViewExtractor",
     "VirtualStatus",
     "WindowPlane",
+    "learn_layout",
     "load_layout",
     "load_rig",
     "parse_layout",
@@ -79,6 +84,7 @@ _HOMES = {
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "FrameStatus": "extractor.track.tracker",
+    "LearntLayout": "extractor.made.learning",
     "Medium": "extractor.space.medium",
     "PointReason": "extractor.space.triangulation",
     "Reconstructor": "extractor.space.reconstruction",
@@ -94,6 +100,7 @@ _HOMES = {
     "View": "extractor.space.camera",
     "ViewExtractor": "extractor.space.views",
     "WindowPlane": "extractor.space.medium",
+    "learn_layout": "extractor.made.learning",
     "load_layout": "extractor.layout.layout_file",
     "load_rig": "extractor.space.rig",
     "parse_layout": "extractor.layout.layout_file",

@@ -21,3 +21,7 @@ class RigError(ExtractorError, ValueError):
 
 class PoseError(ExtractorError, ValueError):
     """Views whose poses cannot be estimated, or do not allow to measure in space; says which and why."""
+
+
+class RestError(ExtractorError, ValueError):
+    """Rest pictures from which no places can be learnt; says which picture, the value, the limit and the remedy."""

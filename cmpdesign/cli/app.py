@@ -21,6 +21,7 @@ from cmpdesign.cli.commands import (
     track,
     verify,
 )
+from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
 
 app = typer.Typer(
@@ -44,6 +45,7 @@ for function in (
 ):
     app.command(function.__name__, cls=Command)(function)
 app.add_typer(evaluate.app, name="evaluate")
+app.add_typer(calibrate.app, name="calibrate")
 
 
 def _print_version(wanted: bool) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from cmpdesign.files.images import ImageFileError
+from cmpdesign.inputs.files import is_folder
 
 IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 
@@ -27,6 +29,15 @@ def find_images(folder: Path) -> list[Path]:
             f"{folder}: holds no image; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
         )
     return paths
+
+
+def without_folders(paths: Sequence[Path]) -> list[Path]:
+    """The paths, with every folder replaced by its images.
+
+    Raises:
+        ImageFileError: a folder cannot be read, or holds no image.
+    """
+    return [image for path in paths for image in (find_images(path) if is_folder(path) else [path])]
 
 
 def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:

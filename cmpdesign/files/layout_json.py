@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -73,9 +74,15 @@ def pattern_digest(layout: Layout) -> str:
 
 def _as_made_object(as_made: AsMade) -> dict[str, Any]:
     found: dict[str, Any] = {"of": as_made.of, "product": as_made.product, "side": as_made.side}
-    found["outlines"] = [_without_repeats(outline.tolist()) for outline in as_made.outlines_mm]
+    if as_made.outlines_mm is not None:
+        found["outlines"] = [_without_repeats(outline.tolist()) for outline in as_made.outlines_mm]
     if as_made.covariance_mm2 is not None:
-        found["covariance_mm2"] = list(as_made.covariance_mm2)
+        places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
+        columns = {name: as_made.covariance_mm2[:, i, j].tolist() for name, (i, j) in places.items()}
+        found["covariance_mm2"] = {
+            name: [None if math.isnan(value) else value for value in column]
+            for name, column in columns.items()
+        }
     return found
 
 

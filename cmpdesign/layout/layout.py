@@ -20,25 +20,29 @@ DECIMALS = 9
 
 @dataclass(frozen=True, eq=False)
 class AsMade:
-    """How a product differs from the layout that it was made after.
+    """How a made pad differs from the layout that it was made after. The layout's markers are where they were made.
 
     Attributes:
         of: digest of the nominal layout.
-        product: name of the product: "laser", "mold", "print".
-        side: side of the pattern whose outlines these are: "front" or "back".
+        product: what made the pad: "laser", "mold", "print"; "measured" where pictures of the pad tell.
+        side: side of the pattern that was measured, or whose outlines these are: "front" or "back".
         outlines_mm: (N, K, 2) float64, layout frame: outline of every cell that is not black, in the layout's order,
-            counter-clockwise from the front; shorter outlines repeat their last point.
-        covariance_mm2: xx, xy, yy of every marker's place, from errors that differ from pad to pad; None: unknown.
+            counter-clockwise from the front; shorter outlines repeat their last point. None: triangles between the
+            markers.
+        covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
+            measured and stays at its nominal place; None: unknown.
     """
 
     of: str
     product: str
     side: Literal["front", "back"]
-    outlines_mm: NDArray[np.float64]
-    covariance_mm2: tuple[float, float, float] | None = None
+    outlines_mm: NDArray[np.float64] | None = None
+    covariance_mm2: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        self.outlines_mm.setflags(write=False)
+        for column in (self.outlines_mm, self.covariance_mm2):
+            if column is not None:
+                column.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class Layout:
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
         fiducial_diameter_mm: the marks' diameter.
-        as_made: how the cells of a made pad look; None: as designed.
+        as_made: where and how a pad was made; None: as designed.
     """
 
     pattern: str
@@ -124,7 +128,7 @@ class Layout:
     @cached_property
     def colored_outlines_mm(self) -> NDArray[np.float64]:
         """(N, K, 2) outlines of the ``colored_cells``: as made where this is known, else their corners."""
-        if self.as_made is not None:
+        if self.as_made is not None and self.as_made.outlines_mm is not None:
             return self.as_made.outlines_mm
         outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]
         return outlines

@@ -50,6 +50,6 @@ def _as_made(reference: Reference) -> AsMade | None:
     made = reference.as_made
     if made is None:
         return None
-    outlines = equal_length_outlines(made.outlines_mm)
+    outlines = None if made.outlines_mm is None else equal_length_outlines(made.outlines_mm)
     side = seen_side(made.side == "back")
     return AsMade(made.of, made.product, side, outlines, made.covariance_mm2)

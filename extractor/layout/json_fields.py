@@ -170,9 +170,14 @@ def integer_rows(value: object, field: str, high: int, widths: tuple[int, ...]) 
     return _integers(flat, field, high, width).reshape(-1, width)
 
 
-def lengths_mm(value: object, field: str, length: int) -> NDArray[np.float64]:
-    """(N,) finite float64 in mm, of either sign."""
-    return _lengths_mm(_list_value(value, field, length), field, 1)
+def lengths_mm(value: object, field: str, length: int, *, nullable: bool = False) -> NDArray[np.float64]:
+    """(N,) finite float64 in mm, of either sign; where this is allowed, NaN for null."""
+    column = _list_value(value, field, length)
+    if not nullable:
+        return _lengths_mm(column, field, 1)
+    lengths = _lengths_mm([0.0 if item is None else item for item in column], field, 1)
+    lengths[[item is None for item in column]] = np.nan
+    return lengths
 
 
 def points_mm(value: object, field: str) -> NDArray[np.float64]:

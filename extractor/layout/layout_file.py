@@ -6,7 +6,6 @@ digest of the geometry. ``layout.schema.json`` describes the format.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from os import PathLike
 from pathlib import Path
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 
 from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
+from extractor.layout.as_made_fields import read_as_made
 from extractor.layout.consistency import check_consistency
-from extractor.layout.reference import BLACK, COLORS, AsMade, Reference
+from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
@@ -30,8 +30,6 @@ FIELDS = (
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
 OPTIONAL_FIELDS = ("fiducials", "as_made")
-SIDES = ("front", "back")
-MIN_OUTLINE = 3
 
 
 def load_layout(path: str | PathLike[str]) -> Reference:
@@ -89,7 +87,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         digest=fields.text_field(document["digest"], "digest"),
         fiducials_mm=fiducials_mm,
         fiducial_diameter_mm=fiducial_diameter_mm,
-        as_made=_as_made(document, int(np.count_nonzero(color != BLACK))),
+        as_made=read_as_made(document, int(np.count_nonzero(color != BLACK)), count),
     )
     check_consistency(reference)
     _check_digest(reference)
@@ -149,59 +147,11 @@ def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
     return np.column_stack([x_mm, y_mm]), diameter_mm
 
 
-def _as_made(document: dict[str, Any], colored: int) -> AsMade | None:
-    """How the pad was made, with one outline for each of the ``colored`` cells; None for a pad as designed."""
-    if "as_made" not in document:
-        return None
-    made = fields.mapping(document["as_made"], "as_made")
-    optional = tuple(name for name in ("covariance_mm2",) if name in made)
-    fields.known_fields(made, ("of", "product", "side", "outlines", *optional), "as_made.")
-    of = fields.text_field(made["of"], "as_made.of")
-    if not re.fullmatch("[0-9a-f]{64}", of):
-        fields.fail("as_made.of", fields.shown(of), "the digest of a layout, 64 hex digits")
-    side = made["side"]
-    if side not in SIDES:
-        fields.fail("as_made.side", fields.shown(side), f"one of {', '.join(SIDES)}")
-    outlines = made["outlines"]
-    if not isinstance(outlines, list) or len(outlines) != colored:
-        fields.fail(
-            "as_made.outlines",
-            fields.shown(outlines),
-            f"{colored} outlines, one for each cell that is not black",
-        )
-    rings = [fields.points_mm(ring, f"as_made.outlines[{i}]") for i, ring in enumerate(outlines)]
-    for number, ring in enumerate(rings):
-        if len(ring) < MIN_OUTLINE:
-            fields.fail(
-                f"as_made.outlines[{number}]", f"a list of {len(ring)}", f"at least {MIN_OUTLINE} points"
-            )
-    covariance = None
-    if optional:
-        xx, xy, yy = fields.lengths_mm(made["covariance_mm2"], "as_made.covariance_mm2", 3).tolist()
-        if min(xx, yy) < 0 or xx * yy < xy * xy:
-            fields.fail("as_made.covariance_mm2", f"[{xx:g}, {xy:g}, {yy:g}]", "xx, xy, yy of a covariance")
-        covariance = (xx, xy, yy)
-    product = fields.text_field(made["product"], "as_made.product")
-    return AsMade(of, product, side, tuple(rings), covariance)
-
-
 def _check_digest(reference: Reference) -> None:
-    """Check the digest of layer, index, corners, color, edges as little-endian int32, then x, y as float64."""
-    digest = hashlib.sha256()
-    integers = (
-        reference.layer,
-        reference.index,
-        reference.cell_corners,
-        reference.cell_color,
-        reference.edges,
-    )
-    for column in integers:
-        digest.update(column.astype("<i4").tobytes())
-    for axis in (0, 1):
-        digest.update(reference.xy_mm[:, axis].astype("<f8").tobytes())
-    if digest.hexdigest() != reference.digest:
+    digest = reference.geometry_digest()
+    if digest != reference.digest:
         fields.fail(
             "digest",
             fields.shown(reference.digest),
-            f"{digest.hexdigest()}: the geometry was changed or damaged",
+            f"{digest}: the geometry was changed or damaged",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as with_default
@@ -22,21 +23,26 @@ ARRAY_FIELDS = (
 
 @dataclass(frozen=True, eq=False)
 class AsMade(FrozenRecord):
-    """How a made pad differs from the layout that it was made after. No marker is found by this.
+    """How a made pad differs from the layout that it was made after. The layout's markers are where they were made.
 
     Attributes:
         of: digest of the nominal layout.
-        product: name of the product: "laser", "mold", "print".
-        side: side of the pattern that the outlines belong to: "front" or "back".
-        outlines_mm: one (K, 2) float64 outline for each cell that is not black.
-        covariance_mm2: xx, xy, yy of every marker's place from pad to pad; None: unknown.
+        product: what made the pad: "laser", "mold", "print"; "measured" where pictures of the pad tell.
+        side: side of the pattern that was measured, or that the outlines belong to: "front" or "back".
+        outlines_mm: one (K, 2) float64 outline for each cell that is not black; None: triangles between the markers.
+        covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
+            measured and stays at its nominal place; None: unknown.
     """
 
     of: str
     product: str
     side: str
-    outlines_mm: tuple[NDArray[np.float64], ...]
-    covariance_mm2: tuple[float, float, float] | None = None
+    outlines_mm: tuple[NDArray[np.float64], ...] | None = None
+    covariance_mm2: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        if self.covariance_mm2 is not None:
+            self.covariance_mm2.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,3 +112,12 @@ class Reference(FrozenRecord):
         present[self.cell_corners[self.cell_color != BLACK]] = True
         present.setflags(write=False)
         return present
+
+    def geometry_digest(self) -> str:
+        """SHA-256 (hex) of layer, index, corners, color, edges as little-endian int32, then x, y as float64."""
+        digest = hashlib.sha256()
+        for column in (self.layer, self.index, self.cell_corners, self.cell_color, self.edges):
+            digest.update(column.astype("<i4").tobytes())
+        for axis in (0, 1):
+            digest.update(self.xy_mm[:, axis].astype("<f8").tobytes())
+        return digest.hexdigest()

@@ -32,7 +32,7 @@ PACKAGES = ("extractor", "cmpdesign")
 ROOMS = {
     "extractor": (
         "errors frozen_record result presets numeric layout image cells localmap numbering refine complete"
-        " pipeline track space draw"
+        " pipeline made track space draw"
     ),
     "cmpdesign": (
         "errors units inputs patterns design layout files reading contact scene products tracking evaluate cli"

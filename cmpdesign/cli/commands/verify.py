@@ -24,7 +24,7 @@ from cmpdesign.cli.terminal import (
     print_error,
     printable_path,
 )
-from cmpdesign.inputs.files import MOST_PIXELS, is_folder
+from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -81,12 +81,13 @@ def verify(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
+    from cmpdesign.files.image_folders import without_folders
     from extractor import Extractor, load_layout
 
     reference, known = load_layout(layout), parse_reading_response(response)
     extractor = cache(lambda: Extractor(reference, response=known))
     verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, max_pixels)
-    images = _without_folders(images)
+    images = without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
         verifier.verify_image(path, name)
@@ -180,17 +181,6 @@ def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: 
         "images": [outcome.to_json() for outcome in outcomes],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-
-
-def _without_folders(paths: list[Path]) -> list[Path]:
-    """The paths, with every folder replaced by its images.
-
-    Raises:
-        ImageFileError: a folder holds no image.
-    """
-    from cmpdesign.files.image_folders import find_images
-
-    return [image for path in paths for image in (find_images(path) if is_folder(path) else [path])]
 
 
 def _unique_names(stems: list[str]) -> list[str]:

@@ -78,7 +78,6 @@ def make_pad(
     product: str,
     outlines_mm: Sequence[Points],
     causes: Sequence[Cause] = (),
-    covariance_mm2: tuple[float, float, float] | None = None,
 ) -> MadePad:
     """Make the pad of a product.
 
@@ -87,11 +86,10 @@ def make_pad(
         product: name of the product.
         outlines_mm: (K, 2) outline of each cell that is not black, in the layout's order and frame.
         causes: what the outlines differ by.
-        covariance_mm2: xx, xy, yy of the markers' places from pad to pad.
     """
     counter_clockwise = [ring if _signed_area_mm2(ring) >= 0 else ring[::-1] for ring in outlines_mm]
     outlines = np.round(equal_length_outlines(counter_clockwise), DECIMALS) + 0.0
-    made = AsMade(layout.digest, product, seen_side(layout.mirrored), outlines, covariance_mm2)
+    made = AsMade(layout.digest, product, seen_side(layout.mirrored), outlines)
     return MadePad(layout, replace(layout, as_made=made), tuple(causes))
 
 

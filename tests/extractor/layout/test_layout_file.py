@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
+from cmpdesign.reading.read_layout import layout_from_reference
 from extractor import LayoutError, Reference, load_layout, parse_layout
 from tests.support.layouts import PATTERNS, layout_schema, small_document, small_layout, small_text
 
@@ -344,6 +345,14 @@ def test_fuzz_bytes(
         assert str(error).isprintable()
 
 
+def covariances(count: int = 19, **changes: object) -> dict[str, Any]:
+    """Unit covariances of all markers, but for some entries of the first."""
+    columns: dict[str, list[object]] = {"xx": [1.0] * count, "xy": [0.0] * count, "yy": [1.0] * count}
+    for name, value in changes.items():
+        columns[name][0] = value
+    return {"covariance_mm2": columns}
+
+
 def made_document() -> dict[str, Any]:
     """A pad as made whose cells look as designed."""
     document = small_document()
@@ -352,7 +361,10 @@ def made_document() -> dict[str, Any]:
     colored = [c for c, color in zip(cells["corners"], cells["color"], strict=True) if color != "black"]
     outlines = [[list(places[marker]) for marker in corners] for corners in colored]
     made = {"of": document["digest"], "product": "mold", "side": "back", "outlines": outlines}
-    return document | {"as_made": made | {"covariance_mm2": [1e-4, 0.0, 1e-4]}}
+    columns = {"xx": [1e-4] * 19, "xy": [-5e-5] * 19, "yy": [2e-4] * 19}
+    for column in columns.values():
+        column[3] = None  # was not measured
+    return document | {"as_made": made | {"covariance_mm2": columns}}
 
 
 def test_a_pad_as_made_is_read() -> None:
@@ -361,8 +373,24 @@ def test_a_pad_as_made_is_read() -> None:
     made = parse_layout(json.dumps(document)).as_made
     assert made is not None
     assert (made.of, made.product, made.side) == (document["digest"], "mold", "back")
-    assert made.covariance_mm2 == (1e-4, 0.0, 1e-4)
+    expected = np.tile([[1e-4, -5e-5], [-5e-5, 2e-4]], (19, 1, 1))
+    expected[3] = np.nan
+    assert made.covariance_mm2 is not None and not made.covariance_mm2.flags.writeable
+    np.testing.assert_array_equal(made.covariance_mm2, expected)
+    assert made.outlines_mm is not None
     assert [ring.tolist() for ring in made.outlines_mm] == document["as_made"]["outlines"]
+
+
+@pytest.mark.parametrize("left_out", [(), ("outlines",), ("covariance_mm2",), ("outlines", "covariance_mm2")])
+def test_what_is_known_of_a_pad_as_made_is_written_as_it_is_read(left_out: tuple[str, ...]) -> None:
+    document = made_document()
+    for name in left_out:
+        del document["as_made"][name]
+    VALIDATOR.validate(document)
+    layout = layout_from_reference(parse_layout(json.dumps(document)))
+    assert json.loads(layout_to_json(layout)) == document
+    cells = len(layout.colored_cells)
+    assert layout.colored_outlines_mm.shape == (cells, 3, 2)
 
 
 @pytest.mark.parametrize(
@@ -374,7 +402,13 @@ def test_a_pad_as_made_is_read() -> None:
         ({"outlines": []}, "as_made.outlines is a list of 0; expected 13 outlines"),
         ({"outlines": [[[0, 0], [1, 0]]] * 13}, r"as_made.outlines\[0\] is a list of 2; expected at least 3"),
         ({"outlines": [[[0, 0], [1, 0], [1, "a"]]] * 13}, r"as_made.outlines\[0\]\[2\]\[1\] is 'a'"),
-        ({"covariance_mm2": [1.0, 2.0, 1.0]}, "expected xx, xy, yy of a covariance"),
+        ({"covariance_mm2": [1.0, 2.0, 1.0]}, "as_made.covariance_mm2 is a list of 3; expected an object"),
+        ({"covariance_mm2": {"xx": [1.0] * 19}}, "as_made.covariance_mm2.xy is missing"),
+        (covariances(18), "as_made.covariance_mm2.xx is a list of 18; expected 19 entries"),
+        (covariances(xy=2.0), r"of marker 0 is \[1, 2, 1\]; expected xx, xy, yy of a covariance"),
+        (covariances(xx=-1.0), r"of marker 0 is \[-1, 0, 1\]; expected xx, xy, yy of a covariance"),
+        (covariances(yy=None), r"of marker 0 is \[1, 0, null\]; expected xx, xy, yy of a covariance"),
+        (covariances(xx="1"), r"as_made.covariance_mm2.xx\[0\] is '1'"),
         ({"note": "mine"}, "as_made.'note' is unknown"),
     ],
 )

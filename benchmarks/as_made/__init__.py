@@ -1,0 +1,1 @@
+"""``python -m benchmarks.as_made``: displacements on scattered pads, read with nominal and with learnt layouts."""

@@ -1,0 +1,22 @@
+"""``cmpdesign calibrate``: what one sensor is like, measured from its pictures."""
+
+from __future__ import annotations
+
+import typer
+
+from cmpdesign.cli.command import Command
+from cmpdesign.cli.commands.calibrate.pattern import pattern
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Measure what one sensor is like, from its pictures.",
+)
+
+
+@app.callback()
+def group() -> None:
+    """Keep the command's name although the group has one command."""
+
+
+app.command("pattern", cls=Command)(pattern)

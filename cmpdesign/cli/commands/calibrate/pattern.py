@@ -1,0 +1,101 @@
+"""``cmpdesign calibrate pattern``: where the markers of one pad were made, from pictures of the pad at rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.paths import require_suffix
+from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.files import MOST_PIXELS
+
+if TYPE_CHECKING:
+    from extractor import LearntLayout, Reference
+
+# RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
+MAX_USUAL_SCATTER_PITCHES = 0.1
+NOT_DETERMINED = "position, turn, size, shear, perspective of the whole pad"
+
+
+def pattern(
+    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's nominal layout.json.")],
+    images: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="IMAGE...", help="10 or more color pictures of one pad at rest, or folders of pictures."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Layout to write, with the places as made: .json."
+        ),
+    ],
+    response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    max_pixels: MaxPixelsOption = MOST_PIXELS,
+) -> None:
+    """Measure where the markers of one pad were made; read the pad's pictures with the written layout."""
+    from cmpdesign.files.image_folders import without_folders
+    from cmpdesign.files.images import read_image
+    from cmpdesign.files.layout_json import write_layout
+    from cmpdesign.reading.read_layout import layout_from_reference
+    from extractor import learn_layout, load_layout
+
+    require_suffix("--output", output, [".json"])
+    if output.resolve() == layout.resolve():
+        raise CmpDesignError(f"--output {output}: is the nominal layout itself; give another name")
+    reference, known = load_layout(layout), parse_reading_response(response)
+    paths = without_folders(images)
+    pictures = [read_image(path, max_pixels) for path in paths]
+    names = [printable_path(path) for path in paths]
+    learnt = learn_layout(reference, pictures, names=names, response=known)
+    write_layout(layout_from_reference(learnt.layout), output)
+    _print_figures(learnt)
+    console().print(f"wrote {printable_path(output)}")
+
+
+def _print_figures(learnt: LearntLayout) -> None:
+    import numpy as np
+    from rich.table import Table
+
+    made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())
+    assert made is not None and made.covariance_mm2 is not None
+    variance = made.covariance_mm2[learnt.measured].trace(axis1=1, axis2=2) / 2
+    present, measured = int(learnt.layout.present.sum()), int(learnt.measured.sum())
+    rows = {
+        "pictures": f"{len(learnt.picture_z)} of the {made.side}, "
+        f"at least {learnt.picture_share.min():.1%} of the markers measured in each",
+        "residuals": f"{learnt.z:.2f} stated deviations; worst picture {learnt.picture_z[worst]:.2f}, "
+        f"{learnt.picture_rms_px[worst]:.4f} px per axis",
+        "markers": f"{measured} of {present} measured",
+        "scatter": f"{learnt.scatter_mm:.5f} mm per axis around the nominal places",
+        "deviation": f"{np.sqrt(variance.mean()):.5f} mm per axis, of a measured place",
+        "not determined": NOT_DETERMINED,
+    }
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console().print(table)
+    scatter = learnt.scatter_mm / _mean_edge_mm(learnt.layout)
+    if scatter > MAX_USUAL_SCATTER_PITCHES:
+        print_warning(
+            f"the markers lie {scatter:.2f} pitches per axis from their nominal places, limit "
+            f"{MAX_USUAL_SCATTER_PITCHES:g}; check that LAYOUT is this pad's, unless the lens distorts strongly"
+        )
+    if measured < present:
+        print_warning(
+            f"{present - measured} of {present} markers are measured in no picture and stay at their nominal places; "
+            "show the whole pad in some pictures"
+        )
+
+
+def _mean_edge_mm(layout: Reference) -> float:
+    import numpy as np
+
+    ends = layout.xy_mm[layout.edges]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
