@@ -29,6 +29,7 @@ from extractor.refine.refinement_step import (
     with_solution,
 )
 from extractor.refine.solve.convergence import groups_with_any
+from extractor.refine.solve.disagreement import variance_ratios, with_weight
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
 from extractor.refine.synthesis.residual_kernel import AA, A, B
@@ -44,6 +45,7 @@ class ProfileStep(NamedTuple):
     Attributes:
         profile_weight: (E,) 0 to 1, how well each gridline looks like the pattern.
         weight: (E,) 0 to 1, with which it was used.
+        variance_ratio: (E,), as ``variance_ratios`` gives it; 1 before the last round.
         bend_variance: (E,) px^2.
         dot_gain: px.
         dot_gain_offset: (E,) px, offset of each gridline by the dot gain.
@@ -52,6 +54,7 @@ class ProfileStep(NamedTuple):
 
     profile_weight: NDArray[np.float64]
     weight: NDArray[np.float64]
+    variance_ratio: NDArray[np.float64]
     bend_variance: NDArray[np.float64]
     dot_gain: float
     dot_gain_offset: NDArray[np.float64]
@@ -85,7 +88,8 @@ def profile_step(
     """
     state = estimate.pattern_state()
     step = _profile_step(view, lines, contrasts, state, topology, stations, judged)
-    look = contrasts.sides, contrasts.sides, contrasts.clearance, step.weight, step.dot_gain_offset
+    weights = step.weight, step.variance_ratio, step.dot_gain_offset
+    look = contrasts.sides, contrasts.sides, contrasts.clearance, *weights
     reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
     others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
     return with_solution(estimate, step.solution, **others), step.profile_weight
@@ -111,7 +115,12 @@ def _profile_step(view, lines, across, state, topology, stations, judged):  # ty
     weight = profile_weight if judged else _lenient_weights(profile_weight, sums, edges, spokes)
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
     solution = solve_step(system, gradients, state.bend, bend_response, state.xy, state.hidden, False)
-    return ProfileStep(profile_weight, weight, bend_variance, dot_gain, dot_gain_offset, solution)
+    ratio = np.ones(len(edges))
+    if judged:
+        ratio = variance_ratios(system, gradients, solution.measured - state.xy)
+        system = with_weight(system, weight / ratio)
+        solution = solve_step(system, gradients, state.bend, bend_response, state.xy, state.hidden, False)
+    return ProfileStep(profile_weight, weight, ratio, bend_variance, dot_gain, dot_gain_offset, solution)
 
 
 @compiled

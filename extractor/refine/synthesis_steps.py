@@ -36,6 +36,7 @@ from extractor.refine.solve.convergence import (
     WIDE_BLUR_REMAINDER,
     convergence_covariance,
 )
+from extractor.refine.solve.disagreement import variance_ratios, with_weight
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
@@ -54,6 +55,7 @@ class SynthesisReading(NamedTuple):
 
     Attributes:
         weight: (E,) 0 to 1.
+        variance_ratio: (E,), as ``variance_ratios`` gives it; 1 before the last step.
         median_misfit: squared gray levels.
         bend_variance: (E,) px^2.
         dot_gain: px.
@@ -64,6 +66,7 @@ class SynthesisReading(NamedTuple):
     """
 
     weight: NDArray[np.float64]
+    variance_ratio: NDArray[np.float64]
     median_misfit: float
     bend_variance: NDArray[np.float64]
     dot_gain: float
@@ -115,7 +118,9 @@ class SynthesisSolver:
         for step in range(count):
             if step > 0:
                 estimate = with_pattern_moved(self._topology, estimate)
-            stepped, drawing = self._full_step(view, self._with_bending(estimate, wide_blur))
+            stepped, drawing = self._full_step(
+                view, self._with_bending(estimate, wide_blur), step == count - 1
+            )
             estimate = _overlap_corrected(stepped, drawing)
         remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
         cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)
@@ -128,16 +133,17 @@ class SynthesisSolver:
         """
         return _without_bending(estimate) if wide_blur else with_roughness(self._topology, estimate)
 
-    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
+    def _full_step(self, view: PyramidLevel, estimate: Estimate, is_last: bool) -> tuple[Estimate, Synthesis]:
         """A step from everything."""
         drawing = draw_pattern(view, self._topology, estimate, self.buffers(view.image.shape))
-        return self._update_estimate(estimate, drawing), drawing
+        return self._update_estimate(estimate, drawing, is_last), drawing
 
-    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
+    def _update_estimate(self, estimate: Estimate, drawing: Synthesis, is_last: bool) -> Estimate:
         """The estimate after the step that the sums of the drawing ask for."""
         topology, levels = self._topology, drawing.corrected_levels
-        read = _update_and_solve(drawing, estimate.pattern_state(), topology)
-        how = NO_CLEARANCE, read.weight, read.dot_gain_offset, drawing.sigma, read.noise, True
+        read = _update_and_solve(drawing, estimate.pattern_state(), topology, is_last)
+        weights = read.weight, read.variance_ratio, read.dot_gain_offset
+        how = NO_CLEARANCE, *weights, drawing.sigma, read.noise, True
         reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
         sigma = read.sigma
         levels = levels_at_blur(
@@ -157,7 +163,7 @@ class SynthesisSolver:
 
 
 @compiled
-def _update_and_solve(drawing, state, topology):  # type: ignore[no-untyped-def]
+def _update_and_solve(drawing, state, topology, is_last):  # type: ignore[no-untyped-def]
     """``SynthesisReading`` of a drawing."""
     lines, contrasts, sums, sigma = drawing.lines, drawing.contrasts, drawing.sums.copy(), drawing.sigma
     edges, spokes, edge_cells, rule = topology.edges, topology.spokes, topology.edge_cells, PIXEL_MISFIT_RULE
@@ -175,8 +181,13 @@ def _update_and_solve(drawing, state, topology):  # type: ignore[no-untyped-def]
     noise = found if np.isfinite(found) else state.noise
     system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
     solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
+    ratio = np.ones(len(edges))
+    if is_last:
+        ratio = variance_ratios(system, gradients, solution.measured - state.xy)
+        system = with_weight(system, weight / ratio)
+        solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
     return SynthesisReading(
-        weight, median_misfit, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution
+        weight, ratio, median_misfit, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution
     )
 
 

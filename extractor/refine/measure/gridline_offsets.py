@@ -49,6 +49,7 @@ class GridlineReading(NamedTuple):
         added: (E, 6), the light to add to the drawing on both sides; the sides themselves where nothing was drawn.
         clearance: (E, 4), as ``gridline_clearance`` gives it; used where nothing was drawn.
         weight: (E,) 0 to 1.
+        variance_ratio: (E,), as ``variance_ratios`` gives it.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
         sigma: px, the blur.
         noise: gray levels.
@@ -60,6 +61,7 @@ class GridlineReading(NamedTuple):
     added: NDArray[np.float64]
     clearance: NDArray[np.float64]
     weight: NDArray[np.float64]
+    variance_ratio: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
     sigma: float
     noise: float
@@ -154,7 +156,8 @@ def measure_offsets(view, model, reading, count):  # type: ignore[no-untyped-def
             if information < MIN_WEIGHT_SUM * strength or not clear:
                 continue
             out[e, j, OFFSET] = sigma * buffers.sums[j, 0] / information - reading.dot_gain_offset[e]
-            out[e, j, VARIANCE] = reading.noise**2 * sigma**2 / information
+            variance = reading.variance_ratio[e] * reading.noise**2
+            out[e, j, VARIANCE] = variance * sigma**2 / information
     return out
 
 
