@@ -108,8 +108,8 @@ def judge_markers(
     reason = (
         _not_found_reason(markers)
         or _wrong_colors_reason(reference, contradictions)
-        or _wrong_side_reason(reference, markers)
-        or _too_few_reason(measured, present, min_share)
+        or _wrong_side_reason(reference, image, markers)
+        or _too_few_reason(markers, measured, present, min_share)
     )
     return Verdict(
         verified=reason is None,
@@ -129,14 +129,7 @@ def judge_markers(
 def _not_found_reason(markers: Markers) -> str | None:
     if np.isfinite(markers.xy_px).all(axis=1).any():
         return None
-    words = {
-        "no_color": "the image holds no colors that could be inks",
-        "no_pattern": "no triangles of the pattern were found",
-        "reference_lost": "the white reference cell was not found",
-        "ambiguous": "the numbering is ambiguous",
-        "several_pads": "several white cells agree with the cells around them; show one pad alone",
-    }
-    return words.get(str(markers.reason), "no marker was found")
+    return "no marker was found" if markers.reason is None else markers.reason.text
 
 
 def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) -> str | None:
@@ -148,19 +141,26 @@ def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) 
     return f"colors contradict the layout: cell {first}, which should be {color}{more}"
 
 
-def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
+def _wrong_side_reason(reference: Reference, image: Image, markers: Markers) -> str | None:
     if markers.mirrored == reference.mirrored:
         return None
+    from extractor.image.color import nominal_hues_deg
+    from extractor.numbering.other_side import reason_by_hues
+
     viewed, designed = ("back", "front") if markers.mirrored else ("front", "back")
-    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}"
+    cells = np.flatnonzero(np.isfinite(markers.xy_px[reference.cell_corners]).all(axis=(1, 2)))
+    level, color = _cell_levels(image, markers.xy_px[reference.cell_corners[cells]]), reference.cell_color[cells]
+    inks = [np.median(level[color == ink], axis=0) if (color == ink).any() else NO_INK for ink in (RED, GREEN, BLUE)]
+    why = reason_by_hues(np.array(inks), nominal_hues_deg(dict(reference.palette)))
+    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: {_SIDE_CAUSES[why]}"
 
 
-def _too_few_reason(measured: int, present: int, min_share: float) -> str | None:
+def _too_few_reason(markers: Markers, measured: int, present: int, min_share: float) -> str | None:
     # The tolerance accepts 90 of 100 at a share of 0.9 despite rounding.
     if measured >= min_share * present - 1e-9:
         return None
     found = f"{measured} of {present} markers measured ({measured / present:.1%})"
-    return f"{found}, expected at least {min_share:.1%}"
+    return "; ".join([f"{found}, expected at least {min_share:.1%}", *markers.advice])
 
 
 def find_color_contradictions(
