@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,28 @@ def quality_to_json(quality: Quality | None) -> dict[str, Any] | None:
         "weakest_inks": list(quality.weakest_inks),
         "hints": list(quality.hints),
     }
+
+
+def quality_text(quality: Mapping[str, Any]) -> str:
+    """One line on a quality as ``quality_to_json`` gives it."""
+    if quality["contrast"] is None:
+        return "unknown"
+    inks = " and ".join(quality["weakest_inks"])
+    return (
+        f"blur {quality['blur_px']:.2f} px of {quality['edge_px']:.1f} px an edge, "
+        f"noise {quality['noise']:.1f} of 255, contrast {quality['contrast']:.0f} ({inks}), {quality['clipping']:.0%} clipped, "
+        f"evenness {quality['evenness']:.2f}"
+    )
+
+
+def reasons_text(reasons: Mapping[str, int]) -> str:
+    """Counted reasons of frames, those of the extractor in words."""
+    from extractor import Reason
+
+    codes = set(Reason)
+    return "; ".join(
+        f"{count} x {Reason(reason).text if reason in codes else reason}" for reason, count in reasons.items()
+    )
 
 
 def median_quality(qualities: Sequence[Quality]) -> Quality | None:

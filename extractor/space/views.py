@@ -96,7 +96,8 @@ class ViewExtractor:
         self.layout, self.rig = layout, rig
         self._sides = [_side_shown(layout, view, side) for view in rig.views]
         self._extractors = {
-            shown: Extractor(layout, preset, response, shown, channels) for shown in dict.fromkeys(self._sides)
+            shown: Extractor(layout, preset, response, shown, channels)
+            for shown in dict.fromkeys(self._sides)
         }
 
     def extract(self, image: Image | Sequence[Image]) -> tuple[Markers, ...]:

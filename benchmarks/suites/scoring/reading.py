@@ -64,7 +64,8 @@ class CaseReading(NamedTuple):
 
 @cache
 def cached_extractor(pattern: str, layers: int) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))))
+    """It reads both sides: one condition shows the back."""
+    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), side="either")
 
 
 @cache

@@ -10,8 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
+from cmpdesign import layout_to_json
+from cmpdesign.design.templates import load_design
+from cmpdesign.layout.build import build_layout
 from tests.support.command import refused, run
-from tests.support.layouts import small_text
 from tests.support.view_scenes import (
     HALF,
     SMALL,
@@ -33,7 +35,9 @@ FRAMES = 4
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A layout, a rig, the frames of a press as PNG files (frame 2 has lost its right half), and the truth."""
     folder = tmp_path_factory.mktemp("made")
-    (folder / "layout.json").write_text(small_text("honeycomb", SMALL), encoding="utf-8")
+    options = {"layers": str(SMALL), "pitch_mm": "1.5", "mirrored": "true"}  # the views look at the back
+    layout = build_layout(load_design("honeycomb", options))
+    (folder / "layout.json").write_text(layout_to_json(layout), encoding="utf-8")
     (folder / "rig.toml").write_text(rig_text(rig_of(binocular())), encoding="utf-8")
     truth = []
     for name in ("frames", "left", "right"):

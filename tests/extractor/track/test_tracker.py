@@ -110,7 +110,7 @@ def test_no_jump_gives_a_wrong_id(
 
 
 def test_a_mirrored_view_is_not_taken_for_the_front() -> None:
-    tracker = Tracker(reference())
+    tracker = Tracker(reference(), side="either")
     tracker.track(shot().image)
     rendered = shot(mirrored=True)
     frame = tracker.track(rendered.image)
