@@ -321,7 +321,8 @@ class Extractor:
         if numbering.doubt is None and self._mirrored not in (None, numbering.mirrored):
             return Unnumbered(other_side_reason(bgr, cells, numbering, self._nominal_hues_deg), cells)
         if numbering.doubt is None:
-            numbering = stages.record("attach", number_detached_cells(cells, numbering, self._lattice))
+            attached = number_detached_cells(cells, numbering, self._lattice, mesh.swelling)
+            numbering = stages.record("attach", attached)
         return (
             NumberedCells(cells, numbering) if numbering.doubt is None else Unnumbered(numbering.doubt, cells)
         )
