@@ -231,7 +231,7 @@ class Extractor:
         virtual = stages.record("virtual", locate_virtual_markers(self._topology, repaired, refined.points))
         few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
         view, cells = pyramid.level(1), self._sampled_cells
-        quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined)
+        quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
         stages.record("quality", quality)
         markers = Markers(
             xy_px=repaired.xy_px,

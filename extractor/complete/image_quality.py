@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cells import Cells
+from extractor.image.input import estimate_noise
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.numeric.bilinear import fill_patch_mean
 from extractor.numeric.compilation import compiled
 from extractor.quality import UNKNOWN, Quality
-from extractor.refine.estimate import RefinedMarkers
 from extractor.refine.measure.gridline_weights import median_edge
 
-CELLS_PER_INK = 60  # that are sampled
+CELLS_PER_INK = 40  # that are sampled
 SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged
 CLIPPED_VALUE = 253.0  # of 255, from which on a cell's mean is clipped; noise pulls it below 255
 DIM_QUANTILE = 0.05  # of the cells' light; the brightest are as many
@@ -63,7 +63,7 @@ def measure_quality(
     cells: SampledCells,
     xy_px: NDArray[np.float64],
     edges: NDArray[np.int32],
-    refined: RefinedMarkers,
+    blur_px: float,
 ) -> Quality:
     """The quality of an image with numbered markers.
 
@@ -72,11 +72,11 @@ def measure_quality(
         cells: by ``sampled_cells``.
         xy_px: (M, 2) the markers, NaN where lost.
         edges: (E, 2) the layout's edges.
-        refined: blur and noise.
+        blur_px: sigma of the blur.
     """
     edge_px = float(median_edge(xy_px, edges))
-    found = _quality_at(view, xy_px[cells.corners].mean(axis=1), cells.color, edge_px)
-    return _quality(found, refined.blur_px, refined.noise, edge_px)
+    found = _quality_at(view, _centers(xy_px, cells.corners), cells.color, edge_px)
+    return _quality(found, blur_px, float(estimate_noise(view.image, xy_px, cells.corners)), edge_px)
 
 
 def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> Quality:
@@ -106,6 +106,17 @@ def _quality(found: NDArray[np.float64], blur_px: float, noise: float, edge_px: 
 
 
 @compiled
+def _centers(xy, corners):  # type: ignore[no-untyped-def]
+    """(K, 2) the means of the markers (M, 2) at the corners (K, 3)."""
+    out = np.empty((corners.shape[0], 2))
+    for i in range(corners.shape[0]):
+        a, b, c = corners[i]
+        out[i, 0] = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3.0
+        out[i, 1] = (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3.0
+    return out
+
+
+@compiled
 def _measure(image, light, center, color, radius):  # type: ignore[no-untyped-def]
     """Contrast, the two inks that differ least, clipping and evenness; NaN where unknown.
 
@@ -117,30 +128,27 @@ def _measure(image, light, center, color, radius):  # type: ignore[no-untyped-de
         radius: of the averaged patch, px.
     """
     flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    bgr, ink = np.empty((3, center.shape[0])), np.empty(center.shape[0], np.int64)
-    own, count, clipped = np.empty(3), 0, 0
+    values, count = np.empty((4, 3, center.shape[0])), np.zeros(4, np.int64)
+    own, clipped = np.empty(3), 0
     for i in range(center.shape[0]):
-        x, y = center[i, 0], center[i, 1]
-        if not fill_patch_mean(flat, height, width, x, y, radius, own):
+        if not fill_patch_mean(flat, height, width, center[i, 0], center[i, 1], radius, own):
             continue
-        ink[count] = color[i]
+        k = color[i]
         for channel in range(3):
-            bgr[channel, count] = own[channel]
-        clipped += color[i] < 3 and max(own[0], own[1], own[2]) >= CLIPPED_VALUE
-        count += 1
-    out = np.full(5, np.nan)
-    bgr, ink = bgr[:, :count], ink[:count]
-    colored = np.count_nonzero(ink < 3)
+            values[k, channel, count[k]] = own[channel]
+        clipped += k < 3 and max(own[0], own[1], own[2]) >= CLIPPED_VALUE
+        count[k] += 1
+    out, median = np.full(5, np.nan), np.full((4, 3), np.nan)
+    colored = count[0] + count[1] + count[2]
     if colored == 0:
         return out
-    median = np.full((4, 3), np.nan)
     for k in range(4):
-        if np.any(ink == k):
-            for channel in range(3):
-                median[k, channel] = _light_of(np.median(bgr[channel][ink == k]), light)
+        for channel in range(3):
+            if count[k] > 0:
+                median[k, channel] = _light_of(np.median(values[k, channel, : count[k]]), light)
     out[3] = clipped / colored
     _fill_contrast(median, out)
-    out[4] = _evenness(bgr, ink, median, light)
+    out[4] = _evenness(values, count, median, light)
     return out
 
 
@@ -178,22 +186,21 @@ def _fill_lab(bgr, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _evenness(bgr, ink, median, light):  # type: ignore[no-untyped-def]
+def _evenness(values, count, median, light):  # type: ignore[no-untyped-def]
     """The light of the dimmest colored cells over that of the brightest; black is subtracted where it was measured."""
-    ratio, count = np.empty(ink.shape[0]), 0
-    black = 0.0
-    if not np.isnan(median[3, 0]):
-        black = median[3].sum()
-    for i in range(ink.shape[0]):
-        usual = median[ink[i]].sum() - black
-        if ink[i] < 3 and usual > 0.0:
+    ratio, cells = np.empty(count[0] + count[1] + count[2]), 0
+    black = median[3].sum() if count[3] > 0 else 0.0
+    for k in range(3):
+        usual = median[k].sum() - black
+        for i in range(count[k] if usual > 0.0 else 0):
             total = -black
             for channel in range(3):
-                total += _light_of(bgr[channel, i], light)
-            ratio[count] = max(total, 0.0) / usual
-            count += 1
-    if count == 0:
+                total += _light_of(values[k, channel, i], light)
+            ratio[cells] = max(total, 0.0) / usual
+            cells += 1
+    if cells == 0:
         return np.nan
-    ordered = np.sort(ratio[:count])
-    last = int(DIM_QUANTILE * (count - 1) + 0.5)
-    return ordered[last] / ordered[count - 1 - last] if ordered[count - 1 - last] > 0.0 else np.nan
+    ordered = np.sort(ratio[:cells])
+    last = int(DIM_QUANTILE * (cells - 1) + 0.5)
+    brightest = ordered[cells - 1 - last]
+    return ordered[last] / brightest if brightest > 0.0 else np.nan

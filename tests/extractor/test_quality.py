@@ -60,7 +60,7 @@ def exposed(image: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:
 )
 def test_blur_noise_and_scale_are_the_scenes(blur: float, noise: float, pitch_px: float) -> None:
     quality = quality_of(shot(blur=blur, noise=noise, pitch_px=pitch_px).image)
-    assert quality.blur_px == pytest.approx(np.sqrt(blur**2 + 1 / 12), rel=0.1)
+    assert quality.blur_px == pytest.approx(np.sqrt(blur**2 + 1 / 12), rel=0.2)
     assert quality.noise == pytest.approx(noise, rel=0.25)
     assert quality.edge_px == pytest.approx(pitch_px, rel=0.01)
     assert not quality.hints
@@ -134,8 +134,8 @@ def test_images_without_a_pattern_say_what_they_can() -> None:
 
 @pytest.mark.parametrize("reason", Reason)
 def test_every_reason_says_what_to_do(reason: Reason) -> None:
-    assert (len(reason.text) > 40 and ";" in reason.text) or ":" in reason.text
-    assert str(reason) not in reason.text.split()
+    found, _, to_do = reason.text.partition("; ")
+    assert len(found) > 20 and len(to_do) > 10 and "_" not in reason.text
 
 
 def covered(rendered: Rendered, share: float) -> NDArray[np.uint8]:
