@@ -37,7 +37,7 @@ class CellMesh:
         faces: (F, 3) int32, the red, green and blue cell of each face; -1 thrice for a triangle that is no face.
         neighbours: (F, 3) int32, the face across the edge opposite to each cell, or -1.
         orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
-        swelling: sides of the cells over those at which neighbours just meet, 1 to ``MAX_SWELLING``.
+        swelling: sides of the cells' triangles over those at which neighbours just meet, 1 to ``MAX_SWELLING``.
     """
 
     faces: NDArray[np.int32]
@@ -150,34 +150,35 @@ def build_cell_mesh(cells: Cells) -> CellMesh | None:
     if len(faces) == 0:
         return None
     _update_flipped_edges(cells.center_px, cells.ink, faces, neighbours)
-    swelling = float(_swelling(cells.center_px, cells.ink, cells.area_px, faces))
-    area, corner = without_swelling(cells.center_px, cells.area_px, cells.corner_px, swelling)
-    return CellMesh(*_classify_faces(cells.center_px, cells.ink, area, corner, faces, neighbours), swelling)
+    swelling = float(_swelling(cells.center_px, cells.ink, cells.corner_px, faces))
+    corner = without_swelling(cells.center_px, cells.corner_px, swelling)
+    classified = _classify_faces(cells.center_px, cells.ink, cells.area_px, corner, faces, neighbours)
+    return CellMesh(*classified, swelling)
 
 
 @compiled
-def _swelling(points, ink, area, faces):  # type: ignore[no-untyped-def]
-    """``CellMesh.swelling``: where neighbours just meet, a triangle of three inks' centers is as large as a cell."""
+def _swelling(points, ink, corner, faces):  # type: ignore[no-untyped-def]
+    """``CellMesh.swelling``: where neighbours just meet, a face is as large as the triangles of its cells."""
     ratio, count = np.empty(faces.shape[0]), 0
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
             continue
-        size = 0.5 * abs(_doubled_area(points, a, b, c))
-        if size > 0.0:
-            ratio[count] = (area[a] + area[b] + area[c]) / (3.0 * size)
+        size, total = abs(_doubled_area(points, a, b, c)), 0.0
+        for i in faces[f]:
+            total += abs(_doubled_area(corner[i], 0, 1, 2))
+        if size > 0.0 and np.isfinite(total):
+            ratio[count] = total / (3.0 * size)
             count += 1
     return min(max(np.sqrt(np.median(ratio[:count])), 1.0), MAX_SWELLING) if count > 0 else 1.0
 
 
 @compiled
-def without_swelling(center, area, corner, swelling):  # type: ignore[no-untyped-def]
-    """The areas (N,) and corners (N, 3, 2) of cells whose sides are divided by the swelling, around their centers."""
-    if swelling == 1.0:
-        return area, corner
-    moved = np.empty(corner.shape)
+def without_swelling(center, corner, swelling):  # type: ignore[no-untyped-def]
+    """The corners (N, 3, 2) of cells whose sides are divided by the swelling, around their centers (N, 2)."""
+    out = np.empty(corner.shape)
     for i in range(center.shape[0]):
         for k in range(3):
-            moved[i, k, 0] = center[i, 0] + (corner[i, k, 0] - center[i, 0]) / swelling
-            moved[i, k, 1] = center[i, 1] + (corner[i, k, 1] - center[i, 1]) / swelling
-    return area / swelling**2, moved
+            out[i, k, 0] = center[i, 0] + (corner[i, k, 0] - center[i, 0]) / swelling
+            out[i, k, 1] = center[i, 1] + (corner[i, k, 1] - center[i, 1]) / swelling
+    return out

@@ -47,8 +47,8 @@ def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice, 
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
     corner_step, white_px = 1 if numbering.mirrored else 2, numbering.white_px
-    area, corner = without_swelling(cells.center_px, cells.area_px, cells.corner_px, swelling)
-    arrays = cells.arrays._replace(area_px=area, corner_px=corner)
+    corner = without_swelling(cells.center_px, cells.corner_px, swelling)
+    arrays = cells.arrays._replace(corner_px=corner)
     cell = _number_detached(arrays, numbering.cell, white_px, lattice.layout_cells, corner_step)
     if numbering.origin is not Origin.WHITE or numbering.white_adjacent:
         return replace(numbering, cell=cell)

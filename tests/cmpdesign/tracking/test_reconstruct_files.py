@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmpdesign import layout_to_json
-from cmpdesign.design.templates import load_design
+from cmpdesign.design.design import load_design
 from cmpdesign.layout.build import build_layout
 from tests.support.command import refused, run
 from tests.support.view_scenes import (
