@@ -113,7 +113,7 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         failed = CaseResult(case, EMPTY_SCORE, math.nan, math.nan, repr(error), True)
         return CaseReading(failed, shot, None)
     score = score_markers(markers, shot, promised=kind.promised)
-    reason = str(markers.reason) if markers.reason else ""
+    reason = "" if markers.found else str(markers.reason)
     squares = picture_squares(markers, nearest_truth(markers, shot.truths)) if shot.truths else {}
     result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False, squares)
     return CaseReading(result, shot, markers)
