@@ -83,4 +83,5 @@ class Quality(FrozenRecord):
         )
 
 
-UNKNOWN = Quality(*[float("nan")] * 3, ("", ""), *[float("nan")] * 3)
+_NAN = float("nan")
+UNKNOWN = Quality(_NAN, _NAN, _NAN, ("", ""), _NAN, _NAN, _NAN)

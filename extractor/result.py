@@ -62,6 +62,8 @@ class Reason(StrEnum):
         return _REASON_TEXTS[self]
 
 
+SIDE_REASONS = (Reason.OTHER_SIDE, Reason.MIRRORED, Reason.SWAPPED_CHANNELS)
+
 _REASON_TEXTS = {
     Reason.NO_COLOR: "the image holds no colors that could be the three inks; give a color image of the pattern, in "
     "white light and neither dark nor overexposed",

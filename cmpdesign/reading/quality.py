@@ -33,8 +33,8 @@ def quality_text(quality: Mapping[str, Any]) -> str:
     inks = " and ".join(quality["weakest_inks"])
     return (
         f"blur {quality['blur_px']:.2f} px of {quality['edge_px']:.1f} px an edge, "
-        f"noise {quality['noise']:.1f} of 255, contrast {quality['contrast']:.0f} ({inks}), {quality['clipping']:.0%} clipped, "
-        f"evenness {quality['evenness']:.2f}"
+        f"noise {quality['noise']:.1f} of 255, contrast {quality['contrast']:.0f} ({inks}), "
+        f"{quality['clipping']:.0%} clipped, evenness {quality['evenness']:.2f}"
     )
 
 

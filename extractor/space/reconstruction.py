@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import PoseError
 from extractor.layout.reference import Reference
-from extractor.result import Markers, Status, VirtualStatus
+from extractor.result import SIDE_REASONS, Markers, Status, VirtualStatus
 from extractor.space.camera import Array, View, is_finite
 from extractor.space.field import Field, hermite_along_edge
 from extractor.space.pose import Poses, estimate_poses
@@ -189,6 +189,11 @@ class Reconstructor:
             return Poses(tuple(views), cov, float("nan"), np.full(len(views), np.nan), none)
         self._require_count(rest)
         for view, markers in zip(views, rest, strict=True):
+            if markers.reason in SIDE_REASONS:
+                raise PoseError(
+                    f"view {view.name!r} shows the pattern's other side at rest ({markers.reason}); check which of "
+                    "them are mirrored, and state side or channels"
+                )
             if not markers.found:
                 raise PoseError(
                     f"view {view.name!r} shows no pattern at rest ({markers.reason}); choose another frame"

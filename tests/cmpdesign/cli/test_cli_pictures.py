@@ -303,5 +303,5 @@ def test_verify_shows_the_quality_of_a_picture(made: Path, tmp_path: Path) -> No
     assert any("shorten the exposure" in line for line in rest)
     report = json.loads(run("verify", made / "layout.json", made / "good.png", "--json").stdout)
     quality = report["images"][0]["quality"]
-    assert quality["hints"] == [] and quality["clipping"] == 0 and 15 < quality["edge_px"] < 24
+    assert quality["hints"] == [] and quality["clipping"] == 0 and 20 < quality["edge_px"] < 30
     assert 0.5 < quality["blur_px"] < 2 and 1 < quality["noise"] < 3 and len(quality["weakest_inks"]) == 2
