@@ -4,7 +4,7 @@
 >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
 
 The rooms (folders and modules) in their order; a room imports only rooms before it, and the small modules ``errors``,
-``result`` and ``presets``:
+``quality``, ``result`` and ``presets``:
 
 - ``numeric``: compilation, linear systems, sampling of images, nearest points.
 - ``layout``: ``layout.json`` and the tables of a layout.
@@ -24,6 +24,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from extractor.errors import ExtractorError, ImageError, LayoutError, PoseError, RestError, RigError
+from extractor.quality import Quality
 from extractor.result import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ __all__ = [
     "Origin",
     "PointReason",
     "PoseError",
+    "Quality",
     "Reason",
     "Reconstructor",
     "Reference",

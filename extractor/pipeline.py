@@ -1,13 +1,13 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
 Stages: image, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, place, refine, repair,
-virtual. A warm start of the tracker goes from image over predict and prove to refine.
+virtual, quality. A warm start of the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,18 @@ from extractor.cells.cells import Cells, cells_with_triangles, find_cells
 from extractor.cells.region_growing import grow
 from extractor.cells.seeds import NO_DOMAIN_LIMIT, Seeds, find_seeds, has_large_domains
 from extractor.cells.triangle_fit import fit_triangles, triangles_from_moments
+from extractor.complete.image_quality import (
+    measure_quality,
+    measure_quality_without_numbers,
+    sampled_cells,
+)
 from extractor.complete.repair import repair_markers
+from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
 from extractor.image.color import nominal_hues_deg, to_colors
 from extractor.image.ink_segmentation import segment
-from extractor.image.input import convert_to_bgr
+from extractor.image.input import Channels, convert_to_bgr
 from extractor.image.pyramid import Pyramid
 from extractor.image.response import Response, light_of_values, response_tables
 from extractor.image.target_area import find_target
@@ -32,8 +38,10 @@ from extractor.layout.topology import topology_of
 from extractor.numbering.gaps.detached_cells import number_detached_cells
 from extractor.numbering.lattice_walk import Numbering, number_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
+from extractor.numbering.other_side import other_side_reason
 from extractor.numbering.small_pattern import fit_predicted_triangles, is_small_pattern_possible
 from extractor.presets import PRESETS, Preset
+from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
@@ -44,6 +52,9 @@ MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
 MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
 
 Result = TypeVar("Result")
+Side = Literal["designed", "front", "back", "either"]
+SIDES: tuple[Side, ...] = ("designed", "front", "back", "either")
+CHANNELS: tuple[Channels, ...] = ("bgr", "rgb")
 
 
 class NumberedCells(NamedTuple):
@@ -51,6 +62,13 @@ class NumberedCells(NamedTuple):
 
     cells: Cells
     numbering: Numbering
+
+
+class Unnumbered(NamedTuple):
+    """The reason why no cell is numbered, and the cells that were found, if any."""
+
+    reason: Reason
+    cells: Cells | None = None
 
 
 class NumberedMarkers(NamedTuple):
@@ -107,24 +125,37 @@ class Extractor:
         preset: "fast", "balanced" or "accurate".
         response: how light became values: "srgb", "linear", an exponent (light is value ** exponent), or a table of the
             light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
+        side: the side of the pattern that images show: "front", "back", or "designed": what the layout's ``mirrored``
+            says. An image of the other side gives no markers, and a reason. "either": both are read.
+        channels: the order of an image's colors: "bgr", as OpenCV has them, or "rgb".
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
-        ValueError: no such preset or response.
+        ValueError: no such preset, response, side or order of channels.
     """
 
     def __init__(
-        self, layout: Reference, preset: Preset = "balanced", response: Response | None = None
+        self,
+        layout: Reference,
+        preset: Preset = "balanced",
+        response: Response | None = None,
+        side: Side = "designed",
+        channels: Channels = "bgr",
     ) -> None:
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
             )
         self.layout = layout
-        if preset not in PRESETS:
-            raise ValueError(f"preset is {preset!r}; give one of {', '.join(PRESETS)}")
-        self._preset = preset
-        self._response = response
+        for name, value, allowed in (
+            ("preset", preset, tuple(PRESETS)),
+            ("channels", channels, CHANNELS),
+        ):
+            if value not in allowed:
+                raise ValueError(f"{name} is {value!r}; give one of {', '.join(allowed)}")
+        self._options = preset, response, side, channels
+        self._channels = channels
+        self._mirrored = is_mirrored(layout, side)
         by_depth: dict[np.dtype[Any], Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
         self._tables = {
             depth: response_tables(light_of_values(usual if response is None else response))
@@ -135,17 +166,19 @@ class Extractor:
         self._domain_limit = max(MAX_DOMAINS_PER_CELL * len(self._lattice.ink), MIN_DOMAIN_LIMIT)
         self._refiner = Refiner(self._topology, preset, layout.virtual_per_edge)
         self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
+        self._sampled_cells = sampled_cells(layout)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is built anew from layout, preset and response; buffers are not copied."""
-        return type(self), (self.layout, self._preset, self._response)
+        """A copy is built anew from layout and options; buffers are not copied."""
+        return type(self), (self.layout, *self._options)
 
     def extract(self, image: NDArray[Any]) -> Markers:
         """The markers in one image, found without any knowledge of other frames.
 
         Args:
-            image: (H, W, 3) uint8 BGR; also uint16 of either byte order (scaled to 8 bits), BGRA (alpha dropped) and
-                grayscale (without color nothing is found, for the reason ``NO_COLOR``). Need not be contiguous.
+            image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
+                bits), with alpha (dropped) and grayscale (without color nothing is found, for the reason
+                ``NO_COLOR``). Need not be contiguous.
 
         Raises:
             ImageError: another dtype or shape, or a side below 16 px.
@@ -155,16 +188,21 @@ class Extractor:
     def read(self, image: NDArray[Any]) -> ReadImage:
         """``extract``, with the appearance that a tracker needs for the next image."""
         stages = Stages()
-        bgr = stages.record("image", convert_to_bgr(image))
+        bgr = stages.record("image", self.to_bgr(image))
         if bgr is None:
             return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
         pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
-        if isinstance(found, Reason):
-            return ReadImage(no_markers(self.layout, found, stages), None)
+        if isinstance(found, Unnumbered):
+            quality = stages.record("quality", measure_quality_without_numbers(pyramid.level(1), found.cells))
+            return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
         places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
+
+    def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
+        """An image for ``extract`` as contiguous (H, W, 3) uint8 BGR, None without color; raises ``ImageError``."""
+        return convert_to_bgr(image, self._channels)
 
     def pyramid(self, bgr: NDArray[np.uint8], depth: np.dtype[Any]) -> Pyramid:
         """The image (H, W, 3) at several scales, with the response of images of a ``depth``, uint8 or uint16."""
@@ -185,6 +223,10 @@ class Extractor:
         refined = stages.record("refine", self._refiner(pyramid, places, before))
         repaired = stages.record("repair", repair_markers(refined, places, self._lattice, size))
         virtual = stages.record("virtual", locate_virtual_markers(self._topology, repaired, refined.points))
+        few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
+        view, cells = pyramid.level(1), self._sampled_cells
+        quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
+        stages.record("quality", quality)
         markers = Markers(
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
@@ -194,34 +236,35 @@ class Extractor:
             virtual_status=virtual.status,
             mirrored=numbered.mirrored,
             origin=numbered.origin,
-            reason=None,
+            reason=Reason.FEW_MARKERS if few else None,
             timings_ms=stages.timings_ms,
             stages=stages.results,
+            quality=quality,
         )
         return ReadImage(markers, refined.appearance)
 
-    def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Reason:
+    def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
         """Stages 1 to 7 at the coarsest scale that numbers cells; else the reason at the finest scale."""
-        reason = Reason.NO_COLOR
+        failed = Unnumbered(Reason.NO_COLOR)
         for scale in _recognition_scales(pyramid.size):
             found = self._number_cells_at(pyramid, scale, stages)
-            if not isinstance(found, Reason):
+            if not isinstance(found, Unnumbered):
                 return found
-            reason = found
-        return reason
+            failed = found
+        return failed
 
-    def _number_cells_at(self, pyramid: Pyramid, scale: int, stages: Stages) -> NumberedCells | Reason:
+    def _number_cells_at(self, pyramid: Pyramid, scale: int, stages: Stages) -> NumberedCells | Unnumbered:
         """Stages 1 to 7 at 1/``scale`` of the full scale, or the reason why no cells are numbered."""
         colors = stages.record("color", to_colors(pyramid.level(scale).image))
         target = stages.record("target", find_target(colors))
         segmentation = stages.record("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:
-            return Reason.NO_COLOR
+            return Unnumbered(Reason.NO_COLOR)
         # at a reduced scale all domains are kept, because a finer scale may resolve clutter
         limit = self._domain_limit if scale == 1 else NO_DOMAIN_LIMIT
         seeds = stages.record("seeds", find_seeds(segmentation, limit))
         if scale > 1 and not has_large_domains(seeds):
-            return self._number_by_centers(pyramid, seeds, scale, stages) or Reason.NO_COLOR
+            return self._number_by_centers(pyramid, seeds, scale, stages) or Unnumbered(Reason.NO_COLOR)
         regions = stages.record("grow", grow(segmentation, seeds))
         triangles = stages.record("triangles", fit_triangles(pyramid.level(1), regions, scale))
         cells = stages.record("cells", find_cells(seeds, triangles, scale))
@@ -236,7 +279,7 @@ class Extractor:
         coarse = stages.record("triangles", triangles_from_moments(seeds, scale))
         cells = stages.record("cells", find_cells(seeds, coarse, scale))
         found = self._number_found_cells(pyramid, cells, stages)
-        if isinstance(found, Reason):
+        if isinstance(found, Unnumbered):
             return None
         triangles = fit_predicted_triangles(pyramid.level(1), cells, found.numbering, self._lattice)
         if triangles is None:
@@ -244,18 +287,25 @@ class Extractor:
         stages.record("triangles", triangles)
         return NumberedCells(stages.record("cells", cells_with_triangles(cells, triangles)), found.numbering)
 
-    def _number_found_cells(self, pyramid: Pyramid, cells: Cells, stages: Stages) -> NumberedCells | Reason:
+    def _number_found_cells(
+        self, pyramid: Pyramid, cells: Cells, stages: Stages
+    ) -> NumberedCells | Unnumbered:
         """Stages 6 and 7: the cells' mesh and numbers, or the reason why there are none."""
         bgr = pyramid.level(1).image
         mesh = stages.record("mesh", build_cell_mesh(cells))
         if mesh is None or int((mesh.orientation != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
-            return Reason.NO_PATTERN
+            return Unnumbered(Reason.NO_PATTERN, cells)
         numbering = stages.record("number", number_cells(bgr, cells, mesh, self._lattice))
         if numbering is None:
-            return Reason.REFERENCE_LOST
+            return Unnumbered(Reason.REFERENCE_LOST, cells)
+        if numbering.doubt is None and self._mirrored not in (None, numbering.mirrored):
+            return Unnumbered(other_side_reason(bgr, cells, numbering, self._nominal_hues_deg), cells)
         if numbering.doubt is None:
-            numbering = stages.record("attach", number_detached_cells(cells, numbering, self._lattice))
-        return NumberedCells(cells, numbering) if numbering.doubt is None else numbering.doubt
+            attached = number_detached_cells(cells, numbering, self._lattice, mesh.swelling)
+            numbering = stages.record("attach", attached)
+        return (
+            NumberedCells(cells, numbering) if numbering.doubt is None else Unnumbered(numbering.doubt, cells)
+        )
 
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:
@@ -264,7 +314,14 @@ def _recognition_scales(size: tuple[int, int]) -> list[int]:
     return [scale >> i for i in range(scale.bit_length())]
 
 
-def no_markers(layout: Reference, reason: Reason, stages: Stages) -> Markers:
+def is_mirrored(layout: Reference, side: Side) -> bool | None:
+    """Whether images that show this side are mirrored; None where both sides are read; ``ValueError`` for no side."""
+    if side not in SIDES:
+        raise ValueError(f"side is {side!r}; give one of {', '.join(SIDES)}")
+    return {"designed": layout.mirrored, "front": False, "back": True, "either": None}[side]
+
+
+def no_markers(layout: Reference, reason: Reason, stages: Stages, quality: Quality | None = None) -> Markers:
     """The result for an image in which no marker was found."""
     markers, edges, count = len(layout.layer), len(layout.edges), layout.virtual_per_edge
     return Markers(
@@ -278,4 +335,5 @@ def no_markers(layout: Reference, reason: Reason, stages: Stages) -> Markers:
         reason=reason,
         timings_ms=stages.timings_ms,
         stages=stages.results,
+        quality=quality,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.frozen_record import FrozenRecord
+from extractor.quality import Quality
 
 
 class Status(IntEnum):
@@ -46,6 +47,42 @@ class Reason(StrEnum):
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
     SEVERAL_PADS = "several_pads"  # several white cells, each with the cells around it that a pattern has
+    OTHER_SIDE = (
+        "other_side"  # the pattern's other side, or red and blue are swapped: the inks do not tell which
+    )
+    MIRRORED = "mirrored"  # the pattern's other side, in inks of the palette's hues
+    SWAPPED_CHANNELS = "swapped_channels"  # the inks have the palette's hues if red and blue are swapped
+    FEW_MARKERS = (
+        "few_markers"  # the numbering is known, but fewer than half of the visible markers are reported
+    )
+
+    @property
+    def text(self) -> str:
+        """What it means and what to do, in one clause."""
+        return _REASON_TEXTS[self]
+
+
+SIDE_REASONS = (Reason.OTHER_SIDE, Reason.MIRRORED, Reason.SWAPPED_CHANNELS)
+
+_REASON_TEXTS = {
+    Reason.NO_COLOR: "the image holds no colors that could be the three inks; give a color image of the pattern, in "
+    "white light and neither dark nor overexposed",
+    Reason.NO_PATTERN: "no triangles of the pattern were found; focus, check light and exposure, and show the pattern "
+    "with 8 px an edge or more",
+    Reason.REFERENCE_LOST: "the white reference cell was not found; uncover or clean it, keep it in view, and check "
+    "that the layout is the pattern's",
+    Reason.AMBIGUOUS: "the numbering is ambiguous: more than one cell could be the white one; remove glare and dirt, "
+    "and show the pattern around the white cell",
+    Reason.SEVERAL_PADS: "several white cells agree with the cells around them; show one pad alone",
+    Reason.OTHER_SIDE: "the pattern is seen from the side that is not expected: a mirrored camera, the pad's other "
+    "face, or an RGB image where BGR is expected; state side or channels",
+    Reason.MIRRORED: "the pattern is seen from the side that is not expected: by the hues of its inks a mirrored "
+    "camera or the pad's other face; state side, or turn the image or the pad",
+    Reason.SWAPPED_CHANNELS: "red and blue are swapped: with them exchanged, the side is the expected one and the "
+    "inks have the layout's hues; state channels, or convert the image to BGR",
+    Reason.FEW_MARKERS: "fewer than half of the visible markers were found; check focus, exposure and light, "
+    "uncover or clean the pattern, and check that the layout is the pattern's",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +97,12 @@ class Markers(FrozenRecord):
         virtual_cov_px2: (E, m, 2, 2) float64, NaN where lost.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (every virtual marker is
             interpolated along it), or interpolated only.
-        mirrored: whether the image shows the pattern's back; None when nothing was found.
-        reason: why nothing or little was found; None when all went well.
+        mirrored: whether the image shows the pattern's back; None when nothing was numbered.
+        reason: why nothing or little was found; None when all went well. ``FEW_MARKERS`` may come with markers.
         timings_ms: stage name -> milliseconds, read-only.
         stages: stage name -> that stage's result, for debugging and drawing, read-only.
-        origin: the evidence that fixed the numbering; None when nothing was found.
+        origin: the evidence that fixed the numbering; None when nothing was numbered.
+        quality: blur, noise, contrast, clipping, light and scale of the image; None when there was no color image.
     """
 
     xy_px: NDArray[np.float64]
@@ -78,6 +116,18 @@ class Markers(FrozenRecord):
     timings_ms: Mapping[str, float]
     stages: Mapping[str, Any] = field(default_factory=dict, repr=False)
     origin: Origin | None = None
+    quality: Quality | None = None
 
     def __post_init__(self) -> None:
         self._freeze_mappings("timings_ms", "stages")
+
+    @property
+    def found(self) -> bool:
+        """Whether any marker has a position."""
+        return bool(np.any(self.status))
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What the reason says to do, and the hints of the quality; empty where neither has any."""
+        reason = () if self.reason is None else (self.reason.text,)
+        return reason + (() if self.quality is None else self.quality.hints)

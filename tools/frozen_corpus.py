@@ -133,7 +133,7 @@ def reads(folder: Path) -> Iterator[tuple[str, str]]:
             path = folder / f"{pattern}.json"
             write_layout(scene.layout, path)
             for preset in PRESETS:
-                markers = Extractor(load_layout(path), preset).extract(rendered.image)
+                markers = Extractor(load_layout(path), preset, side="either").extract(rendered.image)
                 yield from marker_digests(f"extract {pattern} {name} {preset}", markers)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,4 +14,16 @@ MaxPixelsOption = Annotated[
         min=256,
         help="Largest image that is read: its width times its height.",
     ),
+]
+
+ChannelsOption = Annotated[
+    Literal["bgr", "rgb"],
+    typer.Option(
+        "--channels", help="rgb: the pictures' red and blue are swapped, as an RGB array saved by OpenCV."
+    ),
+]
+
+SideOption = Annotated[
+    Literal["designed", "front", "back", "either"],
+    typer.Option("--side", help="Side of the pattern that the camera sees; designed: as the layout says."),
 ]

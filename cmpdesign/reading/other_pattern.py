@@ -81,7 +81,7 @@ def _layers_counted(image: Image, markers: Markers) -> int | None:
         other = parse_layout(layout_to_json(build_layout(design)))
         if other.cell_corners.shape[1] != 3:
             continue
-        measured = _layers_measured(other, image, Extractor(other).extract(image))
+        measured = _layers_measured(other, image, Extractor(other, side="either").extract(image))
         if measured is not None:
             return measured
     return None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
 from cmpdesign.reading.other_pattern import other_pattern_reason
+from cmpdesign.reading.quality import quality_to_json
 
 if TYPE_CHECKING:
     from cmpdesign.files.images import Image
@@ -27,6 +28,11 @@ MIN_SHARE = 0.9
 _SAMPLE_REACH = 0.35
 # Least chroma of a colored cell, as a share of the inks' chroma; glare, dust and black are below.
 _MIN_CHROMA_SHARE = 0.4
+_SIDE_CAUSES = {
+    "other_side": "a mirrored camera, the pad's other face, or an RGB image saved as BGR",
+    "mirrored": "a mirrored camera or the pad's other face, by the hues of the inks",
+    "swapped_channels": "red and blue are swapped, by the hues of the inks: an RGB image saved as BGR (--channels rgb)",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +78,7 @@ class Verdict:
         document = {name: getattr(self, name) for name in names}
         document["share"] = round(self.share, 6)
         document["contradictions"] = list(self.contradictions)
+        document["quality"] = quality_to_json(self.markers.quality)
         document["timings_ms"] = {name: round(ms, 3) for name, ms in self.markers.timings_ms.items()}
         return document
 
@@ -80,7 +87,8 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
     """Extract the markers of one image and judge them.
 
     Args:
-        extractor: extractor for ``reference``.
+        extractor: extractor for ``reference``; with ``side="either"`` it reads both sides, and the verdict tells them
+            apart.
         reference: the layout.
         image: (H, W, 3) BGR, uint8 or uint16.
         min_share: least share of the present markers that must be measured, 0 to 1.
@@ -108,8 +116,8 @@ def judge_markers(
     reason = (
         _not_found_reason(markers)
         or _wrong_colors_reason(reference, contradictions)
-        or _wrong_side_reason(reference, markers)
-        or _too_few_reason(measured, present, min_share)
+        or _wrong_side_reason(reference, image, markers)
+        or _too_few_reason(markers, measured, present, min_share)
     )
     return Verdict(
         verified=reason is None,
@@ -129,14 +137,7 @@ def judge_markers(
 def _not_found_reason(markers: Markers) -> str | None:
     if np.isfinite(markers.xy_px).all(axis=1).any():
         return None
-    words = {
-        "no_color": "the image holds no colors that could be inks",
-        "no_pattern": "no triangles of the pattern were found",
-        "reference_lost": "the white reference cell was not found",
-        "ambiguous": "the numbering is ambiguous",
-        "several_pads": "several white cells agree with the cells around them; show one pad alone",
-    }
-    return words.get(str(markers.reason), "no marker was found")
+    return "; ".join(markers.advice) or "no marker was found"
 
 
 def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) -> str | None:
@@ -148,19 +149,30 @@ def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) 
     return f"colors contradict the layout: cell {first}, which should be {color}{more}"
 
 
-def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
+def _wrong_side_reason(reference: Reference, image: Image, markers: Markers) -> str | None:
     if markers.mirrored == reference.mirrored:
         return None
+    from extractor.image.color import nominal_hues_deg
+    from extractor.numbering.other_side import reason_by_hues
+
     viewed, designed = ("back", "front") if markers.mirrored else ("front", "back")
-    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}"
+    cells = np.flatnonzero(np.isfinite(markers.xy_px[reference.cell_corners]).all(axis=(1, 2)))
+    level = _cell_levels(image, markers.xy_px[reference.cell_corners[cells]])
+    inks = np.full((3, 3), np.nan)
+    for row, ink in enumerate((RED, GREEN, BLUE)):
+        own = reference.cell_color[cells] == ink
+        if own.any():
+            inks[row] = np.median(level[own], axis=0)
+    why = reason_by_hues(inks, nominal_hues_deg(dict(reference.palette)))
+    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: {_SIDE_CAUSES[why]}"
 
 
-def _too_few_reason(measured: int, present: int, min_share: float) -> str | None:
+def _too_few_reason(markers: Markers, measured: int, present: int, min_share: float) -> str | None:
     # The tolerance accepts 90 of 100 at a share of 0.9 despite rounding.
     if measured >= min_share * present - 1e-9:
         return None
     found = f"{measured} of {present} markers measured ({measured / present:.1%})"
-    return f"{found}, expected at least {min_share:.1%}"
+    return "; ".join([f"{found}, expected at least {min_share:.1%}", *markers.advice])
 
 
 def find_color_contradictions(

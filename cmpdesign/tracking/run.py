@@ -127,10 +127,14 @@ def read_rest_markers(
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
     markers = tracker.track(read_rest_image(text, source, fps, most_pixels)).markers
-    if markers.reason is not None:
+    if not markers.found:
         name = f"frame {text}" if text.isdecimal() else text
-        raise CmpDesignError(f"at rest: no pattern is found in {name} ({markers.reason}); choose another")
+        raise CmpDesignError(f"at rest: no pattern is found in {name} ({_why(markers)}); choose another")
     return markers
+
+
+def _why(markers: Markers) -> str:
+    return "no image" if markers.reason is None else markers.reason.text
 
 
 def read_rest_image(text: str, source: str, fps: float | None, most_pixels: int = MOST_PIXELS) -> Any:

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cmpdesign.reading.quality import median_quality, quality_to_json
+
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
+    from extractor.quality import Quality
     from extractor.track.displacement import Rest
     from extractor.track.tracker import Tracked
 
@@ -39,6 +42,7 @@ class TrackStatistics:
         self._starts: Counter[str] = Counter()
         self._reasons: Counter[str] = Counter()
         self._markers = np.zeros(4, np.int64)
+        self._qualities: list[Quality] = []
         self._resting: Tracked | None = None
         self._pairs, self._squares, self._values = 0, 0.0, 0
         self._largest = _LargestDisplacement()
@@ -62,6 +66,8 @@ class TrackStatistics:
         self._reasons[frame.reason] += 1
         self._starts[frame.start or "none"] += 1
         self._markers += np.bincount(frame.markers.status[self._reference.present], minlength=4)
+        if frame.markers.found and frame.markers.quality is not None:
+            self._qualities.append(frame.markers.quality)
         self._add_motion(frame)
 
     def _add_motion(self, frame: Tracked) -> None:
@@ -123,6 +129,7 @@ class TrackStatistics:
             "time_ms": percentiles(self._elapsed_ms),
             "frames_per_s": 1e3 * self.frames / sum(self._elapsed_ms) if self.frames else None,
             "rest": _rest_json(rest),
+            "quality": quality_to_json(median_quality(self._qualities)),
             "jitter_px": self.jitter_px,
             "jitter_pairs": self._pairs,
             "largest_displacement": self._largest_json(),

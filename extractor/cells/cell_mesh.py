@@ -22,6 +22,9 @@ MAX_FLIP_ROUNDS = 12
 # Area of a face relative to its cells' mean area: about 1 for three neighbours, at least 2 across a gap.
 MIN_AREA_RATIO = 0.4
 MAX_AREA_RATIO = 1.9
+# Sides of the cells over those at which neighbours just meet. Ink that bled and overexposure make cells larger; smaller
+# ones are left as they are: in clutter, figures that lie apart must not meet.
+MAX_SWELLING = 1.6
 # L of eq. 5 (neighbouring cells share a corner), in edges of an equilateral cell of the smaller area.
 MAX_CORNER_GAP = 0.4
 
@@ -34,11 +37,13 @@ class CellMesh:
         faces: (F, 3) int32, the red, green and blue cell of each face; -1 thrice for a triangle that is no face.
         neighbours: (F, 3) int32, the face across the edge opposite to each cell, or -1.
         orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
+        swelling: sides of the cells' triangles over those at which neighbours just meet, 1 to ``MAX_SWELLING``.
     """
 
     faces: NDArray[np.int32]
     neighbours: NDArray[np.int32]
     orientation: NDArray[np.int8]
+    swelling: float
 
 
 @inlined_no_refcount
@@ -145,6 +150,35 @@ def build_cell_mesh(cells: Cells) -> CellMesh | None:
     if len(faces) == 0:
         return None
     _update_flipped_edges(cells.center_px, cells.ink, faces, neighbours)
-    return CellMesh(
-        *_classify_faces(cells.center_px, cells.ink, cells.area_px, cells.corner_px, faces, neighbours)
-    )
+    swelling = float(_swelling(cells.center_px, cells.ink, cells.corner_px, faces))
+    corner = without_swelling(cells.center_px, cells.corner_px, swelling)
+    classified = _classify_faces(cells.center_px, cells.ink, cells.area_px, corner, faces, neighbours)
+    return CellMesh(*classified, swelling)
+
+
+@compiled
+def _swelling(points, ink, corner, faces):  # type: ignore[no-untyped-def]
+    """``CellMesh.swelling``: where neighbours just meet, a face is as large as the triangles of its cells."""
+    ratio, count = np.empty(faces.shape[0]), 0
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if ink[a] == ink[b] or ink[b] == ink[c] or ink[a] == ink[c]:
+            continue
+        size, total = abs(_doubled_area(points, a, b, c)), 0.0
+        for i in faces[f]:
+            total += abs(_doubled_area(corner[i], 0, 1, 2))
+        if size > 0.0 and np.isfinite(total):
+            ratio[count] = total / (3.0 * size)
+            count += 1
+    return min(max(np.sqrt(np.median(ratio[:count])), 1.0), MAX_SWELLING) if count > 0 else 1.0
+
+
+@compiled
+def without_swelling(center, corner, swelling):  # type: ignore[no-untyped-def]
+    """The corners (N, 3, 2) of cells whose sides are divided by the swelling, around their centers (N, 2)."""
+    out = np.empty(corner.shape)
+    for i in range(center.shape[0]):
+        for k in range(3):
+            out[i, k, 0] = center[i, 0] + (corner[i, k, 0] - center[i, 0]) / swelling
+            out[i, k, 1] = center[i, 1] + (corner[i, k, 1] - center[i, 1]) / swelling
+    return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 from extractor.errors import ImageError
 from extractor.numeric.compilation import compiled
 
+Channels = Literal["bgr", "rgb"]  # the order of an image's colors
+
 MIN_SIDE_PX = 16  # of an image
 NOISE_SAMPLES = 600  # pixels for the estimate of the noise; with fewer cells, several pixels in each
 # (x, y) of the pixels that are sampled around a cell's middle, in this order
 NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
-def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
+def convert_to_bgr(image: NDArray[Any], channels: Channels = "bgr") -> NDArray[np.uint8] | None:
     """The image as contiguous (H, W, 3) uint8 BGR, or None when it has no color.
 
     16-bit images of either byte order are scaled to 8 bits (value / 257, rounded). The alpha of BGRA is dropped. A
-    grayscale image ((H, W) or (H, W, 1)) has no color.
+    grayscale image ((H, W) or (H, W, 1)) has no color. ``channels`` is the order of the image's colors.
 
     Raises:
         ImageError: not an array, a float or signed type, another shape, or a side below 16 px.
@@ -47,6 +49,8 @@ def convert_to_bgr(image: NDArray[Any]) -> NDArray[np.uint8] | None:
     color = in_native_order(image[:, :, :3])
     if color.dtype == np.uint16:
         color = cv2.convertScaleAbs(color, alpha=1 / 257)
+    if channels == "rgb":
+        return np.asarray(cv2.cvtColor(color, cv2.COLOR_RGB2BGR))
     return np.ascontiguousarray(color, dtype=np.uint8)
 
 

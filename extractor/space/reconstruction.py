@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import PoseError
 from extractor.layout.reference import Reference
-from extractor.result import Markers, Status, VirtualStatus
+from extractor.result import SIDE_REASONS, Markers, Status, VirtualStatus
 from extractor.space.camera import Array, View, is_finite
 from extractor.space.field import Field, hermite_along_edge
 from extractor.space.pose import Poses, estimate_poses
@@ -191,7 +191,12 @@ class Reconstructor:
             return Poses(tuple(views), cov, float("nan"), np.full(len(views), np.nan), none)
         self._require_count(rest)
         for view, markers in zip(views, rest, strict=True):
-            if markers.reason is not None:
+            if markers.reason in SIDE_REASONS:
+                raise PoseError(
+                    f"view {view.name!r} shows the pattern's other side at rest ({markers.reason}); check which of "
+                    "them are mirrored, and state side or channels"
+                )
+            if not markers.found:
                 raise PoseError(
                     f"view {view.name!r} shows no pattern at rest ({markers.reason}); choose another frame"
                 )
@@ -199,7 +204,7 @@ class Reconstructor:
         cov = np.stack([m.cov_px2 for m in rest])
         poses = estimate_poses(views, self.layout.xy_mm, np.stack(measured), cov, spread_mm)
         for view, markers in zip(poses.views, rest, strict=True):
-            if markers.mirrored is not None and markers.mirrored != _appears_mirrored(view):
+            if markers.mirrored is not None and markers.mirrored != appears_mirrored(view):
                 raise PoseError(
                     f"view {view.name!r}: its pose looks at the pattern from the other side than the rest frame shows; "
                     "check R_camera_from_layout and mirrored"
@@ -235,9 +240,9 @@ class Reconstructor:
             problem = ""
             if found is None:
                 problem = "no picture"
-            elif found.reason is not None:
+            elif not found.found:
                 problem = str(found.reason)
-            elif found.mirrored is not None and found.mirrored != _appears_mirrored(view):
+            elif found.mirrored is not None and found.mirrored != appears_mirrored(view):
                 problem = "shows the pattern's other side"
             kept.append(None if problem else found)
             if problem:
@@ -325,7 +330,7 @@ def _has_position(markers: Markers) -> NDArray[np.bool_]:
     return is_finite(markers.xy_px)
 
 
-def _appears_mirrored(view: View) -> bool:
+def appears_mirrored(view: View) -> bool:
     """Whether the picture of the pattern is mirrored: it shows the back directly, or the front through a mirror."""
     return bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0)
 

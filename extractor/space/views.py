@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import ImageError
+from extractor.image.input import Channels
 from extractor.image.response import Response
 from extractor.layout.reference import Reference
-from extractor.pipeline import Extractor
+from extractor.pipeline import Extractor, Side, is_mirrored
 from extractor.presets import Preset
 from extractor.result import Markers
 from extractor.space.camera import View
-from extractor.space.reconstruction import Reconstructor, Shape, translate_markers
+from extractor.space.reconstruction import Reconstructor, Shape, appears_mirrored, translate_markers
 from extractor.space.rig import Rig
 from extractor.track.tracker import FrameStatus, Tracked, Tracker
 
@@ -59,24 +60,45 @@ def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> l
     return list(image)
 
 
+def _side_shown(layout: Reference, view: View, side: Side) -> Side:
+    """The side that a view's picture seems to show, for an ``Extractor``: by its pose, else by side and mirrors."""
+    expected = is_mirrored(layout, side)
+    if expected is None:
+        return "either"
+    mirrored = appears_mirrored(view) if view.placed else expected != view.mirrored
+    return "back" if mirrored else "front"
+
+
 class ViewExtractor:
     """Finds the markers of every view. Can be pickled and copied.
 
     Args:
         layout: a triangular pattern.
         rig: the views.
-        preset, response: see ``Extractor``.
+        preset, response, channels: see ``Extractor``.
+        side: the side of the pattern at which the views look, directly or through mirrors; see ``Extractor``. A view's
+            pose, where the rig has it, says so instead. "either": pictures of both sides are read.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
-        ValueError: no such preset or response.
+        ValueError: no such preset, response, side or order of channels.
     """
 
     def __init__(
-        self, layout: Reference, rig: Rig, preset: Preset = "balanced", response: Response | None = None
+        self,
+        layout: Reference,
+        rig: Rig,
+        preset: Preset = "balanced",
+        response: Response | None = None,
+        side: Side = "designed",
+        channels: Channels = "bgr",
     ) -> None:
         self.layout, self.rig = layout, rig
-        self._extractor = Extractor(layout, preset, response)
+        self._sides = [_side_shown(layout, view, side) for view in rig.views]
+        self._extractors = {
+            shown: Extractor(layout, preset, response, shown, channels)
+            for shown in dict.fromkeys(self._sides)
+        }
 
     def extract(self, image: Image | Sequence[Image]) -> tuple[Markers, ...]:
         """The markers view by view, in the frame of the full image.
@@ -88,8 +110,9 @@ class ViewExtractor:
             ImageError: not an image, or smaller than a view's area.
         """
         found = []
-        for view, picture in zip(self.rig.views, _images_by_view(image, self.rig), strict=True):
-            markers = self._extractor.extract(crop_to_view(picture, view))
+        pictures = _images_by_view(image, self.rig)
+        for view, shown, picture in zip(self.rig.views, self._sides, pictures, strict=True):
+            markers = self._extractors[shown].extract(crop_to_view(picture, view))
             found.append(translate_markers(markers, _view_origin_px(view)))
         return tuple(found)
 
@@ -125,18 +148,26 @@ class ShapeTracker:
     Args:
         reconstructor: with the poses of the views.
         warm: start from the frame before where the image proves the prediction.
-        response: see ``Extractor``.
+        response, channels: see ``Extractor``. The views' poses say which side each of them shows.
 
     Raises:
-        ValueError: no such response.
+        ValueError: no such response or order of channels.
     """
 
     def __init__(
-        self, reconstructor: Reconstructor, *, warm: bool = True, response: Response | None = None
+        self,
+        reconstructor: Reconstructor,
+        *,
+        warm: bool = True,
+        response: Response | None = None,
+        channels: Channels = "bgr",
     ) -> None:
         self.reconstructor = reconstructor
-        layout, views = reconstructor.layout, reconstructor.rig.views
-        self._trackers = [Tracker(layout, warm=warm, response=response) for _ in views]
+        layout = reconstructor.layout
+        sides = [_side_shown(layout, view, "designed") for view in reconstructor.poses.views]
+        self._trackers = [
+            Tracker(layout, warm=warm, response=response, side=side, channels=channels) for side in sides
+        ]
         self._count = 0
 
     def track(

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import ImageError
-from extractor.image.input import convert_to_bgr
+from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
 from extractor.layout.reference import Reference
-from extractor.pipeline import Extractor, NumberedMarkers, Stages, no_markers
+from extractor.pipeline import Extractor, NumberedMarkers, Side, Stages, no_markers
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
 from extractor.result import Markers, Origin, Reason, Status
@@ -59,7 +59,7 @@ class Tracked:
         index: place in the sequence, from 0.
         time_s: time stamp in seconds; NaN where none was given.
         status: outcome of the frame.
-        reason: why the frame is not tracked, in words; empty when it is.
+        reason: why the frame is not tracked, or why few of its markers are found; else empty.
         start: how the numbering was found; None where there is none.
         markers: the markers, all lost where the frame is not tracked.
         displacement_px: (M, 2) float64 from the rest frame in the image frame (x right, y down), NaN where unknown.
@@ -120,11 +120,11 @@ class Tracker:
         mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
             homography fitted at rest.
         warm: start from the frame before where the image proves the prediction; False: always cold. Ids are the same.
-        response: see ``Extractor``.
+        response, side, channels: see ``Extractor``.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
-        ValueError: no such response.
+        ValueError: no such response, side or order of channels.
     """
 
     def __init__(
@@ -135,10 +135,12 @@ class Tracker:
         mm_per_px: float | None = None,
         warm: bool = True,
         response: Response | None = None,
+        side: Side = "designed",
+        channels: Channels = "bgr",
     ) -> None:
         self.layout = layout
         self.rest: Rest | None = None
-        self._extractor = Extractor(layout, response=response)
+        self._extractor = Extractor(layout, response=response, side=side, channels=channels)
         self._mm_per_px = mm_per_px
         self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
         self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])
@@ -166,7 +168,7 @@ class Tracker:
                 markers, start = self._read(image)
                 self._size = self._size or image.shape[:2]
                 reason = markers.reason or ""
-                status = FrameStatus.LOST if markers.reason else FrameStatus.TRACKED
+                status = FrameStatus.TRACKED if markers.found else FrameStatus.LOST
         except ImageError as error:
             reason = str(error)
         markers = markers or no_markers(self.layout, Reason.NO_PATTERN, Stages())
@@ -181,13 +183,13 @@ class Tracker:
         if warm is not None:
             return warm
         markers, appearance = self._extractor.read(image)
-        if markers.reason is not None:
+        if not markers.found:
             if (
                 self._state is not None
             ):  # the next frame may start from these positions, but not from velocities
                 self._state = replace(self._state, previous_px=None, is_before_gap=True)
             return markers, None
-        bgr = convert_to_bgr(image)
+        bgr = self._extractor.to_bgr(image)
         if self._tables is not None and bgr is not None:
             check = check_cells(bgr, markers.xy_px[self._tables.corners], self._tables, None)
             _fill_unseen_levels(check.cell_levels, self._tables)
@@ -215,7 +217,7 @@ class Tracker:
         if state is None or tables is None or state.frames_since_cold >= COLD_START_INTERVAL:
             return None
         stages = Stages()
-        bgr = stages.record("image", convert_to_bgr(image))
+        bgr = stages.record("image", self._extractor.to_bgr(image))
         if bgr is None:
             return None
         pyramid = self._extractor.pyramid(bgr, image.dtype)

@@ -61,7 +61,7 @@ HEAD = "pattern    lay pitch  turn  tilt  axis  side   measured   wrong  side  r
 
 @cache
 def extractor(pattern: str, layers: int) -> Extractor:
-    return Extractor(parse_layout(small_text(pattern, layers)))
+    return Extractor(parse_layout(small_text(pattern, layers)), side="either")
 
 
 def read_back(pattern: str, layers: int, view: View) -> Row:

@@ -212,7 +212,7 @@ def test_views_and_fields_are_the_same(duplicate: Copy) -> None:
 @deep_copies
 def test_reconstruction_goes_on_alike(duplicate: Copy) -> None:
     layout = reference(layers=SMALL)
-    views = ViewExtractor(layout, rig_of(binocular()))
+    views = ViewExtractor(layout, rig_of(binocular()), side="back")
     rest, image = views.extract(binocular_shot().image), binocular_shot(contact, 1).image
     markers = views.extract(image)
     other_views = duplicate(views)

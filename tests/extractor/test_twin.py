@@ -21,7 +21,7 @@ import sys
 import cv2, numba, numpy as np
 from extractor import Extractor, load_layout
 assert numba.config.DISABLE_JIT
-markers = Extractor(load_layout(sys.argv[1])).extract(cv2.imread(sys.argv[2]))
+markers = Extractor(load_layout(sys.argv[1]), side="either").extract(cv2.imread(sys.argv[2]))
 np.savez(sys.argv[3], xy=markers.xy_px, cov=markers.cov_px2, status=markers.status, mirrored=markers.mirrored)
 """
 
@@ -39,7 +39,7 @@ def test_plain_python_gives_the_same_markers(pattern: str, mirrored: bool, tmp_p
     )
     assert result.returncode == 0, result.stderr
     assert "Warning" not in result.stderr
-    markers = Extractor(parse_layout(small_text(pattern, 1))).extract(seen.image)
+    markers = Extractor(parse_layout(small_text(pattern, 1)), side="either").extract(seen.image)
     assert markers.status.all() and markers.mirrored is mirrored
     with np.load(out) as plain:
         np.testing.assert_array_equal(plain["status"], markers.status)

@@ -31,7 +31,7 @@ PACKAGES = ("extractor", "cmpdesign")
 # A room imports only those that stand before it. The last of cmpdesign is kept for programs written against 0.1.
 ROOMS = {
     "extractor": (
-        "errors frozen_record result presets numeric layout image cells localmap numbering refine complete"
+        "errors frozen_record quality result presets numeric layout image cells localmap numbering refine complete"
         " pipeline made track space draw"
     ),
     "cmpdesign": (

@@ -22,7 +22,8 @@ SIZE = (360, 300)
 
 @cache
 def extractor(pattern: str = "honeycomb", layers: int = 4) -> Extractor:
-    return Extractor(parse_layout(small_text(pattern, layers)))
+    """It reads both sides, as ``picture`` shows both."""
+    return Extractor(parse_layout(small_text(pattern, layers)), side="either")
 
 
 @cache

@@ -64,7 +64,8 @@ class CaseReading(NamedTuple):
 
 @cache
 def cached_extractor(pattern: str, layers: int) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))))
+    """It reads both sides: one condition shows the back."""
+    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), side="either")
 
 
 @cache
@@ -112,7 +113,7 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         failed = CaseResult(case, EMPTY_SCORE, math.nan, math.nan, repr(error), True)
         return CaseReading(failed, shot, None)
     score = score_markers(markers, shot, promised=kind.promised)
-    reason = str(markers.reason) if markers.reason else ""
+    reason = "" if markers.found else str(markers.reason)
     squares = picture_squares(markers, nearest_truth(markers, shot.truths)) if shot.truths else {}
     result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False, squares)
     return CaseReading(result, shot, markers)

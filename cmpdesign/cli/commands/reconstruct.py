@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_with_status,
@@ -25,8 +25,10 @@ from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
+    from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.layout.reference import Reference
+    from extractor.pipeline import Side
 
 
 def reconstruct(
@@ -64,6 +66,8 @@ def reconstruct(
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    side: SideOption = "designed",
+    channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
@@ -81,7 +85,20 @@ def reconstruct(
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
     known = parse_reading_response(response)
     options = _Options(
-        layout, rig, rest, source, output, from_rest, flatness_mm, model_px, fps, cold, known, max_pixels
+        layout,
+        rig,
+        rest,
+        source,
+        output,
+        from_rest,
+        flatness_mm,
+        model_px,
+        fps,
+        cold,
+        known,
+        side,
+        channels,
+        max_pixels,
     )
     run = _prepare_run(options)
     run.limit = frames
@@ -109,6 +126,8 @@ class _Options(NamedTuple):
     fps: float | None
     cold: bool
     response: Response | None
+    side: Side
+    channels: Channels
     max_pixels: int
 
 
@@ -130,7 +149,8 @@ def _prepare_run(options: _Options) -> TrackingRun:
     rig, depth_mm = load_rig(options.rig), read_marker_depth_mm(options.rig)
     if options.from_rest:
         rig = rig.without_poses()
-    views = ViewExtractor(load_layout(options.layout), rig, "accurate", options.response)
+    how = options.response, options.side, options.channels
+    views = ViewExtractor(load_layout(options.layout), rig, "accurate", *how)
     at_rest = views.extract(_read_rest_image(options))
     flatness_mm = (0.0, 0.0, options.flatness_mm)
     reconstructor = Reconstructor(
@@ -139,7 +159,9 @@ def _prepare_run(options: _Options) -> TrackingRun:
     for warning in reconstructor.warnings:
         print_warning(warning)
     sink = open_sink(options.output, ShapeTable(reconstructor))
-    tracker = ShapeTracker(reconstructor, warm=not options.cold, response=options.response)
+    tracker = ShapeTracker(
+        reconstructor, warm=not options.cold, response=options.response, channels=options.channels
+    )
     source = open_sources(options.source, options.fps, options.max_pixels)
     return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm))
 

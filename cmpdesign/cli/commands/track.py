@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
 from cmpdesign.cli.paths import require_suffix
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
@@ -26,8 +27,10 @@ from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
+    from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.layout.reference import Reference
+    from extractor.pipeline import Side
 
 
 def track(
@@ -65,6 +68,8 @@ def track(
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    side: SideOption = "designed",
+    channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
@@ -82,9 +87,9 @@ def track(
     from extractor import load_layout
 
     reference = load_layout(layout)
-    known = parse_reading_response(response)
+    reading = _Reading(not cold, parse_reading_response(response), side, channels)
     run = _prepare_run(
-        reference, _Options(source, output, rest, mm_per_px, fps, overlay, cold, known, max_pixels)
+        reference, _Options(source, output, rest, mm_per_px, fps, overlay, reading, max_pixels)
     )
     run.limit = frames
     try:
@@ -98,6 +103,15 @@ def track(
     exit_with_status(run)
 
 
+class _Reading(NamedTuple):
+    """Options of the ``Tracker``."""
+
+    warm: bool
+    response: Response | None
+    side: Side
+    channels: Channels
+
+
 class _Options(NamedTuple):
     """Arguments and options of the command."""
 
@@ -107,8 +121,7 @@ class _Options(NamedTuple):
     mm_per_px: float | None
     fps: float | None
     overlay: Path | None
-    cold: bool
-    response: Response | None
+    reading: _Reading
     max_pixels: int
 
 
@@ -122,14 +135,10 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     from cmpdesign.tracking.table import TrackTable
     from extractor.track.tracker import Tracker
 
-    rest, source, fps, response = options.rest, options.source, options.fps, options.response
-    warm, most_pixels = not options.cold, options.max_pixels
-    at_rest = None
-    if rest is not None:
-        at_rest = read_rest_markers(
-            rest, source, fps, Tracker(reference, warm=warm, response=response), most_pixels
-        )
-    tracker = Tracker(reference, rest=at_rest, mm_per_px=options.mm_per_px, warm=warm, response=response)
+    rest, source, fps, most_pixels = options.rest, options.source, options.fps, options.max_pixels
+    new_tracker = partial(Tracker, reference, **options.reading._asdict())
+    at_rest = None if rest is None else read_rest_markers(rest, source, fps, new_tracker(), most_pixels)
+    tracker = new_tracker(rest=at_rest, mm_per_px=options.mm_per_px)
     frames = open_source(source, fps, most_pixels)
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
@@ -168,6 +177,8 @@ def _write_summary(
 def _print_summary(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
+    from cmpdesign.reading.quality import quality_text, reasons_text
+
     frames, shares, rate = summary["frames"], summary["marker_shares"], summary["frames_per_s"]
     times = ", ".join(f"{name} {value:.1f} ms" for name, value in summary["time_ms"].items())
     others = {name: frames[name] for name in ("lost", "unreadable", "other_size") if frames[name]}
@@ -181,7 +192,11 @@ def _print_summary(summary: dict[str, Any]) -> None:
         "jitter at rest": "too few resting frames" if jitter is None else f"{jitter:.4f} px per axis",
     }
     if summary["reasons"]:
-        rows["not tracked"] = ", ".join(f"{count} x {reason}" for reason, count in summary["reasons"].items())
+        rows["not tracked, or in part"] = reasons_text(summary["reasons"])
+    if summary["quality"] is not None:
+        rows["image quality"] = quality_text(summary["quality"])
+        if summary["quality"]["hints"]:
+            rows["what to do"] = "; ".join(summary["quality"]["hints"])
     if largest is not None:
         mm = "" if largest["mm"] is None else f" = {largest['mm']:.4g} mm"
         rows["largest displacement"] = (

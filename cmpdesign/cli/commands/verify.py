@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.terminal import (
     EXIT_BAD_INPUT,
@@ -78,6 +78,7 @@ def verify(
         ),
     ] = None,
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
+    channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
@@ -85,8 +86,8 @@ def verify(
     from extractor import Extractor, load_layout
 
     reference, known = load_layout(layout), parse_reading_response(response)
-    extractor = cache(lambda: Extractor(reference, response=known))
-    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, max_pixels)
+    extractor = cache(lambda: Extractor(reference, response=known, side="either"))
+    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, channels, max_pixels)
     images = without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
@@ -113,6 +114,7 @@ class _ImageVerifier:
     sheet_dpi: float | None
     output: Path | None
     debug: Path | None
+    channels: str
     max_pixels: int
 
     def verify_image(self, path: Path, name: str) -> Outcome:
@@ -126,6 +128,8 @@ class _ImageVerifier:
         except ImageFileError as error:
             print_error(error)
             return Outcome(printable_path(path), None, error_on_one_line(error))
+        if self.channels == "rgb":
+            image = image[:, :, ::-1].copy()
         sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
         if sheet.is_sheet or self.sheet_dpi is not None:
             return Outcome(printable_path(path), sheet, None)
@@ -153,7 +157,7 @@ def _write_pictures(
 
 
 def _format_outcomes(outcomes: list[Outcome]) -> str:
-    """One line for every image that was read."""
+    """One line for every image that was read, and one for each hint on a pattern that was found."""
     return "".join(
         f"{item.name}: {_format_verdict(item.verdict)}\n" for item in outcomes if item.verdict is not None
     )
@@ -167,7 +171,10 @@ def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
     repaired = verdict.repaired + verdict.fitted
     counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
     head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
-    return f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
+    line = f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
+    quality = verdict.markers.quality
+    hints = quality.hints if quality is not None and verdict.markers.found else ()
+    return "".join([line, *(f"\n  {hint}" for hint in hints if hint not in head)])
 
 
 def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:

@@ -133,7 +133,8 @@ class Instrument:
         if self.reader == "colors":
             from extractor import Extractor
 
-            extract = Extractor(self.reference, self.preset, self.sensor.response).extract
+            # a sensor of any design may look at either side of it
+            extract = Extractor(self.reference, self.preset, self.sensor.response, "either").extract
             return [extract] * len(self.sensor.rig.views)
         return [_make_square_reader(self, view) for view in self.sensor.rig.views]
 

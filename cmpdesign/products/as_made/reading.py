@@ -93,7 +93,9 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading
     camera = Camera(scale * pitch_mm, camera_turn_deg)
     scene = Scene(pad.layout, camera, optics=Optics(BLUR_PX))
     rendered = render(replace(scene, background=Plain(scene.ink(BLACK))), size=camera_px)
-    markers = Extractor(parse_layout(layout_to_json(replace(nominal, as_made=None)))).extract(rendered.image)
+    markers = Extractor(parse_layout(layout_to_json(replace(nominal, as_made=None))), side="either").extract(
+        rendered.image
+    )
     visible = nominal.present & rendered.truth.visible
     measured = visible & (markers.status == Status.MEASURED)
     deviation = np.hypot(*(markers.xy_px - rendered.truth.marker_xy_px)[measured].T)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from extractor.cells.cell_mesh import without_swelling
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.quadratic_map import SUPPORT_CELLS
@@ -33,7 +34,7 @@ MAX_ROUNDS = 40
 MIN_NUMBERED_CELLS = 8  # intact ones, for any prediction
 
 
-def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice) -> Numbering:
+def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice, swelling: float) -> Numbering:
     """Number the cells that no face of the mesh connects with the reference cell.
 
     Cells that share a corner with a numbered cell are its neighbours. Other cells are predicted from the numbered cells
@@ -41,12 +42,14 @@ def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice) 
     may be assigned there. The nearest cells come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 is
     unambiguous. Cells inconsistent across the gap, or across damaged cells that connected the mesh, lose their number.
     If the white cell touches no cell that was numbered by it, the cells around it must agree in the end; otherwise the
-    numbering is ambiguous.
+    numbering is ambiguous. Cells larger than those that just meet, by the factor ``swelling``, are taken at that size.
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering
     corner_step, white_px = 1 if numbering.mirrored else 2, numbering.white_px
-    cell = _number_detached(cells.arrays, numbering.cell, white_px, lattice.layout_cells, corner_step)
+    corner = without_swelling(cells.center_px, cells.corner_px, swelling)
+    arrays = cells.arrays._replace(corner_px=corner)
+    cell = _number_detached(arrays, numbering.cell, white_px, lattice.layout_cells, corner_step)
     if numbering.origin is not Origin.WHITE or numbering.white_adjacent:
         return replace(numbering, cell=cell)
     white_mm = lattice.white_cell_frame[0]

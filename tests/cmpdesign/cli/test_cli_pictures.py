@@ -279,3 +279,29 @@ def test_verify_takes_a_folder(made: Path, tmp_path: Path) -> None:
     ]
     (tmp_path / "empty").mkdir()
     assert "holds no image" in refused("verify", made / "layout.json", tmp_path / "empty")
+
+
+def test_swapped_channels_are_named_and_read_when_told(made: Path, tmp_path: Path) -> None:
+    """An RGB array saved by OpenCV: its red and blue have changed places."""
+    image = cv2.imread(str(made / "good.png"))
+    assert image is not None
+    cv2.imwrite(str(tmp_path / "rgb.png"), image[:, :, ::-1])
+    result = run("verify", made / "layout.json", tmp_path / "rgb.png")
+    assert result.exit_code == 1 and "red and blue are swapped" in result.stdout
+    assert "--channels rgb" in result.stdout
+    assert run("verify", made / "layout.json", tmp_path / "rgb.png", "--channels", "rgb").exit_code == 0
+
+
+def test_verify_shows_the_quality_of_a_picture(made: Path, tmp_path: Path) -> None:
+    image = cv2.imread(str(made / "good.png"))
+    assert image is not None
+    bright = np.minimum(image.astype(float) * 2.2, 255).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "bright.png"), bright)
+    result = run("verify", made / "layout.json", made / "good.png", tmp_path / "bright.png")
+    good, *rest = result.stdout.splitlines()
+    assert "verified (91 of 91" in good and "bright.png" in rest[0]
+    assert any("shorten the exposure" in line for line in rest)
+    report = json.loads(run("verify", made / "layout.json", made / "good.png", "--json").stdout)
+    quality = report["images"][0]["quality"]
+    assert quality["hints"] == [] and quality["clipping"] == 0 and 20 < quality["edge_px"] < 30
+    assert 0.5 < quality["blur_px"] < 2 and 1 < quality["noise"] < 3 and len(quality["weakest_inks"]) == 2

@@ -11,9 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
+from cmpdesign import layout_to_json
+from cmpdesign.design.design import load_design
+from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import Medium, render
 from tests.support.command import refused, run
-from tests.support.layouts import small_text
 from tests.support.view_scenes import (
     HALF,
     SMALL,
@@ -32,11 +34,17 @@ POINTS = MARKERS + len(LAYOUT.edges) * LAYOUT.virtual_per_edge
 FRAMES = 4
 
 
+def seen_from_the_back() -> str:
+    """The layout file of the views' pattern: they look at its back."""
+    options = {"layers": str(SMALL), "pitch_mm": "1.5", "mirrored": "true"}
+    return layout_to_json(build_layout(load_design("honeycomb", options)))
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A layout, a rig, the frames of a press as PNG files (frame 2 has lost its right half), and the truth."""
     folder = tmp_path_factory.mktemp("made")
-    (folder / "layout.json").write_text(small_text("honeycomb", SMALL), encoding="utf-8")
+    (folder / "layout.json").write_text(seen_from_the_back(), encoding="utf-8")
     (folder / "rig.toml").write_text(rig_text(rig_of(binocular())), encoding="utf-8")
     truth = []
     for name in ("frames", "left", "right"):
@@ -163,7 +171,7 @@ MEDIUM = "[medium]\ngel_mm = 4.0\ngel_index = 1.41\nwindow_mm = 2.0\nwindow_inde
 
 def test_the_rig_files_medium_is_what_the_cameras_look_through(tmp_path: Path) -> None:
     """Frames through gel and window: right with the rig's medium, too shallow and warned about without."""
-    (tmp_path / "layout.json").write_text(small_text("honeycomb", SMALL), encoding="utf-8")
+    (tmp_path / "layout.json").write_text(seen_from_the_back(), encoding="utf-8")
     rig = rig_text(rig_of(binocular()))
     (tmp_path / "frames").mkdir()
     for k, surface in enumerate((None, contact)):

@@ -335,3 +335,22 @@ def test_arrows_of_noise_are_not_shown_as_motion(made: Path, tmp_path: Path) -> 
 
     resting, moved = colored(str(tmp_path / "rest")), colored("video.avi")
     assert 0 < resting < 0.6 * moved
+
+
+def test_the_summary_shows_quality_and_what_to_do(made: Path, tmp_path: Path) -> None:
+    """Frames whose red and blue are swapped are the other side: none is tracked until the command is told."""
+    (tmp_path / "rgb").mkdir()
+    for index in range(2):
+        image = cv2.imread(str(made / "frames" / f"frame{index}.png"))
+        assert image is not None
+        cv2.imwrite(str(tmp_path / "rgb" / f"frame{index}.png"), image[:, :, ::-1])
+    command = ("track", made / "layout.json", tmp_path / "rgb", "-o", tmp_path / "a.npz")
+    result = run(*command)
+    assert result.exit_code == 1 and "red and blue are swapped" in " ".join(result.stdout.split())
+    summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
+    assert summary["reasons"] == {"swapped_channels": 2} and summary["quality"] is None
+    assert run(*command, "--channels", "rgb").exit_code == 0
+    summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
+    assert summary["frames"]["tracked"] == 2 and summary["quality"]["hints"] == []
+    assert summary["quality"]["edge_px"] > 8 and summary["quality"]["contrast"] > 20
+    assert run(*command, "--side", "back").exit_code == 0  # so seen, but with the ids of the mirror image

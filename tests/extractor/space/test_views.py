@@ -44,7 +44,7 @@ LAYOUT = reference(layers=SMALL)
 
 
 def sees(mirror: bool) -> tuple[ViewExtractor, Reconstructor]:
-    views = ViewExtractor(LAYOUT, rig_of(binocular(mirror=mirror)))
+    views = ViewExtractor(LAYOUT, rig_of(binocular(mirror=mirror)), side="back")
     return views, Reconstructor(LAYOUT, views.rig, views.extract(binocular_shot(mirror=mirror).image))
 
 
@@ -134,7 +134,8 @@ def test_one_image_a_view_is_plain_stereo() -> None:
             ),
         )
     )
-    one, two = ViewExtractor(LAYOUT, rig).extract(image), ViewExtractor(LAYOUT, own).extract(halves)
+    one = ViewExtractor(LAYOUT, rig, side="back").extract(image)
+    two = ViewExtractor(LAYOUT, own, side="back").extract(halves)
     np.testing.assert_array_equal(one[0].xy_px, two[0].xy_px)
     np.testing.assert_allclose(one[1].xy_px, two[1].xy_px + (HALF[0], 0))
     shapes = [Reconstructor(LAYOUT, r, m).reconstruct(m) for r, m in ((rig, one), (own, two))]

@@ -110,7 +110,7 @@ def test_no_jump_gives_a_wrong_id(
 
 
 def test_a_mirrored_view_is_not_taken_for_the_front() -> None:
-    tracker = Tracker(reference())
+    tracker = Tracker(reference(), side="either")
     tracker.track(shot().image)
     rendered = shot(mirrored=True)
     frame = tracker.track(rendered.image)
@@ -220,7 +220,7 @@ def test_no_frame_vanishes() -> None:
 def test_displacement_in_mm_is_the_surface_s(mirrored: bool) -> None:
     view = {"mirrored": mirrored, "tilt_deg": 20.0, "sensor": None}
     press = composed(Press(4.0, 0.5))
-    tracker = Tracker(reference())
+    tracker = Tracker(reference(), side="either")
     tracker.track(shot(**view).image)
     frame = tracker.track(shot(surface=press, **view).image)
     expected = press(reference().xy_mm) - reference().xy_mm

@@ -119,7 +119,7 @@ def _middle(layout: Layout) -> Points:
 def read_seen(layout: Layout, cells: list[SeenCell]) -> SeenPad:
     """Read a pad with the nominal layout."""
     image, px_mm = picture_of(layout, cells)
-    markers = Extractor(parse_layout(layout_to_json(layout))).extract(image)
+    markers = Extractor(parse_layout(layout_to_json(layout)), side="either").extract(image)
     seen = layout.marker_xy_mm * (-1.0 if layout.mirrored else 1.0, 1.0)
     wanted = px_mm * (seen - _middle(layout)) * (1, -1) + (np.array(SIZE) - 1) / 2
     measured = layout.present & (markers.status == 1)
