@@ -152,8 +152,10 @@ def build_cell_mesh(cells: Cells) -> CellMesh | None:
     _update_flipped_edges(cells.center_px, cells.ink, faces, neighbours)
     swelling = float(_swelling(cells.center_px, cells.ink, cells.corner_px, faces))
     corner = without_swelling(cells.center_px, cells.corner_px, swelling)
-    classified = _classify_faces(cells.center_px, cells.ink, cells.area_px, corner, faces, neighbours)
-    return CellMesh(*classified, swelling)
+    faces, neighbours, orientation = _classify_faces(
+        cells.center_px, cells.ink, cells.area_px, corner, faces, neighbours
+    )
+    return CellMesh(faces, neighbours, orientation, swelling)
 
 
 @compiled

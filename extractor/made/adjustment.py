@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from extractor.made.homographies import (
     PARAMETERS,
@@ -90,8 +91,8 @@ def adjust_places(readings: Readings, nominal_mm: Array) -> Adjustment:
     Raises:
         numpy.linalg.LinAlgError: the markers of a picture determine no homography.
     """
-    read = np.isfinite(readings.xy_px).all(axis=2)
-    seen = read.any(axis=0)
+    read: NDArray[np.bool_] = np.asarray(np.isfinite(readings.xy_px).all(axis=2))
+    seen: NDArray[np.bool_] = np.asarray(read.any(axis=0))
     to_unit, px_to_unit = scaling(nominal_mm[seen]), scaling(readings.xy_px.reshape(-1, 2))
     nominal = mapped(to_unit, nominal_mm)
     observed = np.where(read[..., None], mapped(px_to_unit, readings.xy_px), 0.0)
@@ -120,7 +121,7 @@ def adjust_places(readings: Readings, nominal_mm: Array) -> Adjustment:
     z2 = float(squares.sum() / redundancy) if redundancy > 0 else np.nan
     covariance = _covariances(linear, nominal, seen) * (z2 / to_unit[0, 0] ** 2)
     rms = np.sqrt((residual**2).sum(axis=(1, 2)) / (axes * share)) / px_to_unit[0, 0]
-    xy_mm = mapped(np.linalg.inv(to_unit), places)
+    xy_mm = mapped(np.asarray(np.linalg.inv(to_unit), np.float64), places)
     return Adjustment(
         xy_mm=np.where(seen[:, None], xy_mm, np.nan),
         cov_mm2=np.where(seen[:, None, None], covariance, np.nan),

@@ -75,7 +75,8 @@ def fitted_homography(start: Array, end: Array) -> Array:
     for _ in range(FIT_STEPS):
         by_entries, _ = derivatives(homography, start)
         rows = by_entries.reshape(-1, PARAMETERS)
-        step = np.linalg.solve(rows.T @ rows, rows.T @ (end - mapped(homography, start)).ravel())
+        right = rows.T @ (end - mapped(homography, start)).ravel()
+        step = np.asarray(np.linalg.solve(rows.T @ rows, right), np.float64)
         homography = moved(homography, step)
         if np.abs(step).max() < CONVERGED:
             break

@@ -118,7 +118,7 @@ def _scaled_x_cosh_minus_sinh(x: Array) -> Array:
     y = small * small
     tail = 1 + y / 10 * (1 + y / 28 * (1 + y / 54 * (1 + y / 88 * (1 + y / 130))))
     series = np.exp(-small) * 2 * small * y / 3 * tail
-    return np.where(x < SERIES_LIMIT, series, x * (1 + np.exp(-2 * x)) + np.expm1(-2 * x))
+    return np.asarray(np.where(x < SERIES_LIMIT, series, x * (1 + np.exp(-2 * x)) + np.expm1(-2 * x)))
 
 
 def _scaled_sinh_minus_x(x: Array) -> Array:

@@ -78,6 +78,7 @@ def make_pad(
     product: str,
     outlines_mm: Sequence[Points],
     causes: Sequence[Cause] = (),
+    variance_mm2: float | None = None,
 ) -> MadePad:
     """Make the pad of a product.
 
@@ -86,10 +87,14 @@ def make_pad(
         product: name of the product.
         outlines_mm: (K, 2) outline of each cell that is not black, in the layout's order and frame.
         causes: what the outlines differ by.
+        variance_mm2: of the markers' places from pad to pad, per axis; None where not known.
     """
     counter_clockwise = [ring if _signed_area_mm2(ring) >= 0 else ring[::-1] for ring in outlines_mm]
     outlines = np.round(equal_length_outlines(counter_clockwise), DECIMALS) + 0.0
-    made = AsMade(layout.digest, product, seen_side(layout.mirrored), outlines)
+    covariance = None
+    if variance_mm2 is not None:
+        covariance = np.broadcast_to(variance_mm2 * np.eye(2), (len(layout.marker_xy_mm), 2, 2)).copy()
+    made = AsMade(layout.digest, product, seen_side(layout.mirrored), outlines, covariance)
     return MadePad(layout, replace(layout, as_made=made), tuple(causes))
 
 

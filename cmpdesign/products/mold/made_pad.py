@@ -44,7 +44,7 @@ def made_pad(layout: Layout, stack: MoldStack) -> MadePad:
     # A plate lies anywhere within the clearance of its holes. Over a disc the variance is radius^2 / 4.
     variance = (option.clearance_mm / 2) ** 2 / 4 / PLATES_AT_A_MARKER
     in_order = [outlines[cell] for cell in layout.colored_cells.tolist()]
-    return make_pad(layout, "mold", in_order, causes, (round(variance, 9), 0.0, round(variance, 9)))
+    return make_pad(layout, "mold", in_order, causes, round(variance, 9))
 
 
 def _in_layout(plan_mm: Points, layout: Layout, stack: MoldStack) -> Points:
