@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-import numpy as np
-
 Preset = Literal["fast", "balanced", "accurate"]
 PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
 
@@ -17,20 +15,19 @@ class Schedule(NamedTuple):
         max_profile_rows: rows of pixels across each gridline at most, in the first round of profiles, and in the
             second one if no synthesis follows.
         reduction_blur_px: blur (sigma, px) down to which the image may be reduced; blurred images need no fine pixels.
-        sharp_blur_share: blur as a share of the edges, below which an image needs no synthesis,
-        cheap_reduction: unless the image could be reduced by this factor, which makes synthesis cheap.
+        sharp_blur_share: blur as a share of the edges, below which a second round of profiles takes the place of
+            synthesis.
         steps: number of steps by synthesis, each over all markers.
     """
 
     max_profile_rows: tuple[int, int]
     reduction_blur_px: float
     sharp_blur_share: float
-    cheap_reduction: float
     steps: int
 
 
 SCHEDULES: dict[Preset, Schedule] = {
-    "fast": Schedule((2, 64), 0.5, 0.0875, np.inf, 2),
-    "balanced": Schedule((6, 64), 0.5, 0.085, 2, 2),
-    "accurate": Schedule((8, 8), 1.2, 0.0, 1, 2),
+    "fast": Schedule((2, 64), 0.5, 0.0875, 2),
+    "balanced": Schedule((6, 6), 0.5, 0.0, 3),
+    "accurate": Schedule((8, 8), 1.2, 0.0, 4),
 }

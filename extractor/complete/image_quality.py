@@ -98,11 +98,9 @@ def _quality_at(
 
 def _quality(found: NDArray[np.float64], blur_px: float, noise: float, edge_px: float) -> Quality:
     """``found`` (5,): contrast, the two inks, clipping and evenness."""
-    contrast, one, other, clipping, evenness = found
-    inks = ("", "") if np.isnan(contrast) else (COLORS[int(one)], COLORS[int(other)])
-    return Quality(
-        float(blur_px), float(noise), float(contrast), inks, float(clipping), float(evenness), edge_px
-    )
+    inks = ("", "") if np.isnan(found[0]) else (COLORS[int(found[1])], COLORS[int(found[2])])
+    contrast, clipping, evenness = float(found[0]), float(found[3]), float(found[4])
+    return Quality(float(blur_px), float(noise), contrast, inks, clipping, evenness, edge_px)
 
 
 @compiled

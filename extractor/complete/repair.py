@@ -22,7 +22,6 @@ from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.neighbour_prediction import MIN_CUBIC_NEIGHBOURS, cubic_variance, predict_markers
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.numeric.compilation import compiled
-from extractor.refine.drawn_pattern import merged_rows
 from extractor.refine.estimate import RefinedMarkers
 from extractor.result import Status
 
@@ -135,7 +134,7 @@ def _fill_lost_markers(xy, cov, uncertain, edge_px, implied, tables, size):  # t
     lost, edge_px = np.isnan(xy[:, 0]), _interpolated_edges(edge_px, tables.neighbours)
     status = np.where(lost, LOST, MEASURED)
     lost &= tables.present
-    certain = merged_rows(uncertain, np.full(xy.shape, np.nan), xy)
+    certain = _merged_rows(uncertain, np.full(xy.shape, np.nan), xy)
     rings = _predict_by_rings(certain, lost | uncertain, tables)
     for m in np.flatnonzero(lost | uncertain):
         variance = _variance_by_neighbours(m, rings, edge_px[m])
@@ -143,7 +142,7 @@ def _fill_lost_markers(xy, cov, uncertain, edge_px, implied, tables, size):  # t
             lost[m], status[m] = not _fill_marker(m, rings.xy_px[m], variance, xy, cov, size), REPAIRED
         elif variance >= 0.0:
             update_by_fusion(xy[m], cov[m], rings.xy_px[m], variance)
-    known = merged_rows(uncertain, xy, certain)
+    known = _merged_rows(uncertain, xy, certain)
     if lost.any() and uncertain.any():
         rings = _predict_by_rings(known, lost, tables)
         for m in np.flatnonzero(lost):
@@ -165,6 +164,16 @@ def _fill_lost_markers(xy, cov, uncertain, edge_px, implied, tables, size):  # t
         if not (cov[n, 0, 0] >= 0.0 and is_inside_image(xy[n, 0], xy[n, 1], size)):
             xy[n], cov[n], status[n] = np.nan, np.nan, LOST
     return status
+
+
+@compiled
+def _merged_rows(selected, rows, other_rows):  # type: ignore[no-untyped-def]
+    """``rows`` (n, ...) where selected (n,) bool, ``other_rows`` elsewhere."""
+    out = other_rows.copy()
+    for i in range(selected.shape[0]):
+        if selected[i]:
+            out[i] = rows[i]
+    return out
 
 
 @compiled

@@ -171,13 +171,15 @@ def _undetermined_inverse(linear: _Linear, gain: Array) -> Array:
     return np.asarray((kept / values[PARAMETERS:]) @ kept.T)
 
 
-def _nearest_to(nominal: Array, seen: Array, homographies: Array, places: Array) -> tuple[Array, Array]:
+def _nearest_to(
+    nominal: Array, seen: NDArray[np.bool_], homographies: Array, places: Array
+) -> tuple[Array, Array]:
     """The same pictures by places that lie nearest to the nominal ones."""
     common = fitted_homography(places[seen], nominal[seen])
     return normalised(homographies @ np.linalg.inv(common)), mapped(common, places)
 
 
-def _covariances(linear: _Linear, nominal: Array, seen: Array) -> Array:
+def _covariances(linear: _Linear, nominal: Array, seen: NDArray[np.bool_]) -> Array:
     """(M, 2, 2) of the places with the common homography fixed by the nominal places; 0 where not seen.
 
     Of the places' full covariance D + G S G', D of blocks, the part that a common homography B of all markers makes is

@@ -1,4 +1,4 @@
-"""The pattern drawn as light over black, and the residual along its gridlines: of all, or again around some markers.
+"""The pattern drawn as light over black, and the residual along its gridlines.
 
 One compiled function leads from the markers to the sums along the gridlines: between small functions, every array would
 pass through Python. Large arrays are kept from image to image: fresh memory costs more than writing to it.
@@ -17,7 +17,6 @@ from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_weights import median_edge, pattern_box
-from extractor.refine.solve.convergence import groups_with_any
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.gridline_sides import add_black, gridline_sides, value_contrasts
 from extractor.refine.synthesis.gridlines import gridlines
@@ -30,10 +29,7 @@ from extractor.refine.synthesis.ink_levels import (
 from extractor.refine.synthesis.pattern_drawing import (
     CellAppearance,
     CellGeometry,
-    CoverageRuns,
-    allocate_coverage_runs,
     draw_cells,
-    update_erasing_cells,
 )
 from extractor.refine.synthesis.residual_kernel import DrawnGridlines, accumulate_residual_sums, fill_zeros
 
@@ -46,11 +42,9 @@ class DrawingBuffers(NamedTuple):
 
     Attributes:
         synthetic_image: (H, W, 3) the light of the pattern over black, as it was last drawn.
-        coverage_runs: the coverages of that drawing.
     """
 
     synthetic_image: NDArray[np.float32]
-    coverage_runs: CoverageRuns
 
 
 class Synthesis(NamedTuple):
@@ -84,9 +78,9 @@ class Synthesis(NamedTuple):
     edge_px: float
 
 
-def allocate_drawing_buffers(shape: tuple[int, ...], topology: Topology) -> DrawingBuffers:
+def allocate_drawing_buffers(shape: tuple[int, ...]) -> DrawingBuffers:
     """Buffers for images of a shape (H, W, 3), nothing drawn."""
-    return DrawingBuffers(np.zeros(shape, np.float32), allocate_coverage_runs(len(topology.cells)))
+    return DrawingBuffers(np.zeros(shape, np.float32))
 
 
 def draw_pattern(
@@ -103,16 +97,15 @@ def draw_pattern(
 @compiled
 def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[no-untyped-def]
     """``Synthesis`` of a ``PatternState`` with ``InkLevels`` within the box (4,)."""
-    picture, strokes = buffers.synthetic_image, buffers.coverage_runs
+    picture = buffers.synthetic_image
     xy, bend, sigma = state.xy, state.bend, state.sigma
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = levels.cell, levels.slope
     lines = gridlines(xy, state.maps, bend, edges, topology.edge_vectors)
     sides = gridline_sides(lines, xy, cells, topology.edge_cells, levels, view.frame)
     fill_zeros(picture, box)
-    strokes.used[:] = 0
-    every, geometry = np.ones(len(cells), np.bool_), CellGeometry(xy, cells, cell_edges, edges, lines)
-    draw_cells(every, 1.0, geometry, CellAppearance(cell, slope, sigma), box, picture, strokes)
+    geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
+    draw_cells(geometry, CellAppearance(cell, slope, sigma), box, picture)
     corrected = _corrected_levels(view, picture, topology, xy, levels, state.noise)
     added = gridline_sides(lines, xy, cells, topology.edge_cells, corrected, view.frame) - sides
     add_black(added, lines, levels.black, view.frame)
@@ -135,72 +128,3 @@ def _corrected_levels(view, picture, topology, xy, levels, noise):  # type: igno
     own[:, :3] += levels.cell
     black = cell_means(view.image, view.response.light, picture, xy, black_cells, 0.0)
     return smoothed_levels(own, black, xy, InkCells(cells, black_cells, color), noise, view)
-
-
-@compiled
-def draw_pattern_part(view, topology, buffers, drawing, redrawn, state):  # type: ignore[no-untyped-def]
-    """Draw some markers again, with all gridlines and cells that they belong to.
-
-    Args:
-        view: the image.
-        topology: of the layout.
-        buffers: ``DrawingBuffers`` with the drawing, written.
-        drawing: ``Synthesis`` as it was.
-        redrawn: (M,) bool, the markers to draw again.
-        state: ``PatternState``, where these are drawn; its blur is not used.
-
-    Returns:
-        ``Synthesis``: markers, gridlines, sides, contrasts and sums are new where drawn again.
-    """
-    picture, strokes = buffers.synthetic_image, buffers.coverage_runs
-    sigma, box = drawing.sigma, drawing.box
-    cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
-    cell, slope = drawing.levels.cell, drawing.levels.slope
-    edge_ids, redrawn_cells = np.flatnonzero(groups_with_any(redrawn, edges)), groups_with_any(redrawn, cells)
-    xy, bend, ends = merged_rows(redrawn, state.xy, drawing.xy), state.bend[edge_ids], edges[edge_ids]
-    own = gridlines(xy, state.maps, bend, ends, topology.edge_vectors[edge_ids])
-    edge_cells = topology.edge_cells[edge_ids]
-    sides = gridline_sides(own, xy, cells, edge_cells, drawing.levels, view.frame)
-    added = gridline_sides(own, xy, cells, edge_cells, drawing.corrected_levels, view.frame) - sides
-    add_black(added, own, drawing.levels.black, view.frame)
-    lines, appearance = replaced_rows(drawing.lines, edge_ids, own), CellAppearance(cell, slope, sigma)
-    old_geometry = CellGeometry(drawing.xy, cells, cell_edges, edges, drawing.lines)
-    update_erasing_cells(redrawn_cells, old_geometry, appearance, box, picture, strokes)
-    geometry = CellGeometry(xy, cells, cell_edges, edges, lines)
-    draw_cells(redrawn_cells, 1.0, geometry, appearance, box, picture, strokes)
-    bleed = drawing.bleed[edge_ids]
-    drawn = DrawnGridlines(own, sides, added, bleed, bending_gridlines(state.roughness, bend, ends))
-    sums = accumulate_residual_sums(view, picture, drawn, sigma, box)
-    return Synthesis(
-        xy,
-        lines,
-        replaced_rows(drawing.bend, edge_ids, bend),
-        replaced_rows(drawing.sides, edge_ids, sides),
-        replaced_rows(drawing.contrasts, edge_ids, value_contrasts(sides, view.response.encoded)),
-        replaced_rows(drawing.added, edge_ids, added),
-        drawing.bleed,
-        replaced_rows(drawing.sums, edge_ids, sums),
-        drawing.levels,
-        drawing.corrected_levels,
-        box,
-        sigma,
-        drawing.edge_px,
-    )
-
-
-@compiled
-def merged_rows(selected, rows, other_rows):  # type: ignore[no-untyped-def]
-    """``rows`` (n, ...) where selected (n,) bool, ``other_rows`` elsewhere."""
-    out = other_rows.copy()
-    for i in range(selected.shape[0]):
-        if selected[i]:
-            out[i] = rows[i]
-    return out
-
-
-@compiled
-def replaced_rows(table, numbers, rows):  # type: ignore[no-untyped-def]
-    """A copy of the table with other ``rows`` at these numbers (n,)."""
-    out = table.copy()
-    out[numbers] = rows
-    return out

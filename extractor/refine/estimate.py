@@ -116,9 +116,7 @@ class Estimate(NamedTuple):
         roughness: (M,) px^2, how rough the markers are around each.
         bend_variance: (E,) px^2, how freely gridlines may bend beyond the map.
         bend: (E, 2) px, how far they bend.
-        normalized_steps: (M,) the last step from where the markers were drawn, in standard deviations.
         reading: what that step compared with the image; None before the first step.
-        median_misfit: squared gray levels, by which gridlines usually miss the image; NaN where nothing is drawn.
         dot_gain: how far the sides of all cells have moved outward, px.
         convergence_cov_px2: (M, 2, 2) the error that the last step may have left; None where nothing is drawn.
     """
@@ -136,9 +134,7 @@ class Estimate(NamedTuple):
     roughness: NDArray[np.float64]
     bend_variance: NDArray[np.float64]
     bend: NDArray[np.float64]
-    normalized_steps: NDArray[np.float64]
     reading: GridlineReading | None
-    median_misfit: float = np.nan
     dot_gain: float = 0.0
     convergence_cov_px2: NDArray[np.float64] | None = None
 

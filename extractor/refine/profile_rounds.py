@@ -28,7 +28,6 @@ from extractor.refine.refinement_step import (
     update_for_bending,
     with_solution,
 )
-from extractor.refine.solve.convergence import groups_with_any
 from extractor.refine.solve.disagreement import variance_ratios, with_weight
 from extractor.refine.solve.fisher_information import GridlineSystem
 from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
@@ -128,4 +127,14 @@ def _lenient_weights(profile_weight, sums, edges, spokes):  # type: ignore[no-un
     """(E,) 0 to 1: weights of gridlines that are judged only around markers where little else is measured."""
     read = sums[:, AA] > 0.0
     suspect, _ = suspect_markers(profile_weight, read, spokes)
-    return np.where(groups_with_any(suspect, edges), profile_weight, np.where(read, 1.0, 0.0))
+    return np.where(_groups_with_any(suspect, edges), profile_weight, np.where(read, 1.0, 0.0))
+
+
+@compiled
+def _groups_with_any(selected, groups):  # type: ignore[no-untyped-def]
+    """(G,) bool, the groups (G, n) of markers that contain a selected one (M,) bool."""
+    out = np.zeros(groups.shape[0], np.bool_)
+    for g in range(groups.shape[0]):
+        for k in range(groups.shape[1]):
+            out[g] |= selected[groups[g, k]]
+    return out

@@ -21,16 +21,13 @@ from extractor.refine.measure.gridline_weights import (
     PRIOR_HIDDEN_PX,
     least_information,
     markers_after_shift,
-    normalized_step_lengths,
     weigh_gridlines,
 )
 from extractor.refine.solve.fisher_information import Information, fisher_information, gradient, solve_shifts
 from extractor.refine.synthesis.gridlines import (
-    FIRST_RING,
     extrapolate_markers,
     gridlines,
     local_maps,
-    local_maps_at,
 )
 
 PRIOR_PX = 10.0  # deviation of a marker before it is measured
@@ -87,7 +84,6 @@ class StepSolution(NamedTuple):
     measured: NDArray[np.float64]
     reliable: NDArray[np.float64]
     bend: NDArray[np.float64]
-    normalized_steps: NDArray[np.float64]
     information: Information
 
 
@@ -100,44 +96,15 @@ def extrapolate_pattern(xy, topology):  # type: ignore[no-untyped-def]
     return ExtrapolatedPattern(xy, hidden, maps)
 
 
-@compiled
-def extrapolate_pattern_around(xy, selected, maps, topology):  # type: ignore[no-untyped-def]
-    """``ExtrapolatedPattern`` with new maps at the selected markers (M,) bool and their neighbours; the maps (M, 2, 5)
-    elsewhere stay."""
-    near, offset, stencil = topology.ring_markers, topology.ring_vectors, topology.derivative_stencil
-    asked = selected.copy()
-    for m in np.flatnonzero(selected):
-        for k in range(FIRST_RING):
-            if near[m, k] >= 0:
-                asked[near[m, k]] = True
-    known = np.isfinite(xy[:, 0])
-    new, maps = local_maps_at(xy, asked & known, near, offset, stencil), maps.copy()
-    for n in range(xy.shape[0]):
-        if asked[n] or not known[n]:
-            maps[n] = new[n]
-    xy, hidden = extrapolate_markers(xy, maps, near, offset)
-    return ExtrapolatedPattern(xy, hidden, maps)
-
-
-def with_pattern_moved(
-    topology: Topology, estimate: Estimate, selected: NDArray[np.bool_] | None = None
-) -> Estimate:
-    """The estimate with its pattern where the last step left the markers.
-
-    Args:
-        selected: (M,) bool, the markers whose gridlines are needed; the maps elsewhere stay. All if None.
-    """
-    if selected is None:
-        pattern = extrapolate_pattern(estimate.reliable, topology)
-    else:
-        pattern = extrapolate_pattern_around(estimate.reliable, selected, estimate.maps, topology)
-    return estimate._replace(**pattern._asdict())
+def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
+    """The estimate with its pattern where the last step left the markers."""
+    return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
 
 
 def with_roughness(topology: Topology, estimate: Estimate) -> Estimate:
     """The estimate with the roughness of its markers."""
     rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
-    about = rows, topology.spokes, topology.ring_markers, np.ones(len(topology.spokes), np.bool_)
+    about = rows, topology.spokes, topology.ring_markers
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
     return estimate._replace(roughness=measure_roughness(*markers, *about))
 
@@ -202,8 +169,7 @@ def solve_step(system, gradients, bend, bend_response, xy, hidden, overlapping):
     least = least_information(system.sums, weight, lines, edges, system.variance, len(xy))
     measured, reliable = markers_after_shift(xy, shift, least, weight, spokes)
     bend = bend_after_shift(bend, bend_response, shift, lines, edges)
-    normalized_steps = normalized_step_lengths(shift, information.diagonal, hidden)
-    return StepSolution(measured, reliable, bend, normalized_steps, information)
+    return StepSolution(measured, reliable, bend, information)
 
 
 @compiled

@@ -150,7 +150,6 @@ class Refiner:
             roughness=np.zeros(markers),
             bend_variance=np.zeros(edges),
             bend=np.zeros((edges, 2)),
-            normalized_steps=np.zeros(markers),
             reading=None,
         )
         lines = gridlines_of(topology, estimate)
@@ -185,7 +184,7 @@ class Refiner:
             xy = markers_without_dot_gain(places.xy_px, topology.cells, estimate.dot_gain)
             places = replace(places, xy_px=xy)
         start = with_pattern_moved(topology, estimate)
-        if estimate.sigma < schedule.sharp_blur_share * edge_px and view.scale < schedule.cheap_reduction:
+        if estimate.sigma < schedule.sharp_blur_share * edge_px:
             return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
         usual_px = median_edge(start.xy, topology.edges)
         estimate = self._synthesis_solver.steps(view, start, schedule.steps, usual_px)
@@ -218,7 +217,7 @@ class Refiner:
         )
         if not some:
             return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
-        moved = with_pattern_moved(self._topology, estimate, unaccepted)
+        moved = with_pattern_moved(self._topology, estimate)
         lost = update_lost_markers(xy, cov, unaccepted, moved.xy, *start)
         fill_recovered_markers(view, self._topology, moved, contrasts, places, lost, xy, cov)
         return self._refined_markers(view, estimate, xy, cov, ~lost, places)

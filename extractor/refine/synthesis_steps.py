@@ -56,7 +56,6 @@ class SynthesisReading(NamedTuple):
     Attributes:
         weight: (E,) 0 to 1.
         variance_ratio: (E,), as ``variance_ratios`` gives it; 1 before the last step.
-        median_misfit: squared gray levels.
         bend_variance: (E,) px^2.
         dot_gain: px.
         dot_gain_offset: (E,) px.
@@ -67,7 +66,6 @@ class SynthesisReading(NamedTuple):
 
     weight: NDArray[np.float64]
     variance_ratio: NDArray[np.float64]
-    median_misfit: float
     bend_variance: NDArray[np.float64]
     dot_gain: float
     dot_gain_offset: NDArray[np.float64]
@@ -102,7 +100,7 @@ class SynthesisSolver:
         if shape not in kept:
             while len(kept) >= MAX_BUFFERS:
                 del kept[next(iter(kept))]
-            kept[shape] = allocate_drawing_buffers(shape, self._topology)
+            kept[shape] = allocate_drawing_buffers(shape)
         return kept[shape]
 
     def steps(self, view: PyramidLevel, estimate: Estimate, count: int, usual_px: float) -> Estimate:
@@ -157,7 +155,6 @@ class SynthesisSolver:
             noise=read.noise,
             sigma=sigma,
             levels=levels,
-            median_misfit=read.median_misfit,
             dot_gain=read.dot_gain,
         )
 
@@ -175,7 +172,7 @@ def _update_and_solve(drawing, state, topology, is_last):  # type: ignore[no-unt
     prior = BendingPrior(drawing.bend, state.roughness, state.weight)
     bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, state.noise, rule)
     pardon = bending_misfit(bend_variance, contrasts, sigma)
-    weight, median_misfit, found = weigh_gridlines(
+    weight, _, found = weigh_gridlines(
         sums, gradients, pardon, rule.values, rule.min_places, rule.default_weight
     )
     noise = found if np.isfinite(found) else state.noise
@@ -186,9 +183,7 @@ def _update_and_solve(drawing, state, topology, is_last):  # type: ignore[no-unt
         ratio = variance_ratios(system, gradients, solution.measured - state.xy)
         system = with_weight(system, weight / ratio)
         solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
-    return SynthesisReading(
-        weight, ratio, median_misfit, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution
-    )
+    return SynthesisReading(weight, ratio, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution)
 
 
 def _without_bending(estimate: Estimate) -> Estimate:

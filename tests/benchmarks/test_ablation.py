@@ -21,7 +21,8 @@ from benchmarks.support.code_copy import ROOT, path_of, replace_text
 from cmpdesign.scene import standard_layout
 from extractor import Status
 
-PIPELINE = "extractor.pipeline"
+PACKAGE = "extractor"
+PIPELINE = f"{PACKAGE}.pipeline"
 NOTHING = Rule("nothing", "", "accuracy", PIPELINE, "import annotations\n", "import annotations \n")
 READING = Rule("reading", "", "accuracy", PIPELINE, "        if bgr is None:\n", "        if True:\n")
 
@@ -54,8 +55,8 @@ def test_a_text_that_occurs_twice_or_never_is_refused(tmp_path: Path) -> None:
     (tmp_path / "extractor" / "some.py").write_text("a = 1\nb = 1\n")
     for old, count in (("= 1", 2), ("= 3", 0)):
         with pytest.raises(ValueError, match=f"occurs {count} times"):
-            replace_text("extractor.some", old, "= 2", tmp_path)
-    replace_text("extractor.some", "a = 1", "a = 2", tmp_path)
+            replace_text(f"{PACKAGE}.some", old, "= 2", tmp_path)
+    replace_text(f"{PACKAGE}.some", "a = 1", "a = 2", tmp_path)
     assert (tmp_path / "extractor" / "some.py").read_text().startswith("a = 2\nb = 1\n")
 
 
@@ -74,7 +75,7 @@ def test_caches_of_what_changed_and_of_its_users_go_and_others_stay_valid(tmp_pa
     for name in functions:
         (package / "__pycache__" / f"{name}-3.py311.nbi").write_text("")
     before = (package / "low.py").stat()
-    replace_text("extractor.low", "LIMIT = 100\n", "LIMIT = 2\n", tmp_path)
+    replace_text(f"{PACKAGE}.low", "LIMIT = 100\n", "LIMIT = 2\n", tmp_path)
     left = {path.name.partition("-")[0] for path in (package / "__pycache__").iterdir()}
     assert left == {"low.g", "middle.k", "beside.n"}
     after = (package / "low.py").stat()

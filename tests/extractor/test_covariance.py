@@ -52,7 +52,7 @@ def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> 
     d2, _ = squares_of(preset, kind)
     found = summarise(d2)
     assert 0.9 < found.z.value < {"fast": 1.3, "balanced": 1.15, "accurate": 1.1}[preset]
-    assert 0.85 < found.median_z < 1.2  # the bulk of them, too
+    assert 0.8 < found.median_z < 1.2  # the bulk of them, too
     # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
     assert np.concatenate(d2).max() < (200 if preset == "fast" else 72)
 

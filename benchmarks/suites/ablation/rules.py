@@ -42,8 +42,8 @@ PIPELINE = (
         "a small pattern in a large image numbered by the centers of its cells",
         "accuracy",
         "extractor.pipeline",
-        "return self._number_by_centers(pyramid, seeds, scale, stages) or Reason.NO_COLOR",
-        "return Reason.NO_COLOR",
+        "return self._number_by_centers(pyramid, seeds, scale, stages) or Unnumbered(Reason.NO_COLOR)",
+        "return Unnumbered(Reason.NO_COLOR)",
     ),
     Rule(
         "attach",

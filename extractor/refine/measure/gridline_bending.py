@@ -100,7 +100,7 @@ def _update_sorted_lanes(column):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def measure_roughness(xy, maps, diagonal, rows, spokes, near, which):  # type: ignore[no-untyped-def]
+def measure_roughness(xy, maps, diagonal, rows, spokes, near):  # type: ignore[no-untyped-def]
     """The roughness of the markers.
 
     The roughness is the median of the squared third differences along the gridlines at a marker and at its neighbours,
@@ -112,10 +112,9 @@ def measure_roughness(xy, maps, diagonal, rows, spokes, near, which):  # type: i
         diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
         rows: ``MarkerRows``.
         spokes, near: as in ``Topology``.
-        which: (M,) bool, the markers to measure.
 
     Returns:
-        (M,) px^2; 0 for the other markers.
+        (M,) px^2.
     """
     square = _squared_third_differences(xy, maps, rows)
     # the median, as markers with little weight where gridlines bend must not be taken for noise
@@ -131,7 +130,7 @@ def measure_roughness(xy, maps, diagonal, rows, spokes, near, which):  # type: i
             if n >= 0:
                 count += known[n]
                 over += above[n]
-        if which[m] and 2.0 * over > count:
+        if 2.0 * over > count:
             _fill_lane(m, own, near, column[filled:])
             marker[filled], odd[filled] = m, count % 2.0 == 1.0
             filled += 1

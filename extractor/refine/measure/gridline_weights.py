@@ -250,21 +250,6 @@ def least_information(sums, weight, lines, edges, variance, count):  # type: ign
 
 
 @compiled
-def normalized_step_lengths(step, diagonal, hidden):  # type: ignore[no-untyped-def]
-    """(M,) the length of each marker's step (M, 2) px, in its deviations with all other markers known.
-
-    ``diagonal`` (M, 3) 1/px^2, the information's diagonal blocks; 0 for the ``hidden`` (M,) bool.
-    """
-    out = np.zeros(step.shape[0])
-    for m in range(step.shape[0]):
-        xx, cross, yy = diagonal[m, 0], diagonal[m, 1], diagonal[m, 2]
-        dx, dy = step[m, 0], step[m, 1]
-        if not hidden[m]:
-            out[m] = np.sqrt(max(dx * dx * xx + 2 * dx * dy * cross + dy * dy * yy, 0.0))
-    return out
-
-
-@compiled
 def markers_after_shift(xy, shift, information, weight, spokes):  # type: ignore[no-untyped-def]
     """The markers after a step.
 

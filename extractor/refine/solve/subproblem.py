@@ -24,28 +24,6 @@ class SubproblemNumbering(NamedTuple):
     spokes: NDArray[np.int32]
 
 
-class Subproblem(NamedTuple):
-    """Some gridlines (n) and the markers at their ends (m), numbered among themselves.
-
-    Attributes:
-        gridlines: (n,) the gridlines.
-        markers, ends, spokes: as in ``SubproblemNumbering``.
-        free: (m,) bool, all gridlines at the marker belong to the subproblem.
-        hidden: (m,) bool.
-        roughness: (m,) px^2.
-        shifts: (m, 2) px, of each marker from where it is drawn.
-    """
-
-    gridlines: NDArray[np.int64]
-    markers: NDArray[np.int64]
-    ends: NDArray[np.int32]
-    spokes: NDArray[np.int32]
-    free: NDArray[np.bool_]
-    hidden: NDArray[np.bool_]
-    roughness: NDArray[np.float64]
-    shifts: NDArray[np.float64]
-
-
 @compiled
 def gridlines_at(selected, edges):  # type: ignore[no-untyped-def]
     """(n,) the gridlines with an end at a selected marker (M,) bool."""
@@ -78,48 +56,10 @@ def number_subproblem(gridlines, edges, spokes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def held_shifts(measured, drawn, redrawn):  # type: ignore[no-untyped-def]
-    """(M, 2) px, the shifts of the markers from where they are drawn; 0 for those drawn again and unknown ones."""
-    out = measured - drawn
-    for m in range(out.shape[0]):
-        if redrawn[m] or not np.isfinite(out[m, 0]):
-            out[m, 0], out[m, 1] = 0.0, 0.0
-    return out
-
-
-@compiled
-def subproblem_around(free, hidden, roughness, shifts, edges, spokes):  # type: ignore[no-untyped-def]
-    """The subproblem of the gridlines at some markers.
-
-    Args:
-        free: (M,) bool, the markers.
-        hidden, roughness, shifts: (M,) bool, (M,) px^2 and (M, 2) px, of all markers.
-        edges, spokes: (E, 2) and (M, 6), as in ``Topology``.
-
-    Returns:
-        ``Subproblem``.
-    """
-    gridlines = gridlines_at(free, edges)
-    markers, ends, around = number_subproblem(gridlines, edges, spokes)
-    kinds = free[markers], hidden[markers], roughness[markers]
-    return Subproblem(gridlines, markers, ends, around, *kinds, selected_rows(shifts, markers))
-
-
-@compiled
 def selected_rows(table, numbers):  # type: ignore[no-untyped-def]
     """The rows of a two-dimensional table with these numbers (n,)."""
     out = np.empty((len(numbers), table.shape[1]), table.dtype)
     for i in range(len(numbers)):
         for k in range(table.shape[1]):
             out[i, k] = table[numbers[i], k]
-    return out
-
-
-@compiled
-def replaced_table_rows(table, numbers, rows):  # type: ignore[no-untyped-def]
-    """A copy of a two-dimensional table with other ``rows`` (n, k) at these numbers (n,)."""
-    out = table.copy()
-    for i in range(len(numbers)):
-        for k in range(table.shape[1]):
-            out[numbers[i], k] = rows[i, k]
     return out

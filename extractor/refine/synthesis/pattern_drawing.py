@@ -1,7 +1,7 @@
-"""Drawing of the pattern from its current markers, and erasing of single cells.
+"""Drawing of the pattern from its current markers.
 
 A pixel of the drawing is the sum over the cells of the cell's share in that pixel (``cell_coverage``) times its level
-over black. The shares are kept: erasing subtracts what was added, for a fraction of the time.
+over black.
 """
 
 from __future__ import annotations
@@ -28,25 +28,6 @@ from extractor.refine.synthesis.cell_coverage import (
 )
 from extractor.refine.synthesis.gridlines import KNOWN
 from extractor.refine.synthesis.pixel_rows import LANES, padded_count
-
-MAX_COVERAGES, MAX_RUNS = 1 << 18, 1 << 16  # that are kept; cells beyond are drawn once more to be erased
-FIRST_RUN, RUN_COUNT, FIRST_COVERAGE = range(3)  # columns of a cell's kept coverages
-
-
-class CoverageRuns(NamedTuple):
-    """The coverages of the cells that were drawn.
-
-    Attributes:
-        cell: (K, 3) each cell's first run, its number of runs (0: not kept) and its first coverage.
-        runs: (R, 3) x, y and number of pixels in a row of the image.
-        coverages: (S,) shares of the cell in these pixels.
-        used: (2,) numbers of runs and of coverages in use.
-    """
-
-    cell: NDArray[np.int64]
-    runs: NDArray[np.int32]
-    coverages: NDArray[np.float32]
-    used: NDArray[np.int64]
 
 
 class CellGeometry(NamedTuple):
@@ -81,27 +62,14 @@ class CellAppearance(NamedTuple):
     sigma: float
 
 
-class Canvas(NamedTuple):
-    """The memory that cells are drawn in.
-
-    Attributes:
-        flat: (H * W * 3,) the drawing.
-        width: px, W.
-        kept: the coverages of the cells that were drawn.
-    """
-
-    flat: NDArray[np.float32]
-    width: int
-    kept: CoverageRuns
-
-
 class CellBuffers(NamedTuple):
     """Memory for one cell.
 
     Attributes:
         side: (3, 9) the sides, in units of the blur. corners: (3, 9) float32.
         places: x, then y of the pixels, px. distances: of the pixels inside each of the three sides.
-        colors: three channels of the pixels. shares: of the cell in the pixels. runs: (n, 3) as in ``CoverageRuns``.
+        colors: three channels of the pixels. shares: of the cell in the pixels.
+        runs: (n, 3) x, y and number of pixels in a row of the image.
         low, high: px, the ends of the rows.
     """
 
@@ -121,14 +89,12 @@ class ColorPlane(NamedTuple):
 
     Attributes:
         x, y: px, the centroid, from the origin of the pixels' places.
-        sense: 1 to add the cell, -1 to subtract it.
         level: (3,) gray levels at the centroid.
         slope: (3, 2) gray levels per px along x and y.
     """
 
     x: float
     y: float
-    sense: float
     level: NDArray[np.float64]
     slope: NDArray[np.float64]
 
@@ -143,21 +109,13 @@ class RowEnds(NamedTuple):
     high: NDArray[np.float64]
 
 
-def allocate_coverage_runs(cells: int, shares: int = MAX_COVERAGES) -> CoverageRuns:
-    """Empty memory for a number of cells and of their coverages in all."""
-    runs = np.empty((MAX_RUNS, 3), np.int32)
-    return CoverageRuns(
-        np.zeros((cells, 3), np.int64), runs, np.empty(shares, np.float32), np.zeros(2, np.int64)
-    )
-
-
 @inlined_no_refcount
 def _fill_colors(places, count, shares, plane, colors):  # type: ignore[no-untyped-def]
     """Fill in the three channels of pixels: the color of the plane times the pixels' shares."""
-    f, sense, level, slope = np.float32, plane.sense, plane.level, plane.slope
-    l0, l1, l2 = f(sense * level[0]), f(sense * level[1]), f(sense * level[2])
-    r0, r1, r2 = f(sense * slope[0, 0]), f(sense * slope[1, 0]), f(sense * slope[2, 0])
-    d0, d1, d2 = f(sense * slope[0, 1]), f(sense * slope[1, 1]), f(sense * slope[2, 1])
+    f, level, slope = np.float32, plane.level, plane.slope
+    l0, l1, l2 = f(level[0]), f(level[1]), f(level[2])
+    r0, r1, r2 = f(slope[0, 0]), f(slope[1, 0]), f(slope[2, 0])
+    d0, d1, d2 = f(slope[0, 1]), f(slope[1, 1]), f(slope[2, 1])
     x0, y0 = f(plane.x), f(plane.y)
     for k in range(padded_count(count)):
         x, y, share = places[PX + k] - x0, places[PY + k] - y0, shares[k]
@@ -201,11 +159,10 @@ def _fill_runs(x, y, ends, x0, y0, places, runs):  # type: ignore[no-untyped-def
 
 
 @inlined_no_refcount
-def _draw_cell(i, sense, geometry, appearance, box, canvas, buffers):  # type: ignore[no-untyped-def]
-    """Draw a cell, and keep its coverages if it is added and memory is left."""
+def _draw_cell(i, geometry, appearance, box, flat, width, buffers):  # type: ignore[no-untyped-def]
+    """Draw a cell into the flat drawing of an image ``width`` px wide."""
     xy, cells, sigma = geometry.xy, geometry.cells, appearance.sigma
     side, places, shares, runs = buffers.side, buffers.places, buffers.shares, buffers.runs
-    kept, used = canvas.kept, canvas.kept.used
     a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
     turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0 else -1.0
     edges_of_cell = geometry.cell_edges[i]
@@ -221,41 +178,13 @@ def _draw_cell(i, sense, geometry, appearance, box, canvas, buffers):  # type: i
     fill_row_ends(side, top, max(bottom + 1 - top, 0), far, left, right, ends.low, ends.high)
     cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
     x0, y0 = np.floor(cx), np.floor(cy)
-    plane = ColorPlane(cx - x0, cy - y0, sense, appearance.levels[i], appearance.slopes[i])
-    fits = used[0] + CHUNK <= kept.runs.shape[0] and used[1] + CHUNK <= kept.coverages.shape[0]
-    fits = sense > 0.0 and fits
-    if fits:
-        runs, shares = kept.runs[used[0] :], kept.coverages[used[1] :]
+    plane = ColorPlane(cx - x0, cy - y0, appearance.levels[i], appearance.slopes[i])
     x, y, filled, count = 0, top, 0, 0
     while y <= bottom:
         x, y, filled, count = _fill_runs(x, y, ends, x0, y0, places, runs)
-        fits = fits and y > bottom
         fill_coverage(places, count, x0, y0, outline, buffers.distances, shares)
         _fill_colors(places, count, shares, plane, buffers.colors)
-        _add_colors(canvas.flat, canvas.width, runs[:filled], buffers.colors)
-    if fits:
-        kept.cell[i, FIRST_RUN], kept.cell[i, RUN_COUNT] = used[0], filled
-        kept.cell[i, FIRST_COVERAGE] = used[1]
-        used[0] += filled
-        used[1] += count
-
-
-@inlined_no_refcount
-def _update_erasing_cell(i, geometry, appearance, canvas, places, colors):  # type: ignore[no-untyped-def]
-    """Subtract a cell whose coverages are kept."""
-    xy, cells, kept = geometry.xy, geometry.cells, canvas.kept
-    a, b, c = xy[cells[i, 0]], xy[cells[i, 1]], xy[cells[i, 2]]
-    cx, cy = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-    x0, y0, count = np.floor(cx), np.floor(cy), 0
-    first = kept.cell[i, FIRST_RUN]
-    own = kept.runs[first : first + kept.cell[i, RUN_COUNT]]
-    for k in range(own.shape[0]):
-        fill_pixels(places, count, own[k, 2], own[k, 0] - x0, own[k, 1] - y0)
-        count += own[k, 2]
-    shares = kept.coverages[kept.cell[i, FIRST_COVERAGE] :]
-    plane = ColorPlane(cx - x0, cy - y0, -1.0, appearance.levels[i], appearance.slopes[i])
-    _fill_colors(places, count, shares, plane, colors)
-    _add_colors(canvas.flat, canvas.width, own, colors)
+        _add_colors(flat, width, runs[:filled], buffers.colors)
 
 
 @compiled
@@ -269,57 +198,18 @@ def _cell_buffers(height):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def draw_cells(which, sense, geometry, appearance, box, model, kept):  # type: ignore[no-untyped-def]
-    """Add cells to a drawing, and keep their coverages as far as memory is left.
+def draw_cells(geometry, appearance, box, model):  # type: ignore[no-untyped-def]
+    """Add all cells whose sides are known to a drawing.
 
     Args:
-        which: (K,) bool, the cells to draw.
-        sense: 1 to add the cells; -1 to subtract them, which keeps no coverages.
         geometry: ``CellGeometry``.
         appearance: ``CellAppearance``.
         box: (4,) px, x from, y from, x to, y to; nothing is drawn outside.
         model: (H, W, 3) float32, the drawing.
-        kept: ``CoverageRuns``.
     """
-    canvas = Canvas(model.reshape(-1), model.shape[1], kept)
+    cell_edges, lines, flat = geometry.cell_edges, geometry.lines, model.reshape(-1)
     buffers = _cell_buffers(model.shape[0])
-    _draw_listed_cells(np.flatnonzero(which), sense, geometry, appearance, box, canvas, buffers)
-
-
-@inlined_no_refcount
-def _draw_listed_cells(some, sense, geometry, appearance, box, canvas, buffers):  # type: ignore[no-untyped-def]
-    """The same for the cells of these numbers (n,)."""
-    cell_edges, lines, kept = geometry.cell_edges, geometry.lines, canvas.kept.cell
-    for i in some:
-        kept[i, RUN_COUNT] = 0
+    for i in range(len(geometry.cells)):
         e, f, g = cell_edges[i, 0], cell_edges[i, 1], cell_edges[i, 2]
         if lines[e, KNOWN] * lines[f, KNOWN] * lines[g, KNOWN] > 0.0:
-            _draw_cell(i, sense, geometry, appearance, box, canvas, buffers)
-
-
-@compiled
-def update_erasing_cells(which, geometry, appearance, box, model, kept):  # type: ignore[no-untyped-def]
-    """Subtract cells from a drawing; they were drawn with the same geometry and appearance.
-
-    Args: as in ``draw_cells``.
-    """
-    some, canvas = np.flatnonzero(which), Canvas(model.reshape(-1), model.shape[1], kept)
-    places, colors = np.zeros(2 * COLUMN, np.float32), np.empty(3 * CHUNK, np.float32)
-    left = some[: _update_erasing_listed_cells(some, geometry, appearance, canvas, places, colors)]
-    if left.shape[0] > 0:
-        buffers = _cell_buffers(model.shape[0])
-        _draw_listed_cells(left, -1.0, geometry, appearance, box, canvas, buffers)
-
-
-@inlined_no_refcount
-def _update_erasing_listed_cells(some, geometry, appearance, canvas, places, colors):  # type: ignore[no-untyped-def]
-    """Subtract those of the cells (n,) whose coverages are kept; the number of the others, which are moved to the front
-    of ``some``."""
-    left = 0
-    for i in some:
-        if canvas.kept.cell[i, RUN_COUNT] > 0:
-            _update_erasing_cell(i, geometry, appearance, canvas, places, colors)
-        else:
-            some[left] = i
-            left += 1
-    return left
+            _draw_cell(i, geometry, appearance, box, flat, model.shape[1], buffers)

@@ -184,7 +184,8 @@ def test_the_ten_places_are_4_mm_apart_and_the_cube_lies_on_both_patterns() -> N
 
 
 def test_a_contact_moves_with_its_place() -> None:
-    text = small_sensor_text()
+    text = small_sensor_text().replace("marker_depth_mm = 1.0", "marker_depth_mm = 0.0")
+    assert "marker_depth_mm = 0.0" in text
     here, there = (
         place_surface(text, ContactLoad("ball", 1.0), centre) for centre in ((0.0, 0.0), (2.0, -1.5))
     )

@@ -120,7 +120,7 @@ def test_the_extractor_projects_what_the_scene_draws(mirror: bool) -> None:
 def found_px(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What the extractor reads of the scene's markers, and their true places."""
     drawn = render(scene, size=SIZE)
-    markers = Extractor(parse_layout(small_text("honeycomb", 6))).extract(drawn.image)
+    markers = Extractor(parse_layout(small_text("honeycomb", 6)), side="either").extract(drawn.image)
     return markers.xy_px[drawn.truth.visible], drawn.truth.marker_xy_px[drawn.truth.visible]
 
 

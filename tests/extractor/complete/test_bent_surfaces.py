@@ -43,7 +43,7 @@ def without_cells_at(pattern: str, markers: list[int]) -> Damage:
     [
         (ONE, 0.0, 1.0, 0.002),
         (ONE, 0.4, 1.0, 0.006),
-        (ONE, 0.9, 1.0, 0.006),
+        (ONE, 0.9, 1.0, 0.0065),
         (ONE, 2.0, None, 0.0),
         (GAPS, 0.0, 1.0, 0.002),
         (GAPS, 0.4, 1.0, 0.02),

