@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.suites.calibration.camera import camera_cases
 from benchmarks.suites.scoring.calibration import squared_distances, summarise
 from benchmarks.support.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
+from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import render
-from extractor import Status, VirtualStatus
+from extractor import Extractor, Status, VirtualStatus, parse_layout
 
 LAYERS = 8
 SIZE = (400, 360)
@@ -63,3 +65,21 @@ def test_the_covariance_of_a_measured_virtual_marker_is_true(preset: str, kind: 
     found = summarise(squares_of(preset, kind)[1])
     assert found.count > 1000 and not found.singular
     assert 0.85 < found.z.value < (1.25 if preset == "fast" else 1.2)
+
+
+@pytest.mark.parametrize("preset", ["balanced", "accurate"])
+def test_the_covariance_holds_what_a_camera_does_to_gridlines(preset: str) -> None:
+    """Colors beside each other, aberration, motion, demosaicing, compression: the gridlines at a marker disagree."""
+    effects = ("shifted colors", "aberration", "motion", "mosaic", "jpeg")
+    d2 = []
+    for case in camera_cases(False, 11):
+        if case.kind in effects and len(d2) < 20:
+            seen = case.shoot()
+            extractor = Extractor(parse_layout(layout_to_json(case.layout)), preset, side="either")  # type: ignore[arg-type]
+            markers = extractor.extract(seen.image)
+            mine = markers.status == Status.MEASURED
+            error = markers.xy_px - seen.truths[0].marker_xy_px
+            d2.append(squared_distances(error[mine], markers.cov_px2[mine]))
+    found = summarise(d2)
+    assert found.pictures >= 18 and found.count > 5000
+    assert 0.8 < found.z.value < 1.3 and found.beyond.value < 0.04
