@@ -62,7 +62,6 @@ class RefinedMarkers:
         cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
         explained: (M,) bool, the pattern explains the image around the marker. Where not, something lies on the marker
             (and after synthesis, its place is from profiles alone).
-        bend_deviation_px: (M,) how freely the gridlines at the marker were let bend beyond the smooth map (deviation).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, gray levels, one channel.
         appearance: how the image looks; None where the pattern was not drawn.
@@ -72,7 +71,6 @@ class RefinedMarkers:
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     explained: NDArray[np.bool_]
-    bend_deviation_px: NDArray[np.float64]
     blur_px: float
     noise: float
     appearance: Appearance | None

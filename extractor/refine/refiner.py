@@ -33,7 +33,6 @@ from extractor.refine.estimate import (
     start_places,
 )
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
-from extractor.refine.measure.gridline_bending import mean_at_markers
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
 from extractor.refine.measure.gridline_weights import (
     MIN_NOISE,
@@ -236,12 +235,11 @@ class Refiner:
         assert reading is not None
         picture = self._synthesis_solver.buffers(view.image.shape).synthetic_image
         points = measure_virtual_markers(view, picture, reading, self._virtual)
-        start, spokes = start_places(places), self._topology.spokes
-        xy, cov, bend_deviation = _at_full_scale(xy, cov, estimate.bend_variance, spokes, start, scale)
+        xy, cov = _at_full_scale(xy, cov, start_places(places), scale)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look) if reading.drawn else None
         blur, noise = scale * estimate.sigma, scale * estimate.noise
-        return RefinedMarkers(xy, cov, explained, bend_deviation, blur, noise, appearance, points)
+        return RefinedMarkers(xy, cov, explained, blur, noise, appearance, points)
 
     def _accepted_markers(
         self, estimate: Estimate, places: InitialMarkers
@@ -287,11 +285,9 @@ def rescaled_contrasts(contrasts: EdgeContrasts, ratio: float) -> EdgeContrasts:
 
 
 @compiled
-def _at_full_scale(xy, cov, bend_variance, spokes, places, scale):  # type: ignore[no-untyped-def]
-    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image, and (M,) px, the deviation of the bending at
-    each; lost markers on which triangles agree lie where these put them."""
+def _at_full_scale(xy, cov, places, scale):  # type: ignore[no-untyped-def]
+    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image; a lost marker lies where its triangles agree."""
     start, out, out_cov = places.xy_px, np.empty_like(xy), scale**2 * cov
-    bend_deviation = scale * np.sqrt(mean_at_markers(bend_variance, spokes))
     for m in range(xy.shape[0]):
         from_places = np.isnan(xy[m, 0]) and places.agreed[m] and np.isfinite(start[m, 0])
         for axis in range(2):
@@ -299,4 +295,4 @@ def _at_full_scale(xy, cov, bend_variance, spokes, places, scale):  # type: igno
         if from_places:
             out_cov[m, 0, 0] = out_cov[m, 1, 1] = scale**2 * (AGREED_DEVIATION * places.edge_px[m]) ** 2
             out_cov[m, 0, 1] = out_cov[m, 1, 0] = 0.0
-    return out, out_cov, bend_deviation
+    return out, out_cov
