@@ -286,7 +286,7 @@ def rescaled_contrasts(contrasts: EdgeContrasts, ratio: float) -> EdgeContrasts:
 
 @compiled
 def _at_full_scale(xy, cov, places, scale):  # type: ignore[no-untyped-def]
-    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image; a lost marker lies where its triangles agree."""
+    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image; a lost one lies where its triangles agree."""
     start, out, out_cov = places.xy_px, np.empty_like(xy), scale**2 * cov
     for m in range(xy.shape[0]):
         from_places = np.isnan(xy[m, 0]) and places.agreed[m] and np.isfinite(start[m, 0])
