@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.made.homographies import (
+from extractor.numeric.homographies import (
     PARAMETERS,
     Array,
     derivatives,

@@ -37,16 +37,6 @@ MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
 BLUR_STEP = 0.02  # of the blur, for derivatives of the levels
 
 
-class DrawingBuffers(NamedTuple):
-    """Memory to draw in for one image size and layout.
-
-    Attributes:
-        synthetic_image: (H, W, 3) the light of the pattern over black, as it was last drawn.
-    """
-
-    synthetic_image: NDArray[np.float32]
-
-
 class Synthesis(NamedTuple):
     """The pattern as it is drawn, and the sums along its gridlines.
 
@@ -54,11 +44,8 @@ class Synthesis(NamedTuple):
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
         sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
         added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
-        bleed: (E, 6) light, the change of the levels on both sides where the blur grows by its own width.
         sums: (E, 24), as ``accumulate_residual_sums`` gives them.
-        levels: of the inks, as drawn.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.
-        box: (4,) the part of the image that is drawn: x from, y from, x to, y to.
         sigma: the blur, px.
         edge_px: the median length of the gridlines.
     """
@@ -69,35 +56,26 @@ class Synthesis(NamedTuple):
     sides: NDArray[np.float64]
     contrasts: NDArray[np.float64]
     added: NDArray[np.float64]
-    bleed: NDArray[np.float64]
     sums: NDArray[np.float64]
-    levels: InkLevels
     corrected_levels: InkLevels
-    box: NDArray[np.int64]
     sigma: float
     edge_px: float
 
 
-def allocate_drawing_buffers(shape: tuple[int, ...]) -> DrawingBuffers:
-    """Buffers for images of a shape (H, W, 3), nothing drawn."""
-    return DrawingBuffers(np.zeros(shape, np.float32))
-
-
 def draw_pattern(
-    view: PyramidLevel, topology: Topology, estimate: Estimate, buffers: DrawingBuffers
+    view: PyramidLevel, topology: Topology, estimate: Estimate, picture: NDArray[np.float32]
 ) -> Synthesis:
-    """Draw the whole pattern of the estimate into the buffers, and compare it with the image."""
+    """Draw the whole pattern of the estimate into the picture (H, W, 3), and compare it with the image."""
     height, width = view.image.shape[:2]
     box = pattern_box(estimate.xy, MARGIN_SIGMA * estimate.sigma + 2, width, height)
     state = estimate.pattern_state()
-    drawing: Synthesis = _draw_pattern(view, topology, buffers, state, estimate.levels, box)
+    drawing: Synthesis = _draw_pattern(view, topology, picture, state, estimate.levels, box)
     return drawing
 
 
 @compiled
-def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[no-untyped-def]
+def _draw_pattern(view, topology, picture, state, levels, box):  # type: ignore[no-untyped-def]
     """``Synthesis`` of a ``PatternState`` with ``InkLevels`` within the box (4,)."""
-    picture = buffers.synthetic_image
     xy, bend, sigma = state.xy, state.bend, state.sigma
     cells, cell_edges, edges = topology.cells, topology.cell_edges, topology.edges
     cell, slope = levels.cell, levels.slope
@@ -115,9 +93,7 @@ def _draw_pattern(view, topology, buffers, state, levels, box):  # type: ignore[
     drawn = DrawnGridlines(lines, sides, added, bleed, bending_gridlines(state.roughness, bend, edges))
     sums = accumulate_residual_sums(view, picture, drawn, sigma, box)
     contrasts, edge_px = value_contrasts(sides, view.response.encoded), median_edge(xy, edges)
-    return Synthesis(
-        xy, lines, bend, sides, contrasts, added, bleed, sums, levels, corrected, box, sigma, edge_px
-    )
+    return Synthesis(xy, lines, bend, sides, contrasts, added, sums, corrected, sigma, edge_px)
 
 
 @compiled

@@ -233,7 +233,7 @@ class Refiner:
         """The markers at the image's full scale. A lost marker on which all triangles agree lies where these put it."""
         scale, reading = view.scale, estimate.reading
         assert reading is not None
-        picture = self._synthesis_solver.buffers(view.image.shape).synthetic_image
+        picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = _at_full_scale(xy, cov, start_places(places), scale)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numeric.compilation import compiled
-from extractor.refine.drawn_pattern import DrawingBuffers, Synthesis, allocate_drawing_buffers, draw_pattern
+from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import bending_misfit
 from extractor.refine.measure.gridline_offsets import GridlineReading
@@ -46,7 +46,7 @@ WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like be
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
 # (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
-MAX_BUFFERS = 2  # kept, for images of so many shapes
+MAX_PICTURES = 2  # kept, for images of so many shapes
 NO_CLEARANCE = np.empty((0, 4))
 
 
@@ -92,15 +92,15 @@ class SynthesisSolver:
         self.__dict__.update(state)
         self._kept = threading.local()
 
-    def buffers(self, shape: tuple[int, ...]) -> DrawingBuffers:
-        """The thread's buffers for images of a shape (H, W, 3), with the pattern as it was last drawn."""
-        kept: dict[tuple[int, ...], DrawingBuffers] | None = getattr(self._kept, "buffers", None)
+    def picture(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """(H, W, 3) the thread's picture of a shape: the light of the pattern over black, as last drawn."""
+        kept: dict[tuple[int, ...], NDArray[np.float32]] | None = getattr(self._kept, "pictures", None)
         if kept is None:
-            kept = self._kept.buffers = {}
+            kept = self._kept.pictures = {}
         if shape not in kept:
-            while len(kept) >= MAX_BUFFERS:
+            while len(kept) >= MAX_PICTURES:
                 del kept[next(iter(kept))]
-            kept[shape] = allocate_drawing_buffers(shape)
+            kept[shape] = np.zeros(shape, np.float32)
         return kept[shape]
 
     def steps(self, view: PyramidLevel, estimate: Estimate, count: int, usual_px: float) -> Estimate:
@@ -133,7 +133,7 @@ class SynthesisSolver:
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate, is_last: bool) -> tuple[Estimate, Synthesis]:
         """A step from everything."""
-        drawing = draw_pattern(view, self._topology, estimate, self.buffers(view.image.shape))
+        drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
         return self._update_estimate(estimate, drawing, is_last), drawing
 
     def _update_estimate(self, estimate: Estimate, drawing: Synthesis, is_last: bool) -> Estimate:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.reference import Reference
+from extractor.numeric.homographies import mapped
 
 MIN_MARKERS = 4  # for a homography
 MAX_CONDITION = 1e6  # of the markers' scatter; collinear markers determine no homography
@@ -44,9 +45,7 @@ class Rest:
             return (xy_px - self.xy_px) * (self.mm_per_px, -self.mm_per_px)
         if self.layout_from_image is None:
             return np.full_like(xy_px, np.nan)
-        return apply_homography(self.layout_from_image, xy_px) - apply_homography(
-            self.layout_from_image, self.xy_px
-        )
+        return mapped(self.layout_from_image, xy_px) - mapped(self.layout_from_image, self.xy_px)
 
 
 def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None) -> Rest:
@@ -66,11 +65,5 @@ def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None
     if homography is None:
         return Rest(xy_px, None, None, float("nan"))
     h = np.asarray(homography, dtype=np.float64)
-    residual = float(np.sqrt(np.mean((apply_homography(h, px) - mm) ** 2)))
+    residual = float(np.sqrt(np.mean((mapped(h, px) - mm) ** 2)))
     return Rest(xy_px, h, None, residual)
-
-
-def apply_homography(homography: NDArray[np.float64], xy: Points) -> Points:
-    """(N, 2) the points (N, 2) mapped by a homography (3, 3); NaN stays NaN."""
-    x, y, w = homography @ np.column_stack([xy, np.ones(len(xy))]).T
-    return np.column_stack([x / w, y / w])

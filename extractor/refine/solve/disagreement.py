@@ -16,9 +16,7 @@ from extractor.refine.synthesis.gridlines import KNOWN, UX, UY
 from extractor.refine.synthesis.residual_kernel import AA, AB, BB
 
 TAIL_FREEDOM = 6.0  # degrees of freedom of the t distribution by which gridlines count for their picture
-PICTURE_FREEDOM = (
-    20.0  # degrees of freedom by which the picture's ratio counts beside that of the gridlines around
-)
+PICTURE_FREEDOM = 20.0  # by which the picture's ratio counts beside that of the gridlines around
 ROUNDS = 4  # of the picture's ratio
 MIN_FREEDOM = 0.1  # of a gridline
 MAX_SQUARE = 1e6  # of a distance over its deviation
@@ -107,11 +105,8 @@ def variance_ratios(system, gradients, shift):  # type: ignore[no-untyped-def]
     Returns:
         (E,).
     """
-    square, freedom, edges = (
-        _squared_distances(system, gradients, shift),
-        _degrees_of_freedom(system),
-        system.edges,
-    )
+    edges = system.edges
+    square, freedom = _squared_distances(system, gradients, shift), _degrees_of_freedom(system)
     ratio, count = _ratio_of_picture(square, freedom)
     at_square, at_freedom = np.zeros(len(system.spokes)), np.zeros(len(system.spokes))
     for e in range(len(edges)):
@@ -130,11 +125,5 @@ def variance_ratios(system, gradients, shift):  # type: ignore[no-untyped-def]
 @compiled
 def with_weight(system, weight):  # type: ignore[no-untyped-def]
     """The ``GridlineSystem`` with other weights (E,)."""
-    sums, lines, contrasts, edges, spokes = (
-        system.sums,
-        system.lines,
-        system.contrasts,
-        system.edges,
-        system.spokes,
-    )
-    return GridlineSystem(sums, weight, lines, contrasts, edges, spokes, system.sigma, system.variance)
+    lines, contrasts, edges, spokes = system.lines, system.contrasts, system.edges, system.spokes
+    return GridlineSystem(system.sums, weight, lines, contrasts, edges, spokes, system.sigma, system.variance)
