@@ -5,6 +5,7 @@ In: an elastomer, an object, its motion. Out: displacement and traction of the s
 
 from __future__ import annotations
 
+from cmpdesign.contact.continuation import ContinuedSurface, SurfaceContinuation
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import ContactError
 from cmpdesign.contact.motion import Motion
@@ -19,6 +20,7 @@ __all__ = [
     "Contact",
     "ContactError",
     "ContactSetup",
+    "ContinuedSurface",
     "Cube",
     "Cylinder",
     "Elastomer",
@@ -29,6 +31,7 @@ __all__ = [
     "Relief",
     "Rib",
     "Ring",
+    "SurfaceContinuation",
     "Wedge",
     "contact_from",
     "solve",

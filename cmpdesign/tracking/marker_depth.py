@@ -1,4 +1,4 @@
-"""What a rig file says of the place of the pattern: how far it lies below the touched surface."""
+"""What a rig file says of the place of the pattern: how far it lies below the touched surface, and of which layer."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.files import read_text
@@ -21,18 +22,50 @@ def read_marker_depth_mm(path: Path) -> float | None:
         InputError: the file cannot be read, or is no TOML.
         CmpDesignError: the depth is no number from 0.
     """
+    elastomer = _read_table(path)
+    return (
+        None
+        if elastomer is None
+        else _length_mm(path, "marker_depth_mm", elastomer.get("marker_depth_mm", 0.0))
+    )
+
+
+def read_elastomer(path: Path) -> Elastomer:
+    """The layer of the same table, for displacements alone: its Young's modulus is 1 MPa.
+
+    Raises:
+        InputError: the file cannot be read, or is no TOML.
+        CmpDesignError: the file has no such table, or a value is missing or out of range.
+    """
+    table = _read_table(path)
+    if table is None or "thickness_mm" not in table:
+        raise CmpDesignError(
+            f"{path}: has no [elastomer] with thickness_mm, which the touched surface is computed with; "
+            "add thickness_mm, marker_depth_mm and poisson, or leave out --surface"
+        )
+    lengths = {
+        name: _length_mm(path, name, table.get(name, 0.0)) for name in ("thickness_mm", "marker_depth_mm")
+    }
+    poisson = table.get("poisson", 0.5)
+    if not isinstance(poisson, int | float) or isinstance(poisson, bool):
+        raise CmpDesignError(f"{path}: elastomer.poisson is {poisson!r}; expected a number from 0 to 0.5")
+    return Elastomer(lengths["thickness_mm"], 1.0, float(poisson), lengths["marker_depth_mm"])
+
+
+def _length_mm(path: Path, name: str, value: object) -> float:
+    try:
+        length_mm = parse_length_mm(value)
+    except ValueError as error:
+        raise CmpDesignError(f"{path}: elastomer.{name}: {error}") from None
+    if length_mm < 0:
+        raise CmpDesignError(f"{path}: elastomer.{name} is {length_mm:g} mm; expected 0 or more")
+    return length_mm
+
+
+def _read_table(path: Path) -> Mapping[str, Any] | None:
     document = parse_toml(read_text(path), str(path))
     elastomer = document.get("elastomer", _table(document, "contact").get("elastomer"))
-    if not isinstance(elastomer, Mapping):
-        return None
-    value = elastomer.get("marker_depth_mm", 0.0)
-    try:
-        depth_mm = parse_length_mm(value)
-    except ValueError as error:
-        raise CmpDesignError(f"{path}: elastomer.marker_depth_mm: {error}") from None
-    if depth_mm < 0:
-        raise CmpDesignError(f"{path}: elastomer.marker_depth_mm is {depth_mm:g} mm; expected 0 or more")
-    return depth_mm
+    return elastomer if isinstance(elastomer, Mapping) else None
 
 
 def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:

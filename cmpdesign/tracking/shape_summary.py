@@ -28,11 +28,14 @@ class ShapeStatistics:
     Args:
         reconstructor: what reconstructs them.
         marker_depth_mm: depth of the pattern below the touched surface; None: not known.
+        is_continued: the table holds the touched surface, too.
     """
 
-    def __init__(self, reconstructor: Reconstructor, marker_depth_mm: float | None = None) -> None:
+    def __init__(
+        self, reconstructor: Reconstructor, marker_depth_mm: float | None = None, is_continued: bool = False
+    ) -> None:
         self._reconstructor = reconstructor
-        self._marker_depth_mm = marker_depth_mm
+        self._marker_depth_mm, self._is_continued = marker_depth_mm, is_continued
         self._present = reconstructor.layout.present
         self._elapsed_ms: list[float] = []
         self._statuses: Counter[str] = Counter()
@@ -110,6 +113,10 @@ class ShapeStatistics:
             ],
             "model_px": self._reconstructor.model_px,
             "warnings": list(self._reconstructor.warnings),
-            "positions": {"of": "pattern", "depth_mm": self._marker_depth_mm},
+            "positions": {
+                "of": "pattern",
+                "depth_mm": self._marker_depth_mm,
+                "continued_to_surface": self._is_continued,
+            },
             "largest_displacement": None if self._largest.frame < 0 else self._largest._asdict(),
         }

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import HEAD, Columns, head_columns, long_head_columns
+from cmpdesign.tracking.columns import Columns, head_columns, long_head_columns
 
 if TYPE_CHECKING:
+    from cmpdesign.contact.continuation import SurfaceContinuation
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.views import ShapeFrame
 
@@ -18,6 +19,7 @@ TRIPLES = {
     "3D_Displacements": ("dx_mm", "dy_mm", "dz_mm"),
     "3D_Normals": ("nx", "ny", "nz"),
 }
+SURFACE = ("surface_dx_mm", "surface_dy_mm", "surface_dz_mm")  # of the touched surface above the markers
 COVARIANCE = ("xx", "xy", "xz", "yy", "yz", "zz")
 UPPER = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
 
@@ -27,17 +29,26 @@ class ShapeTable:
 
     Args:
         reconstructor: its layout, poses and rest frame are the shared columns.
+        continuation: continues the markers' displacements to the touched surface, for four more columns; None: not
+            wanted.
     """
 
-    digits: Mapping[str, int] = (
+    _digits: Mapping[str, int] = (
         {name: 0 for name in ("point", "edge", "status", "point_reason")}
         | {name: 6 for name in (*TRIPLES["3D_Positions"], *TRIPLES["3D_Displacements"])}
         | {name: 7 for name in TRIPLES["3D_Normals"]}
         | {f"cov_{name}_mm2": 12 for name in COVARIANCE}
     )
 
-    def __init__(self, reconstructor: Reconstructor) -> None:
-        self._reconstructor = reconstructor
+    _surface_digits: Mapping[str, int] = {name: 6 for name in SURFACE} | {
+        f"surface_cov_{name}_mm2": 12 for name in COVARIANCE
+    }
+
+    def __init__(self, reconstructor: Reconstructor, continuation: SurfaceContinuation | None = None) -> None:
+        self._reconstructor, self._continuation = reconstructor, continuation
+        self.digits: Mapping[str, int] = (
+            dict(self._digits) if continuation is None else {**self._digits, **self._surface_digits}
+        )
 
     def batch(self, frames: Sequence[ShapeFrame]) -> Columns:
         shapes = [frame.shape for frame in frames]
@@ -49,6 +60,12 @@ class ShapeTable:
             columns[name] = np.stack([s.tac3d[name] for s in shapes]).astype(np.float32)
         cov = np.stack([np.concatenate([s.cov_mm2, s.virtual_cov_mm2.reshape(-1, 3, 3)]) for s in shapes])
         columns["cov_mm2"] = cov[:, :, UPPER[0], UPPER[1]].astype(np.float32)
+        if self._continuation is not None:
+            surfaces = [self._continuation(s.displacement_mm, s.displacement_cov_mm2) for s in shapes]
+            moved = np.stack([surface.displacement_mm for surface in surfaces])
+            spread = np.stack([surface.cov_mm2[:, UPPER[0], UPPER[1]] for surface in surfaces])
+            columns["surface_displacement_mm"] = moved.astype(np.float32)
+            columns["surface_cov_mm2"] = spread.astype(np.float32)
         return columns
 
     def about(self) -> Columns:
@@ -98,4 +115,16 @@ def shape_long_form(columns: Columns, fixed: Columns) -> Columns:
             long[axis] = columns[name][..., place].reshape(-1)
     for place, name in enumerate(COVARIANCE):
         long[f"cov_{name}_mm2"] = columns["cov_mm2"][..., place].reshape(-1)
-    return {name: long[name] for name in (*HEAD, *ShapeTable.digits)}
+    if "surface_displacement_mm" in columns:
+        for place, axis in enumerate(SURFACE):
+            long[axis] = _by_point(columns["surface_displacement_mm"][..., place], count)
+        for place, name in enumerate(COVARIANCE):
+            long[f"surface_cov_{name}_mm2"] = _by_point(columns["surface_cov_mm2"][..., place], count)
+    return long
+
+
+def _by_point(of_markers: np.ndarray, count: int) -> np.ndarray:
+    """(F * count,) from (F, M): NaN for the virtual markers."""
+    padded = np.full((len(of_markers), count), np.nan, of_markers.dtype)
+    padded[:, : of_markers.shape[1]] = of_markers
+    return padded.reshape(-1)

@@ -24,6 +24,8 @@ from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
+    from cmpdesign.contact.continuation import SurfaceContinuation
+    from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.tracking.run import TrackingRun
     from extractor.image.input import Channels
     from extractor.image.response import Response
@@ -60,6 +62,13 @@ def reconstruct(
             metavar="PX", help="What the camera model leaves open. [default: as the rest frame says]"
         ),
     ] = None,
+    surface: Annotated[
+        bool,
+        typer.Option(
+            "--surface",
+            help="Also give the touched surface, by the [elastomer] of RIG, in columns of its own.",
+        ),
+    ] = False,
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
@@ -93,6 +102,7 @@ def reconstruct(
         from_rest,
         flatness_mm,
         model_px,
+        surface,
         fps,
         cold,
         known,
@@ -123,6 +133,7 @@ class _Options(NamedTuple):
     from_rest: bool
     flatness_mm: float
     model_px: float | None
+    surface: bool
     fps: float | None
     cold: bool
     response: Response | None
@@ -138,7 +149,7 @@ def _points_in(layout: Reference) -> int:
 
 def _prepare_run(options: _Options) -> TrackingRun:
     """Prepare the run; all checks of the input are made here, before a file is written."""
-    from cmpdesign.tracking.marker_depth import read_marker_depth_mm
+    from cmpdesign.tracking.marker_depth import read_elastomer, read_marker_depth_mm
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.shape_summary import ShapeStatistics
     from cmpdesign.tracking.shape_table import ShapeTable
@@ -147,6 +158,7 @@ def _prepare_run(options: _Options) -> TrackingRun:
     from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
 
     rig, depth_mm = load_rig(options.rig), read_marker_depth_mm(options.rig)
+    elastomer = read_elastomer(options.rig) if options.surface else None
     if options.from_rest:
         rig = rig.without_poses()
     how = options.response, options.side, options.channels
@@ -158,12 +170,22 @@ def _prepare_run(options: _Options) -> TrackingRun:
     )
     for warning in reconstructor.warnings:
         print_warning(warning)
-    sink = open_sink(options.output, ShapeTable(reconstructor))
+    continuation = None if elastomer is None else _continuation(elastomer, views.layout)
+    sink = open_sink(options.output, ShapeTable(reconstructor, continuation))
     tracker = ShapeTracker(
         reconstructor, warm=not options.cold, response=options.response, channels=options.channels
     )
     source = open_sources(options.source, options.fps, options.max_pixels)
-    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm))
+    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm, options.surface))
+
+
+def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuation:
+    import numpy as np
+
+    from cmpdesign.contact.continuation import SurfaceContinuation
+
+    edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
+    return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
 
 
 def _read_rest_image(options: _Options) -> Any:
@@ -197,8 +219,10 @@ def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
     return [summary_path(output)]
 
 
-def _describe_positions(depth_mm: float | None) -> str:
+def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
     """Of what the positions are: what the cameras see is the pattern, wherever it lies."""
+    if is_continued:
+        return f"of the pattern, {depth_mm:g} mm below the touched surface; surface_* of that surface"
     if depth_mm is None:
         return "of the pattern; RIG does not say how far below the touched surface it lies"
     if depth_mm == 0:
@@ -217,7 +241,9 @@ def _print_summary(summary: dict[str, Any]) -> None:
         "views": "; ".join(f"{view['name']} {view['rms_px']:.3f} px at rest" for view in summary["views"]),
         "markers": ", ".join(f"{share:.2%} {name}" for name, share in summary["marker_shares"].items()),
     }
-    rows["positions"] = _describe_positions(summary["positions"]["depth_mm"])
+    rows["positions"] = _describe_positions(
+        summary["positions"]["depth_mm"], summary["positions"]["continued_to_surface"]
+    )
     if summary["lost_markers"]:
         lost = summary["lost_markers"].items()
         rows["not reported"] = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in lost)

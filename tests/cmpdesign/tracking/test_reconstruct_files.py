@@ -156,7 +156,7 @@ def test_the_summary_counts(made: Path, tmp_path: Path) -> None:
     assert summary["frames"] == {
         "declared": 4, "read": 4, "tracked": 3, "lost": 1, "unreadable": 0, "other_size": 0
     }  # fmt: skip
-    assert summary["positions"] == {"of": "pattern", "depth_mm": None}
+    assert summary["positions"] == {"of": "pattern", "depth_mm": None, "continued_to_surface": False}
     assert summary["marker_shares"] == {"measured": 0.75, "repaired": 0.0, "lost": 0.25}
     assert summary["lost_markers"] == {"one_view": MARKERS}
     assert 0.1 < summary["sigma_um"][2] < 2 and summary["largest_displacement"]["mm"] == pytest.approx(
@@ -195,6 +195,39 @@ def test_the_rig_files_medium_is_what_the_cameras_look_through(tmp_path: Path) -
     assert depths_mm[0] == pytest.approx(true_mm[deepest, 2], rel=0.005)
     assert 0.15 < 1 - depths_mm[1] / true_mm[deepest, 2] < 0.35
     assert not warnings[0] and len(warnings[1]) == 1 and "the rig has no [medium]" in warnings[1][0]
+
+
+def test_the_touched_surface_is_continued_on_wish(made: Path, tmp_path: Path) -> None:
+    rig = (made / "rig.toml").read_text() + '\n[elastomer]\nthickness_mm = 5\nmarker_depth_mm = "1mm"\n'
+    (tmp_path / "rig.toml").write_text(rig)
+    files = str(made / "layout.json"), str(tmp_path / "rig.toml"), str(made / "frames" / "0.png")
+    out = tmp_path / "out.npz"
+    result = run("reconstruct", *files, str(made / "frames"), "-o", str(out), "--surface")
+    assert result.exit_code in (0, 1), result.output
+    assert "1 mm below the touched surface; surface_* of that surface" in " ".join(result.output.split())
+    table = np.load(out)
+    pattern, surface = table["3D_Displacements"][:, :MARKERS], table["surface_displacement_mm"]
+    assert surface.shape == pattern.shape and (np.isnan(surface) == np.isnan(pattern)).all()
+    assert np.nanmax(np.abs(surface - pattern)[0]) < 0.01 and np.nanmax(np.abs(surface - pattern)[1]) > 0.1
+    assert np.nanmedian(table["surface_cov_mm2"][..., 5]) > np.nanmedian(table["cov_mm2"][:, :MARKERS, 5])
+    assert (
+        json.loads((tmp_path / "out.npz.summary.json").read_text())["positions"]["continued_to_surface"]
+        is True
+    )
+    text = tmp_path / "out.csv"
+    run("reconstruct", *files, str(made / "frames"), "-o", str(text), "--surface")
+    rows = list(csv.DictReader(text.read_text().splitlines()))
+    z = np.array([float(row["surface_dz_mm"] or "nan") for row in rows]).reshape(FRAMES, POINTS)
+    np.testing.assert_allclose(z[:, :MARKERS], surface[..., 2], atol=1e-6)
+    assert np.isnan(z[:, MARKERS:]).all()
+
+
+def test_without_an_elastomer_no_surface_is_made_up(made: Path, tmp_path: Path) -> None:
+    files = str(made / "layout.json"), str(made / "rig.toml"), str(made / "frames" / "0.png")
+    out = tmp_path / "out.npz"
+    result = run("reconstruct", *files, str(made / "frames"), "-o", str(out), "--surface")
+    assert result.exit_code == 2 and "has no [elastomer] with thickness_mm" in " ".join(result.output.split())
+    assert not out.exists()
 
 
 def test_two_cameras_are_two_sources(made: Path, tmp_path: Path) -> None:
