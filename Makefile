@@ -1,59 +1,85 @@
-# Needs Python 3.11 or newer with venv; everything else is installed into .venv.
+# Needs Python 3.11 or newer with venv and its headers; everything else is installed into .venv. Without a C++ compiler,
+# the one in the package ziglang is installed, too.
 
 PYTHON ?= python3
 # The versions that the tests ran with; "make setup LOCK=" takes the newest that pyproject.toml allows.
 LOCK ?= requirements.lock
 BIN := .venv/bin
 READY := .venv/.ready
+CORE := .venv/.core
+SOURCES := $(wildcard cmake/CMakeLists.txt extractor/native/* extractor/native/*/* extractor/native/*/*/* cmpdesign/native/*)
+BUILD_NEEDS := scikit-build-core nanobind cmake ninja
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCK),--constraint $(LOCK))
+ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
+  ZIG := ziglang
+  TOOLCHAIN := CMAKE_TOOLCHAIN_FILE=$(CURDIR)/cmake/zig.cmake
+endif
 
-.PHONY: help setup demo test test-all lint bench figures lock clean
+.PHONY: help setup demo test test-all test-sanitized lint bench figures lock wheel clean
 
 help:
 	@echo "make demo      build a design, render a pressed sample, read it back, print the figures (out/)"
 	@echo "make test      the tests, without the slow ones"
 	@echo "make test-all  every test"
+	@echo "make test-sanitized  the extractor's tests on native modules that check every index and address"
+	@echo "make wheel     dist/: a wheel that runs on other machines without a compiler"
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     every figure that the documentation states"
 	@echo "make figures   every picture and generated page of docs/"
 	@echo "make setup     .venv with everything, in the versions of requirements.lock (the others call it)"
 	@echo "make lock      requirements.lock anew, from what is installed in .venv"
 
-setup: $(READY)
+setup: $(READY) $(CORE)
 
 $(READY): pyproject.toml $(LOCK)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "error: $(PYTHON) is missing or older than 3.11; call make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@$(PYTHON) -c 'import os, sysconfig as s; os.stat(s.get_path("include") + "/Python.h")' 2>/dev/null || \
+	  { echo "error: the headers of $(PYTHON) are missing; on Debian: apt install python3-dev" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { echo "error: $(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv" >&2; exit 1; }
 	@echo "Setting up .venv (once; some minutes) ..."
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCK),--constraint $(LOCK)) --editable '.[dev]'
+	@$(PIP) $(BUILD_NEEDS) $(ZIG)
+	@$(TOOLCHAIN) PATH=$(CURDIR)/$(BIN):$$PATH $(PIP) --no-build-isolation --editable '.[dev]'
+	@touch $@ $(CORE)
+
+# The native modules, where a source is newer.
+$(CORE): $(SOURCES) | $(READY)
+	@PATH=$(CURDIR)/$(BIN):$$PATH cmake --build cmake
 	@touch $@
 
-demo: $(READY)
+demo: $(READY) $(CORE)
 	@$(BIN)/python -m cmpdesign.demo
 
-test: $(READY)
+test: $(READY) $(CORE)
 	@$(BIN)/python -m pytest -n 2
 
-test-all: $(READY)
+test-all: $(READY) $(CORE)
 	@$(BIN)/python -m pytest -n 2 -m ''
 
-lint: $(READY)
+lint: $(READY) $(CORE)
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(SOURCES))
 	@$(BIN)/mypy
 
-bench: $(READY)
+bench: $(READY) $(CORE)
 	@set -e; for name in extraction accuracy comparison; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
 	@$(BIN)/python -m docs.figures
 	@set -e; for name in startup numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
-figures: $(READY)
+figures: $(READY) $(CORE)
 	@$(BIN)/python -m docs.figures
 
-lock: $(READY)
+lock: $(READY) $(CORE)
 	@$(BIN)/python -m tools.lock
 
+wheel: $(READY)
+	@$(BIN)/python -m tools.wheel
+
+test-sanitized: $(READY)
+	@$(BIN)/python -m tools.sanitized
+
 clean:
-	@rm -rf .venv out
+	@rm -rf .venv out build dist; git clean -qfdX cmake extractor cmpdesign

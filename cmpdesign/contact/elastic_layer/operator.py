@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign._native import elastic_layer
 from cmpdesign.contact.elastic_layer.green import GreenKernels
 from cmpdesign.contact.elastic_layer.inverse import InversePreconditioner
 
@@ -79,14 +80,13 @@ class ComplianceOperator:
 
         The result has the traction's precision, float64 or float32.
         """
-        from cmpdesign.contact.elastic_layer.spectra import update_load_spectra
-
         spectra = self._spectra[traction_mpa.dtype]
         waves = self._forward_transform(traction_mpa)
         if len(waves) == 1:
             waves *= spectra.zz
         else:
-            update_load_spectra(waves.view(spectra.xx.dtype).reshape(*waves.shape, 2), *spectra)
+            update = getattr(elastic_layer, f"update_load_spectra_{spectra.xx.dtype.name}")
+            update(waves.view(spectra.xx.dtype).reshape(*waves.shape, 2), *spectra)
         return self._inverse_transform(waves)
 
     def _forward_transform(self, values: Field) -> Spectrum:

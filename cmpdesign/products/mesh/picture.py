@@ -86,7 +86,7 @@ def draw_meshes(
     """
     import cv2
 
-    from cmpdesign.products.mesh.depth_buffer import fill_depth_buffer
+    from cmpdesign._native import depth_buffer
 
     width, height = (OVERSAMPLING * side for side in size_px)
     framing = Framing.of(meshes, direction, (width, height))
@@ -95,7 +95,7 @@ def draw_meshes(
     shades = _triangle_shades(corners * (1, -1, 1), direction)
     depth = np.full((height, width), -np.inf)
     number = np.full((height, width), -1, dtype=np.int64)
-    fill_depth_buffer(corners, depth, number)
+    depth_buffer.fill_depth_buffer(corners, depth, number)
     picture = np.full((height, width, 3), 255.0)
     hit = number >= 0
     picture[hit] = colors[number[hit]] * shades[number[hit]][:, None]

@@ -10,7 +10,7 @@ cumulative sum then gives the coverage. Along the piece of a side inside one sam
 polynomial of degree 2 * degree + 1. Gauss-Legendre quadrature with degree + 1 points integrates it
 exactly. The only error is rounding (about 1e-6).
 
-This module holds the preparation and the engine in plain numpy. ``coverage_compiled`` holds the engine as loops.
+This module holds the preparation and the engine in plain numpy. ``_native.coverage`` is the same engine as loops.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def draw_coverage(
         values: (polygons, planes): the value that each polygon adds to each plane where it covers the plane.
         size: the image's (width, height) px.
         spread: the point spread.
-        engine: "compiled" (numba) or the equivalent "numpy".
+        engine: "compiled" (C++) or the equivalent "numpy".
         orientation: sign of the area (positive from x to y) of polygons whose coverage is positive; polygons of
             the opposite sign have negative coverage. None: the coverage of all polygons is positive.
 
@@ -67,9 +67,10 @@ def draw_coverage(
 def _load_engine(engine: Engine) -> BandFunction:
     if engine == "numpy":
         return draw_band
-    from cmpdesign.scene.drawing.coverage_compiled import draw_band as compiled_band
+    from cmpdesign._native import coverage
 
-    return compiled_band
+    band: BandFunction = coverage.draw_band
+    return band
 
 
 def _make_task(

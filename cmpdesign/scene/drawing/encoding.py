@@ -1,6 +1,6 @@
 """From light to values: the camera's response, applied to every pixel.
 
-``encode_light`` of the reader's ``response`` is the engine in plain numpy; ``encoding_compiled`` is the same as a loop.
+``encode_light`` of the reader's ``response`` is the engine in plain numpy; ``_native.encoding`` is the same as a loop.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def encode_planes(sensor: Sensor, light: Planes, engine: Engine) -> Planes:
     light_of_value = sensor.light_of_values()
     if engine == "numpy":
         return encode_light(light, light_of_value).astype(np.float32)
-    from cmpdesign.scene.drawing.encoding_compiled import fill_values
+    from cmpdesign._native import encoding
 
     step_light = 255.0 * (np.arange(STEPS) / (STEPS - 1)) ** 2
     first = np.clip(np.searchsorted(light_of_value, step_light, side="right") - 1, 0, len(light_of_value) - 2)
     values = np.empty_like(light, order="C")
-    fill_values(np.ascontiguousarray(light).reshape(-1), light_of_value, first, values.reshape(-1))
+    encoding.fill_values(np.ascontiguousarray(light).reshape(-1), light_of_value, first, values.reshape(-1))
     return values

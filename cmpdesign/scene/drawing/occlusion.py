@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,19 @@ TILE_PX, SAMPLES_PER_PX = 32, 8
 TEXELS_PER_PITCH = 64
 MAX_TEXTURE_PX = 2048
 DEPTH_SHARE = 0.02  # of the pitch: sheets with a smaller difference of depth count as one
+
+
+class OcclusionResidual(NamedTuple):
+    """The correction of a tile's samples.
+
+    Attributes:
+        row, column: the first sample.
+        values: (planes, rows, columns) the nearest sheet's value less the signed sum of all sheets.
+    """
+
+    row: int
+    column: int
+    values: Points
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +197,7 @@ def update_hidden_parts(planes: Planes, occlusion: Occlusion, texture: Planes, b
         texture: (n, height, width) the same sums for the flat layout, of ``occlusion.texture_size``.
         blur_px: the optics' blur.
     """
-    from cmpdesign.scene.drawing.occlusion_compiled import occlusion_residual
+    from cmpdesign._native import occlusion as native
 
     uv = occlusion.texels_from_layout(occlusion.corners_mm)
     height, width = planes.shape[1:]
@@ -194,8 +208,17 @@ def update_hidden_parts(planes: Planes, occlusion: Occlusion, texture: Planes, b
     for left, top in occlusion.tiles:
         near = (high_x >= left - 0.5) & (low_x <= left + TILE_PX - 0.5)
         near &= (high_y >= top - 0.5) & (low_y <= top + TILE_PX - 0.5)
-        residual = occlusion_residual(
-            occlusion.xyd[near], uv[near], occlusion.facing[near], texture, left, top, TILE_PX, SAMPLES_PER_PX
+        residual = OcclusionResidual(
+            *native.occlusion_residual(
+                occlusion.xyd[near],
+                uv[near],
+                occlusion.facing[near],
+                texture,
+                left,
+                top,
+                TILE_PX,
+                SAMPLES_PER_PX,
+            )
         )
         if not residual.values.size:
             continue
@@ -226,12 +249,12 @@ def is_hidden(occlusion: Occlusion, xyd: Points, facing: NDArray[np.bool_]) -> N
         xyd: (N, 3) x and y in px of the area, depth in mm.
         facing: (N,) the surface faces the camera at the point.
     """
-    from cmpdesign.scene.drawing.occlusion_compiled import nearest_depth
+    from cmpdesign._native import occlusion as native
 
     tile = np.floor((xyd[:, :2] + 0.5) / TILE_PX) * TILE_PX
     in_tile = (tile[:, None] == occlusion.tiles).all(axis=2).any(axis=1)
     hidden = ~facing
     by_x = np.flatnonzero(in_tile)[np.argsort(xyd[in_tile, 0], kind="stable")]
-    nearest = nearest_depth(occlusion.xyd, xyd[by_x])
+    nearest = native.nearest_depth(occlusion.xyd, xyd[by_x])
     hidden[by_x] |= xyd[by_x, 2] > nearest + occlusion.tolerance_mm
     return hidden

@@ -48,7 +48,7 @@ def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine =
     Args:
         scene: the scene.
         size: the image's (width, height) px.
-        engine: "compiled" (numba) or the equivalent "numpy".
+        engine: "compiled" (C++) or the equivalent "numpy".
 
     Raises:
         SceneError: the surface folds, a part lies behind a camera or turns away from it, or a value is out of range.

@@ -1,0 +1,9 @@
+# The C++ compiler of the package ziglang, for machines that have none, and for wheels: it links for old systems and for
+# other processors. The environment variable ZIG_TARGET names the system, for example aarch64-linux-gnu.2.28.
+set(CMAKE_CXX_COMPILER ${CMAKE_CURRENT_LIST_DIR}/zig-c++)
+set(CMAKE_AR ${CMAKE_CURRENT_LIST_DIR}/zig-ar CACHE FILEPATH "")
+set(CMAKE_RANLIB ${CMAKE_CURRENT_LIST_DIR}/zig-ranlib CACHE FILEPATH "")
+if("$ENV{ZIG_TARGET}" MATCHES "^aarch64")
+  set(CMAKE_SYSTEM_NAME Linux)
+  set(CMAKE_SYSTEM_PROCESSOR aarch64)
+endif()

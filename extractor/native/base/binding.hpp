@@ -1,0 +1,312 @@
+// The border to Python: arrays are checked, not converted; results own their memory; loops run without the
+// GIL.
+//
+// A function takes views, records of views, numbers and booleans, and returns an array, a number or a tuple
+// of these. A record is a struct with `static Record read(const Fields&)`, which reads a Python object's
+// attributes by name.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "array.hpp"
+
+namespace cmp {
+
+namespace nb = nanobind;
+
+// The name of an argument or of a field of one, for messages.
+struct Name {
+  const Name* owner;
+  const char* own;
+
+  std::string text() const { return owner == nullptr ? own : owner->text() + "." + own; }
+};
+
+// The arrays that a call has borrowed from Python; given back when the call ends.
+class Borrowed {
+ public:
+  Borrowed() { buffers_.reserve(16); }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
+  ~Borrowed() {
+    for (Py_buffer& buffer : buffers_) PyBuffer_Release(&buffer);
+  }
+  const Py_buffer& add(PyObject* object, bool is_written, const Name& name) {
+    Py_buffer& buffer = buffers_.emplace_back();
+    int flags = PyBUF_STRIDES | PyBUF_FORMAT | (is_written ? PyBUF_WRITABLE : 0);
+    if (PyObject_GetBuffer(object, &buffer, flags) != 0) {
+      buffers_.pop_back();
+      PyErr_Clear();
+      throw nb::type_error(
+          (name.text() + " is no array" + (is_written ? " that can be written" : "")).c_str());
+    }
+    return buffer;
+  }
+  void keep(nb::object object) { objects_.push_back(std::move(object)); }
+
+ private:
+  std::vector<Py_buffer> buffers_;
+  std::vector<nb::object> objects_;
+};
+
+template <class T>
+constexpr const char* dtype_name() {
+  if constexpr (std::is_same_v<T, bool>) return "bool";
+  if constexpr (std::is_same_v<T, double>) return "float64";
+  if constexpr (std::is_same_v<T, float>) return "float32";
+  if constexpr (std::is_same_v<T, std::int64_t>) return "int64";
+  if constexpr (std::is_same_v<T, std::int32_t>) return "int32";
+  if constexpr (std::is_same_v<T, std::int16_t>) return "int16";
+  if constexpr (std::is_same_v<T, std::int8_t>) return "int8";
+  if constexpr (std::is_same_v<T, std::uint64_t>) return "uint64";
+  if constexpr (std::is_same_v<T, std::uint32_t>) return "uint32";
+  if constexpr (std::is_same_v<T, std::uint16_t>) return "uint16";
+  if constexpr (std::is_same_v<T, std::uint8_t>) return "uint8";
+}
+
+template <class T>
+bool has_dtype(const Py_buffer& buffer) {
+  const char* format = buffer.format == nullptr ? "B" : buffer.format;
+  if (*format == '@' || *format == '=' || *format == '<') ++format;
+  if (format[0] == '\0' || format[1] != '\0' || buffer.itemsize != static_cast<Py_ssize_t>(sizeof(T)))
+    return false;
+  if constexpr (std::is_same_v<T, bool>) return *format == '?';
+  const std::string kinds = std::is_floating_point_v<T> ? "fd" : std::is_signed_v<T> ? "bhilq" : "BHILQ";
+  return kinds.find(*format) != std::string::npos;
+}
+
+template <class T>
+struct FromPython;
+
+template <class T, int N>
+struct FromPython<View<T, N>> {
+  using Value = std::remove_const_t<T>;
+
+  static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
+    if (buffer.ndim != N || !has_dtype<Value>(buffer)) refuse(buffer, name);
+    std::array<Index, N> shape, stride;
+    for (int k = 0; k < N; ++k) {
+      shape[k] = buffer.shape[k];
+      stride[k] = buffer.strides[k] / static_cast<Index>(sizeof(T));
+      bool is_whole = buffer.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
+      bool has_gap = k == N - 1 && shape[k] > 1 && stride[k] != 1;
+      if (!is_whole || has_gap)
+        throw nb::type_error((name.text() + " has gaps within its rows; give a contiguous array").c_str());
+    }
+    return {static_cast<T*>(buffer.buf), shape, stride};
+  }
+
+ private:
+  [[noreturn]] static void refuse(const Py_buffer& buffer, const Name& name) {
+    std::string text = name.text() + " must be " + dtype_name<Value>() + " of " + std::to_string(N) +
+                       " dimensions, and is '" + (buffer.format == nullptr ? "B" : buffer.format) + "' of " +
+                       std::to_string(buffer.ndim);
+    throw nb::type_error(text.c_str());
+  }
+};
+
+template <class T>
+  requires std::is_arithmetic_v<T>
+struct FromPython<T> {
+  static T get(nb::handle object, const Name& name, Borrowed&) {
+    PyObject* source = object.ptr();
+    bool is_failed = false;
+    T value{};
+    if constexpr (std::is_same_v<T, bool>) {
+      int truth = PyObject_IsTrue(source);
+      is_failed = truth < 0;
+      value = truth > 0;
+    } else if constexpr (std::is_floating_point_v<T>) {
+      double number = PyFloat_AsDouble(source);
+      is_failed = number == -1.0 && PyErr_Occurred() != nullptr;
+      value = static_cast<T>(number);
+    } else {
+      long long number =
+          PyIndex_Check(source) != 0 ? PyLong_AsLongLong(nb::steal(PyNumber_Index(source)).ptr()) : -1;
+      is_failed = PyIndex_Check(source) == 0 || (number == -1 && PyErr_Occurred() != nullptr);
+      value = static_cast<T>(number);
+      is_failed = is_failed || static_cast<long long>(value) != number;
+    }
+    if (is_failed) {
+      PyErr_Clear();
+      throw nb::type_error((name.text() + " is no number of the type that is needed").c_str());
+    }
+    return value;
+  }
+};
+
+// A field of a Python object, which becomes whatever C++ value it is given to.
+class Field {
+ public:
+  Field(nb::object value, Name name, Borrowed& borrowed)
+      : value_(std::move(value)), name_(name), borrowed_(borrowed) {}
+  template <class T>
+  operator T() const {
+    return FromPython<T>::get(value_, name_, borrowed_);
+  }
+
+ private:
+  nb::object value_;
+  Name name_;
+  Borrowed& borrowed_;
+};
+
+// The attributes of a Python object.
+class Fields {
+ public:
+  Fields(nb::handle object, const Name& name, Borrowed& borrowed)
+      : object_(object), name_(name), borrowed_(borrowed) {}
+  Field operator[](const char* field) const {
+    PyObject* value = PyObject_GetAttr(object_.ptr(), interned(field));
+    if (value == nullptr) {
+      PyErr_Clear();
+      throw nb::type_error((name_.text() + " has no field " + field).c_str());
+    }
+    nb::object owned = nb::steal(value);
+    borrowed_.keep(owned);  // a property may have made its array for this call
+    return {owned, Name{&name_, field}, borrowed_};
+  }
+
+ private:
+  // The Python text of a literal, made once.
+  static PyObject* interned(const char* literal) {
+    static std::unordered_map<const char*, PyObject*> texts;
+    PyObject*& text = texts[literal];
+    if (text == nullptr) text = PyUnicode_InternFromString(literal);
+    return text;
+  }
+
+  nb::handle object_;
+  const Name& name_;
+  Borrowed& borrowed_;
+};
+
+template <class T>
+concept Record = requires(const Fields& fields) {
+  { T::read(fields) } -> std::same_as<T>;
+};
+
+template <Record T>
+struct FromPython<T> {
+  static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    return T::read(Fields(object, name, borrowed));
+  }
+};
+
+// A record of numbers from a tuple or list of that length.
+template <class T, std::size_t N>
+struct FromPython<std::array<T, N>> {
+  static std::array<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    std::array<T, N> values;
+    if (PySequence_Check(object.ptr()) == 0 || nb::len(object) != N)
+      throw nb::type_error((name.text() + " must have " + std::to_string(N) + " items").c_str());
+    for (std::size_t k = 0; k < N; ++k) values[k] = FromPython<T>::get(nb::object(object[k]), name, borrowed);
+    return values;
+  }
+};
+
+template <class T, int N>
+nb::object to_python(Array<T, N>&& array) {
+  std::array<std::size_t, N> shape;
+  for (int k = 0; k < N; ++k) shape[k] = static_cast<std::size_t>(array.size(k));
+  T* data = array.release();
+  if (data == nullptr) data = new T[1];
+  nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
+  return nb::cast(nb::ndarray<nb::numpy, T>(data, N, shape.data(), owner));
+}
+
+template <class T>
+  requires std::is_arithmetic_v<T>
+nb::object to_python(T value) {
+  return nb::cast(value);
+}
+
+template <class... T>
+nb::object to_python(std::tuple<T...>&& values) {
+  return std::apply([](auto&&... value) { return nb::make_tuple(to_python(std::move(value))...); },
+                    std::move(values));
+}
+
+// Refuses to go on where the processor lacks the instructions that the loops were compiled for.
+inline void require_processor() {
+#if defined(CMP_NEEDS_V3) && (defined(__x86_64__) || defined(_M_X64))
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || !__builtin_cpu_supports("bmi2"))
+    throw nb::import_error(
+        "this build needs a processor with AVX2, FMA and BMI2 (x86-64-v3); for older ones build with "
+        "pip install . -C cmake.define.CMP_CPU=x86-64");
+#endif
+}
+
+// A room of the core: a submodule of its own. Each room makes one constant of this type.
+class Room {
+ public:
+  using Fill = void (*)(nb::module_&);
+  Room(const char* name, Fill fill) { all().push_back({name, fill}); }
+
+  static void add_all(nb::module_& module) {
+    for (const auto& [name, fill] : all()) {
+      nb::module_ room = module.def_submodule(name);
+      fill(room);
+    }
+  }
+
+ private:
+  static std::vector<std::pair<const char*, Fill>>& all() {
+    static std::vector<std::pair<const char*, Fill>> rooms;
+    return rooms;
+  }
+};
+
+template <auto F, class Signature>
+struct Bound;
+
+template <auto F, class Result, class... Arguments>
+struct Bound<F, Result (*)(Arguments...)> {
+  static constexpr std::size_t COUNT = sizeof...(Arguments);
+  using Names = std::array<const char*, COUNT>;
+
+  static nb::object call(const char* function, const Names& names, const nb::args& given) {
+    if (given.size() != COUNT)
+      throw nb::type_error(
+          (std::string(function) + " takes " + std::to_string(COUNT) + " arguments").c_str());
+    return call(names, given, std::index_sequence_for<Arguments...>());
+  }
+
+ private:
+  template <std::size_t... K>
+  static nb::object call(const Names& names, const nb::args& given, std::index_sequence<K...>) {
+    Borrowed borrowed;
+    std::tuple<std::remove_cvref_t<Arguments>...> values{
+        FromPython<std::remove_cvref_t<Arguments>>::get(given[K], Name{nullptr, names[K]}, borrowed)...};
+    if constexpr (std::is_void_v<Result>) {
+      nb::gil_scoped_release released;
+      F(std::get<K>(values)...);
+    } else {
+      Result result = [&] {
+        nb::gil_scoped_release released;
+        return F(std::get<K>(values)...);
+      }();
+      return to_python(std::move(result));
+    }
+    return nb::none();
+  }
+};
+
+// Makes a function known to Python under a name, with the names of its arguments.
+template <auto F>
+void bind(nb::module_& module, const char* name, typename Bound<F, decltype(F)>::Names names) {
+  module.def(
+      name, [name, names](const nb::args& given) { return Bound<F, decltype(F)>::call(name, names, given); });
+}
+
+}  // namespace cmp
