@@ -1,4 +1,4 @@
-"""extractor: reads continuous marker patterns from images. It needs numpy, OpenCV, numba and scipy, and no CAD.
+"""extractor: reads continuous marker patterns from images. It needs numpy and OpenCV, and no CAD.
 
 >>> from extractor import Extractor, load_layout
 >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP

@@ -2,41 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
-from extractor.numeric.compilation import compiled
-
-UNCERTAIN_DEVIATION = 0.02  # in edges, of a marker that others may predict better: at best to 0.012
-
-
-@compiled
-def find_uncertain_markers(cov, edge_px):  # type: ignore[no-untyped-def]
-    """(M,) bool, the uncertain markers by their covariances (M, 2, 2) and edges (M,); and whether there are any."""
-    uncertain = np.zeros(edge_px.shape[0], np.bool_)
-    for m in range(edge_px.shape[0]):
-        uncertain[m] = cov[m, 0, 0] + cov[m, 1, 1] > (UNCERTAIN_DEVIATION * edge_px[m]) ** 2
-    return uncertain, np.any(uncertain)
+from extractor._native import complete as native
 
 
-@compiled
-def update_by_fusion(xy, cov, predicted, variance):  # type: ignore[no-untyped-def]
-    """Fuse a marker with an independent prediction of its place, in place.
+class UncertainLimits(NamedTuple):
+    """Limits of uncertain markers.
 
-    With the marker's covariance P and the prediction's V = variance * I, the marker moves by P (P + V)^-1 of the
-    difference, and its covariance becomes V (P + V)^-1 P.
-
-    Args:
-        xy, cov: (2,) and (2, 2), the marker.
-        predicted: (2,) the prediction, px.
-        variance: of the prediction per axis, px^2.
+    Attributes:
+        deviation: in edges, of a marker that others may predict better: at best to 0.012.
     """
-    xx, cross, yy = cov[0, 0] + variance, cov[0, 1], cov[1, 1] + variance
-    determinant = xx * yy - cross * cross
-    dx, dy = predicted[0] - xy[0], predicted[1] - xy[1]
-    a, b = (yy * dx - cross * dy) / determinant, (xx * dy - cross * dx) / determinant
-    xy[0] += cov[0, 0] * a + cov[0, 1] * b
-    xy[1] += cov[0, 1] * a + cov[1, 1] * b
-    factor = variance / determinant
-    own = cov[0, 0] * cov[1, 1] - cross * cross
-    cov[0, 0], cov[1, 1] = factor * (own + variance * cov[0, 0]), factor * (own + variance * cov[1, 1])
-    cov[0, 1] = cov[1, 0] = factor * variance * cross
+
+    deviation: float = 0.02
+
+
+LIMITS = UncertainLimits()
+
+
+def find_uncertain_markers(
+    cov_px2: NDArray[np.float64], edge_px: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], bool]:
+    """(M,) bool, the uncertain markers by their covariances (M, 2, 2) and edges (M,); and whether there are any."""
+    uncertain, is_any = native.find_uncertain_markers(cov_px2, edge_px, LIMITS)
+    return np.asarray(uncertain), bool(is_any)

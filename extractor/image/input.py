@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import image as native
 from extractor.errors import ImageError
-from extractor.numeric.compilation import compiled
 
 Channels = Literal["bgr", "rgb"]  # the order of an image's colors
 
 MIN_SIDE_PX = 16  # of an image
-NOISE_SAMPLES = 600  # pixels for the estimate of the noise; with fewer cells, several pixels in each
-# (x, y) of the pixels that are sampled around a cell's middle, in this order
-NEIGHBOUR_PIXELS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
+
+
+class NoiseLimits(NamedTuple):
+    """Limits of the estimate of the noise.
+
+    Attributes:
+        samples: pixels for the estimate; with fewer cells, several pixels in each.
+    """
+
+    samples: int = 600
+
+
+LIMITS = NoiseLimits()
 
 
 def convert_to_bgr(image: NDArray[Any], channels: Channels = "bgr") -> NDArray[np.uint8] | None:
@@ -59,8 +69,7 @@ def in_native_order(image: NDArray[Any]) -> NDArray[Any]:
     return image if image.dtype.isnative else image.astype(image.dtype.newbyteorder("="))
 
 
-@compiled
-def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
+def estimate_noise(image: NDArray[np.uint8], xy: NDArray[np.float64], cells: NDArray[np.int32]) -> float:
     """Standard deviation of a channel's noise in gray levels (Immerkaer 1996, with a median for robustness).
 
     The Laplacian-like mask [1 -2 1; -2 4 -2; 1 -2 1] ignores gradients; its response to noise is 6 sigma. It is applied
@@ -74,35 +83,5 @@ def estimate_noise(image, xy, cells):  # type: ignore[no-untyped-def]
     Returns:
         NaN where no cell lies within the image.
     """
-    counts, total = np.zeros(8 * 255 + 1, np.int64), 0
-    samples = min(max(NOISE_SAMPLES // max(cells.shape[0], 1), 1), len(NEIGHBOUR_PIXELS))
-    for i in range(cells.shape[0]):
-        a, b, c = cells[i]
-        cx, cy = (xy[a, 0] + xy[b, 0] + xy[c, 0]) / 3, (xy[a, 1] + xy[b, 1] + xy[c, 1]) / 3
-        if not (cx > 2.5 and cy > 2.5 and cx < image.shape[1] - 3.5 and cy < image.shape[0] - 3.5):
-            continue
-        for k in range(samples):
-            x, y = int(cx + 0.5) + NEIGHBOUR_PIXELS[k][0], int(cy + 0.5) + NEIGHBOUR_PIXELS[k][1]
-            for channel in range(3):
-                response, low, high = np.int64(0), np.int64(255), np.int64(0)
-                for dy in range(-1, 2):
-                    left, middle = (
-                        np.int64(image[y + dy, x - 1, channel]),
-                        np.int64(image[y + dy, x, channel]),
-                    )
-                    right = np.int64(image[y + dy, x + 1, channel])
-                    low, high = min(low, left, middle, right), max(high, left, middle, right)
-                    row = left - 2 * middle + right
-                    response += -2 * row if dy == 0 else row
-                if low > 0 and high < 255:
-                    counts[abs(response)] += 1
-                    total += 1
-    if total == 0:
-        return np.nan
-    below, bin_of = 0, 0
-    while below + counts[bin_of] < 0.5 * total:
-        below += counts[bin_of]
-        bin_of += 1
-    # responses are integers: each represents the interval of half a step on both sides
-    median = bin_of - 0.5 + (0.5 * total - below) / counts[bin_of]
-    return max(median, 0.0) / (6 * 0.6745)
+    cells = np.ascontiguousarray(cells, dtype=np.int32)
+    return float(native.estimate_noise(image, np.ascontiguousarray(xy), cells, LIMITS))

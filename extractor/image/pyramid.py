@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.image.response import LIGHT_STEPS, ResponseTables
-from extractor.numeric.compilation import compiled, inlined
+from extractor._native import image as native
+from extractor.image.response import ResponseTables
 
 
 class PolynomialFrame(NamedTuple):
@@ -75,67 +75,9 @@ class Pyramid:
 
 def _pyramid_level(image: NDArray[np.uint8], scale: int, response: ResponseTables) -> PyramidLevel:
     if scale == 2:
-        image = _halved(image, response.light_steps, response.value_of_steps)
+        image = native.halved(image, response.light_steps, response.value_of_steps)
     elif scale > 1:
-        image = _block_means(image, scale, response.light_steps, response.value_of_steps)
+        image = native.block_means(image, scale, response.light_steps, response.value_of_steps)
     height, width = image.shape[:2]
     frame = PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height))
     return PyramidLevel(image, scale, frame, response)
-
-
-@compiled
-def _block_means(image, scale, light_steps, value_of_steps):  # type: ignore[no-untyped-def]
-    """(H // scale, W // scale, 3) uint8: the values of the mean light of ``scale`` x ``scale`` pixels."""
-    height, width, row = image.shape[0] // scale, image.shape[1] // scale, 3 * image.shape[1]
-    out = np.empty((height, width, 3), np.uint8)
-    flat, means = image.reshape(-1), out.reshape(-1)
-    column = np.empty(row, np.uint32)
-    total = np.empty(3 * width, np.uint32)
-    share, half, last = np.float32(1.0 / scale**2), np.float32(0.5), np.uint32(LIGHT_STEPS - 1)
-    for y in range(height):
-        line = flat[scale * y * row : (scale * y + 1) * row]
-        for i in range(row):
-            column[i] = light_steps[line[i]]
-        for k in range(1, scale):
-            line = flat[(scale * y + k) * row : (scale * y + k + 1) * row]
-            for i in range(row):
-                column[i] += light_steps[line[i]]
-        _fill_block_sums(column, scale, width, total)
-        line = means[3 * y * width : 3 * (y + 1) * width]
-        for i in range(3 * width):
-            line[i] = value_of_steps[min(np.uint32(np.float32(total[i]) * share + half), last)]
-    return out
-
-
-@inlined
-def _fill_block_sums(column, scale, width, total):  # type: ignore[no-untyped-def]
-    """Write the sums of ``scale`` adjacent pixels of a row into ``total`` (3 * width,), all channels at once."""
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    i = np.uint64(0)
-    for x in range(np.uint64(width)):
-        blue, green, red = np.uint32(0), np.uint32(0), np.uint32(0)
-        for _ in range(scale):
-            blue += column[i]
-            green += column[i + one]
-            red += column[i + two]
-            i += three
-        total[three * x], total[three * x + one], total[three * x + two] = blue, green, red
-
-
-@compiled
-def _halved(image, light_steps, value_of_steps):  # type: ignore[no-untyped-def]
-    """The same for 2 x 2 pixels, in half of the time."""
-    height, width, row = image.shape[0] // 2, image.shape[1] // 2, 3 * image.shape[1]
-    out = np.empty((height, width, 3), np.uint8)
-    flat, means = image.reshape(-1), out.reshape(-1)
-    three, six, two = np.uint64(3), np.uint64(6), np.uint32(2)
-    for y in range(height):
-        above, below = flat[2 * y * row : (2 * y + 1) * row], flat[(2 * y + 1) * row : (2 * y + 2) * row]
-        line = means[3 * y * width : 3 * (y + 1) * width]
-        for x in range(np.uint64(width)):
-            for channel in range(three):
-                k = six * x + channel
-                left = np.uint32(light_steps[above[k]]) + np.uint32(light_steps[below[k]])
-                right = np.uint32(light_steps[above[k + three]]) + np.uint32(light_steps[below[k + three]])
-                line[three * x + channel] = value_of_steps[(left + right + two) >> two]
-    return out

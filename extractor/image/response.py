@@ -13,14 +13,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.numeric.compilation import inlined_no_refcount
-
 VALUES = 256  # of 8 bits
 SRGB_SLOPE, SRGB_STRAIGHT = 12.92, 0.04045  # of the straight line from 0, and the value where the line ends
 SRGB_OFFSET, SRGB_EXPONENT = 0.055, 2.4  # of the curve above
 MIN_EXPONENT, MAX_EXPONENT = 0.2, 5.0
+# The sizes of the tables are also in native/image/response.hpp.
 ENTRIES = 2048  # of the table that encodes light; equal steps of the square root of light
-STEPS_PER_ROOT = np.float32((ENTRIES - 1) / 255.0**0.5)
 LIGHT_STEPS = 1 << 14  # steps of light from 0 to 255, for means of pixels
 ALLOWED = "give 'srgb', 'linear', an exponent or a table of 256 values"
 
@@ -126,17 +124,3 @@ def response_tables(light_of_value: NDArray[np.float64]) -> ResponseTables:
     return ResponseTables(
         light_of_value.astype(np.float32), encoded, steps, np.floor(nearest + 0.5).astype(np.uint8)
     )
-
-
-@inlined_no_refcount
-def table_place(light):  # type: ignore[no-untyped-def]
-    """The place of light's value in ``ResponseTables.encoded``; the derivative follows there. Light beyond the table
-    has the first or the last value."""
-    root = np.sqrt(min(max(np.float32(light), np.float32(0.0)), np.float32(255.0)))
-    return np.int32(2) * np.int32(root * STEPS_PER_ROOT + np.float32(0.5))
-
-
-@inlined_no_refcount
-def light_at(light, value):  # type: ignore[no-untyped-def]
-    """The light of the whole value next to a value from 0 to 255."""
-    return light[np.uint8(value + np.float32(0.5))]

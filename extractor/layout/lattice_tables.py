@@ -9,16 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates, marker_id
+from extractor._native import layout as native
+from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates
 from extractor.layout.neighbour_tables import (
     FIRST_RING,
     neighbour_table,
     ring_weights,
 )
 from extractor.layout.reference import BLACK, WHITE, Reference
-from extractor.numeric.compilation import compiled, inlined
 
-UNKNOWN_AXIAL = -(1 << 20)  # the axial coordinate of a cell that has none
+UNKNOWN_AXIAL = -(
+    1 << 20
+)  # the axial coordinate of a cell that has none; as in native/layout/lattice_tables.hpp
 
 
 class LayoutCells(NamedTuple):
@@ -180,36 +182,11 @@ def _cell_lookup_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int3
     return lookup
 
 
-@inlined
-def cell_at(cell_lookup, q, r):  # type: ignore[no-untyped-def]
-    """The layout's cell at the axial (q, r), or -1; branch-free, because cells are read in any order."""
-    last = np.int64(cell_lookup.shape[0] - 1)
-    return cell_lookup[min(max(q + last // 2, 0), last), min(max(r + last // 2, 0), last)]
-
-
-@compiled
-def _cells_at(axial, cell_lookup):  # type: ignore[no-untyped-def]
-    out = np.empty(axial.shape[0], np.int32)
-    for i in range(axial.shape[0]):
-        out[i] = cell_at(cell_lookup, axial[i, 0], axial[i, 1])
-    return out
-
-
 def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
     """(N,) int32, the layout's cell at each axial (q, r) of (N, 2), or -1."""
-    return np.asarray(_cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup))
-
-
-@compiled
-def _fill_corner_ids(axial, out):  # type: ignore[no-untyped-def]
-    """Write the ids of the markers (q, r), (q + 1, r), (q, r + 1) of every cell."""
-    for i in range(axial.shape[0]):
-        q, r = axial[i, 0], axial[i, 1]
-        out[i, 0], out[i, 1], out[i, 2] = marker_id(q, r), marker_id(q + 1, r), marker_id(q, r + 1)
+    return np.asarray(native.cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup))
 
 
 def corner_marker_ids(axial: NDArray[np.int32]) -> NDArray[np.int32]:
     """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1), the corners of the cells at (q, r) of (N, 2)."""
-    out = np.empty((len(axial), 3), np.int32)
-    _fill_corner_ids(np.ascontiguousarray(axial, dtype=np.int32), out)
-    return out
+    return np.asarray(native.corner_ids(np.ascontiguousarray(axial, dtype=np.int32)))

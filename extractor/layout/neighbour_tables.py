@@ -2,45 +2,50 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.lattice import layer_of, marker_id
-from extractor.numeric.compilation import compiled
+from extractor._native import layout as native
 
 QUADRATIC_TERMS = 6  # of a quadratic map: 1, x, y, x^2, xy, y^2 in units of the local edge
-RIGHT_SIDES = 3  # of its normal equations: x, y and the leverage
-LINEAR_TERMS = 3  # of a linear map: 1, x, y
-MIN_PIVOT = 1e-7  # of a Cholesky factor; below it the neighbours do not determine the map
+LINEAR_TERMS = 3  # of a linear map: 1, x, y; both as in native/layout/neighbour_tables.hpp
 RING_STEPS = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
 )  # (18, 2) axial steps to the markers of the two rings
 FIRST_RING = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING_STEPS])  # (6,)
-MIN_QUADRATIC_NEIGHBOURS = 9  # fewer neighbours get the linear map
-MIN_LINEAR_NEIGHBOURS = 4  # fewer neighbours give no map
 
 
-@compiled
-def _neighbour_ids(axial, layers):  # type: ignore[no-untyped-def]
-    out = np.full((axial.shape[0], RING_STEPS.shape[0]), -1, np.int32)
-    for m in range(axial.shape[0]):
-        for k in range(RING_STEPS.shape[0]):
-            q, r = axial[m, 0] + RING_STEPS[k, 0], axial[m, 1] + RING_STEPS[k, 1]
-            if layer_of(q, r) <= layers:
-                out[m, k] = marker_id(q, r)
-    return out
+class NeighbourMapLimits(NamedTuple):
+    """Limits of maps through the markers around a marker.
+
+    Attributes:
+        min_pivot: of a Cholesky factor of the normal equations; below it the neighbours do not determine the map.
+        min_linear_neighbours: markers; fewer give no map.
+        min_quadratic_neighbours: markers; fewer give the linear map.
+        min_cubic_neighbours: markers; with fewer a cubic map has too few degrees of freedom.
+    """
+
+    min_pivot: float = 1e-7
+    min_linear_neighbours: int = 4
+    min_quadratic_neighbours: int = 9
+    min_cubic_neighbours: int = 16
+
+
+LIMITS = NeighbourMapLimits()
 
 
 def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     """(M, 18) int32, the ids of the markers in the two rings around each marker at (M, 2); -1 outside the pattern."""
-    return np.asarray(_neighbour_ids(axial, layers))
+    return np.asarray(native.neighbour_ids(axial, RING_STEPS, layers))
 
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:
     """(M, 18) float64 weights of the neighbours ``table`` (M, 18) whose weighted sum is a marker's place.
 
     The weights are those of the least-squares map of ``predict_markers`` with all neighbours known: quadratic, or
-    linear below ``MIN_QUADRATIC_NEIGHBOURS``. They are 0 where the neighbours are too few.
+    linear below ``min_quadratic_neighbours``. They are 0 where the neighbours are too few.
     """
     exists = table >= 0
     vectors = np.where(exists[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
@@ -49,14 +54,14 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     x, y = np.moveaxis(vectors / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
     rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * exists[..., None]
     weights = np.zeros(table.shape)
-    quadratic = count >= MIN_QUADRATIC_NEIGHBOURS
+    quadratic = count >= LIMITS.min_quadratic_neighbours
     for terms, selected in (
         (QUADRATIC_TERMS, quadratic),
-        (LINEAR_TERMS, (count >= MIN_LINEAR_NEIGHBOURS) & ~quadratic),
+        (LINEAR_TERMS, (count >= LIMITS.min_linear_neighbours) & ~quadratic),
     ):
         map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
-        regular = np.linalg.eigvalsh(gram)[:, 0] > MIN_PIVOT * count[selected]
+        regular = np.linalg.eigvalsh(gram)[:, 0] > LIMITS.min_pivot * count[selected]
         solutions = np.linalg.solve(gram[regular], np.swapaxes(map_rows[regular], 1, 2))[:, 0]
         weights[np.flatnonzero(selected)[regular]] = solutions
     return weights

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import numbering as native
 from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
-from extractor.layout.lattice_tables import UNKNOWN_AXIAL, Lattice
-from extractor.numbering.mesh_parts import largest_components, marker_turns, most_central_face
+from extractor.layout.lattice_tables import Lattice
+from extractor.numbering.mesh_parts import largest_components, marker_turns
 from extractor.numbering.outline_fit import align_to_outline
 from extractor.numbering.white_search import LayoutPlacement, placements_by_white_cell
-from extractor.numeric.compilation import compiled
 from extractor.result import Origin, Reason
 
 MIN_SCORE_LEAD = 2  # cells, of the best reference over the next one in its component of the mesh
@@ -34,9 +34,21 @@ MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout
 # cells, or this number.
 MIN_MESH_SHARE = 0.4
 SUFFICIENT_CELLS = 30
-MAX_ROUNDS = 8  # walks of one component
 MAX_COMPONENTS = 12
 MIN_COMPONENT_FACES = 5  # of a component whose white cell competes with another's
+
+
+class WalkLimits(NamedTuple):
+    """Limits of a walk.
+
+    Attributes:
+        max_rounds: walks of one component, each without the cells contradicted before; then it is given up.
+    """
+
+    max_rounds: int = 8
+
+
+LIMITS = WalkLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +79,7 @@ class _WalkedComponent(NamedTuple):
 
     Attributes:
         axial: (N, 2) int32, the cells' axial coordinates, ``UNKNOWN_AXIAL`` for cells not walked to.
-        cells: number of the cells walked to.
+        cells: number of the cells walked to; 0 if contradictions remain.
         conflicts: number of the cells left out.
         front: orientation of the faces that are markers.
         component: signed number of the component.
@@ -104,91 +116,6 @@ class _Candidate(NamedTuple):
     numbering: Numbering
 
 
-@compiled
-def _walk_faces(start, faces, neighbours, orientation, front, blocked, reach):  # type: ignore[no-untyped-def]
-    """Walk to all cells connected with the face ``start``.
-
-    Args:
-        faces, neighbours, orientation: of ``CellMesh``.
-        front: orientation of the faces that are markers.
-        blocked: (N,) bool, cells not to be walked to.
-        reach: largest axial coordinate.
-
-    Returns:
-        (N, 2) int32, the axial coordinates up to the lattice's translations, and (N,) bool, the contradicted cells.
-    """
-    count = blocked.shape[0]
-    axial = np.full((count, 2), UNKNOWN_AXIAL, np.int32)
-    bad = np.zeros(count, np.bool_)
-    side = 2 * reach + 1
-    lookup = np.full((side, side), -1, np.int32)
-    queue = np.empty(faces.shape[0], np.int32)
-    is_queued = np.zeros(faces.shape[0], np.bool_)
-    # around marker (0, 0) red is (0, 0), green (0, -1), blue (-1, 0); around the white cell green is (-1, 1)
-    for k in range(3):
-        i = faces[start, k]
-        axial[i, 0] = 0 if k == 0 or (k == 1 and orientation[start] == front) else -1
-        axial[i, 1] = 0 if k != 1 else (-1 if orientation[start] == front else 1)
-        lookup[axial[i, 0] + reach, axial[i, 1] + reach] = i
-    queue[0] = start
-    is_queued[start] = True
-    begin, end = 0, 1
-    while begin < end:
-        f = queue[begin]
-        begin += 1
-        for k in range(3):
-            g = neighbours[f, k]
-            if g < 0:
-                continue
-            a, b, c, d = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3], faces[f, k], faces[g, k]
-            if blocked[d]:
-                continue
-            q = axial[a, 0] + axial[b, 0] - axial[c, 0]
-            r = axial[a, 1] + axial[b, 1] - axial[c, 1]
-            if axial[d, 0] == UNKNOWN_AXIAL:
-                if abs(q) > reach or abs(r) > reach:
-                    continue
-                other = lookup[q + reach, r + reach]
-                if other >= 0:
-                    bad[d] = True
-                    bad[other] = True
-                    continue
-                axial[d, 0], axial[d, 1] = q, r
-                lookup[q + reach, r + reach] = d
-            elif axial[d, 0] != q or axial[d, 1] != r:
-                bad[d] = True
-                continue
-            if not is_queued[g]:
-                is_queued[g] = True
-                queue[end] = g
-                end += 1
-    return axial, bad
-
-
-@compiled
-def _walk_component(center, faces, neighbours, orientation, component, front, reach):  # type: ignore[no-untyped-def]
-    """Walk a component from its middle; contradicted cells are left out and the walk is repeated.
-
-    Args:
-        center: (N, 2) px, the cells' centers.
-        faces, neighbours, orientation: of ``CellMesh``. component: (K,) the component's faces.
-        front, reach: as in ``_walk_faces``.
-
-    Returns:
-        ``axial``, ``cells`` and ``conflicts`` of ``_WalkedComponent``; no cells if contradictions remain.
-    """
-    blocked = np.zeros(center.shape[0], np.bool_)
-    for _ in range(MAX_ROUNDS):
-        start = most_central_face(center, faces, component, blocked)
-        if start < 0:
-            break
-        axial, bad = _walk_faces(start, faces, neighbours, orientation, front, blocked, reach)
-        if not bad.any():
-            return axial, np.count_nonzero(axial[:, 0] != UNKNOWN_AXIAL), np.count_nonzero(blocked)
-        blocked |= bad
-    return np.full((center.shape[0], 2), UNKNOWN_AXIAL, np.int32), 0, np.count_nonzero(blocked)
-
-
 def max_walk_distance(lattice: Lattice) -> int:
     """The largest axial distance of a walk from its first cell: across the whole layout."""
     return 2 * lattice.layers + 2
@@ -203,8 +130,8 @@ def _walk_largest_components(
         # k faces have at most k + 2 cells
         if len(component) < MIN_COMPONENT_FACES and len(component) + 2 < min_cells:
             break
-        axial, walked, conflicts = _walk_component(
-            cells.center_px, mesh.faces, mesh.neighbours, mesh.orientation, component, front, reach
+        axial, walked, conflicts = native.walk_component(
+            cells.center_px, mesh.faces, mesh.neighbours, mesh.orientation, component, front, reach, LIMITS
         )
         walks.append(_WalkedComponent(axial, walked, conflicts, front, front * (number + 1)))
     return walks
@@ -287,20 +214,9 @@ def _doubt(best: _Candidate, rivals: list[_Candidate], min_cells: float) -> Reas
     return None
 
 
-@compiled
-def _count_meshed_cells(faces, orientation, count):  # type: ignore[no-untyped-def]
-    """The number of cells, of ``count``, that have a face."""
-    has_face = np.zeros(count, np.bool_)
-    for f in range(orientation.shape[0]):
-        if orientation[f] != 0:
-            for k in range(3):
-                has_face[faces[f, k]] = True
-    return np.count_nonzero(has_face)
-
-
 def _min_explained_cells(cells: Cells, mesh: CellMesh, lattice: Lattice) -> float:
     """The least number of cells of a component that is accepted as the pattern."""
-    meshed = int(_count_meshed_cells(mesh.faces, mesh.orientation, len(cells.ink)))
+    meshed: int = native.count_meshed_cells(mesh.faces, mesh.orientation, len(cells.ink))
     of_layout = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
     return max(of_layout, min(MIN_MESH_SHARE * meshed, SUFFICIENT_CELLS))
 

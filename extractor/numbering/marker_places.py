@@ -8,28 +8,52 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import numbering as native
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
+from extractor.layout.neighbour_tables import LIMITS as NEIGHBOUR_MAP_LIMITS
+from extractor.layout.neighbour_tables import NeighbourMapLimits
 from extractor.localmap.affine_maps import completed_linear_maps
-from extractor.localmap.neighbour_prediction import predict_markers
 from extractor.numbering.lattice_walk import Numbering
-from extractor.numeric.compilation import compiled
 
-MAX_CORNER_MISFIT = 0.28  # in edges, between a triangle's corner and its prediction by the cell's neighbours
-MAX_CORNER_SPREAD = 0.3  # in edges, between a corner and the mean of its marker's corners
-MAX_AGREED_SPREAD = 0.2  # in the triangle's shortest edge, the same for corners that agree
-# Where most cells have triangles, a cell without one is damaged and its edges are not the pattern's, unless the image's
-# border cuts it off.
-MIN_SHARP_SHARE = 0.6  # share of cells with triangles
-BORDER_PX = 3.0
-PREDICTED_WEIGHT = 0.05  # of a predicted corner, relative to a corner of a fitted triangle
 AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend
-MAX_AMBIGUITY_RATIO = 0.6  # of the least misfit to the next rotation's; below it the orientation is clear
-MAX_PREDICTED_DEVIATION = 0.15  # in edges, of a marker whose prediction confirms a triangle's corner
-MAX_PREDICTED_DISTANCE = 0.1  # in edges, between that prediction and the corner
-MAX_DISTANCE_RATIO = 0.5  # of that distance to the one between the prediction and the averaged place
 MAX_PLACE_ERROR = 0.1  # in edges, between a marker's place by its gridlines and a correct initial place
-X, Y, EDGE, WEIGHT = range(4)  # columns of a marker's sums
+
+
+class CornerLimits(NamedTuple):
+    """Limits of corners.
+
+    Where most cells have triangles, a cell without one is damaged and its edges are not the pattern's, unless the
+    image's border cuts it off.
+
+    Attributes:
+        max_corner_misfit: in edges, between a triangle's corner and its prediction by the cell's neighbours.
+        max_corner_spread: in edges, between a corner and the mean of its marker's corners.
+        max_agreed_spread: in the triangle's shortest edge, the same for corners that agree.
+        min_sharp_share: share of cells with triangles, above which most have one.
+        border_px: px, from the image's border; the border cuts off cells with a corner nearer to it.
+        predicted_weight: of a predicted corner, relative to a corner of a fitted triangle.
+        max_ambiguity_ratio: of the least misfit to the next rotation's; below it the orientation is clear.
+        max_predicted_deviation: in edges, of a marker whose prediction confirms a triangle's corner.
+        max_predicted_distance: in edges, between that prediction and the corner.
+        max_distance_ratio: of that distance to the one between the prediction and the averaged place.
+        prediction: of the maps that predict a marker.
+    """
+
+    max_corner_misfit: float = 0.28
+    max_corner_spread: float = 0.3
+    max_agreed_spread: float = 0.2
+    min_sharp_share: float = 0.6
+    border_px: float = 3.0
+    predicted_weight: float = 0.05
+    max_ambiguity_ratio: float = 0.6
+    max_predicted_deviation: float = 0.15
+    max_predicted_distance: float = 0.1
+    max_distance_ratio: float = 0.5
+    prediction: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
+
+
+LIMITS = CornerLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +73,24 @@ class InitialMarkers:
     cells: NDArray[np.int32]
     agreed: NDArray[np.bool_]
     is_intact: NDArray[np.bool_]
+
+
+class _MappedCells(NamedTuple):
+    """The N cells of the image with their local maps.
+
+    Attributes:
+        center_px: (N, 2) float64.
+        corner_px: (N, 3, 2) float64, of the triangles, clockwise.
+        slope: (N, 2, 2) float64, px per mm, NaN where unknown.
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        mirrored: the pattern is seen from its back.
+    """
+
+    center_px: NDArray[np.float64]
+    corner_px: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    cell: NDArray[np.int32]
+    mirrored: bool
 
 
 class _CellCorners(NamedTuple):
@@ -113,21 +155,24 @@ def merge_corners(
     slope = completed_linear_maps(
         cells.center_px, cells.corner_px, numbering.cell, numbering.mirrored, lattice.layout_cells
     )
-    corners = _cell_corners(
-        cells.center_px,
-        cells.corner_px,
-        slope,
-        numbering.cell,
-        lattice.corner_vectors_mm,
-        lattice.corner_ids,
-        numbering.mirrored,
-        size,
+    mapped = _MappedCells(cells.center_px, cells.corner_px, slope, numbering.cell, numbering.mirrored)
+    corners = _CellCorners(
+        *native.cell_corners(mapped, lattice.corner_vectors_mm, lattice.corner_ids, size, LIMITS)
     )
-    merged = _average_corners(corners, len(lattice.marker_mm))
+    merged = _MergedCorners(*native.average_corners(corners, len(lattice.marker_mm), LIMITS))
     agreed, is_intact = corner_agreement(merged.agreeing, lattice.cells_per_marker)
     unmatched = merged.is_unmatched & lattice.is_rim
     if unmatched.any():
-        _update_unmatched_markers(merged, agreed, unmatched, corners, lattice.marker_mm, lattice.neighbours)
+        native.update_unmatched_markers(
+            merged.xy_px,
+            merged.edge_px,
+            agreed,
+            unmatched,
+            corners,
+            lattice.marker_mm,
+            lattice.neighbours,
+            LIMITS,
+        )
     return InitialMarkers(merged.xy_px, merged.edge_px, merged.cells, agreed, is_intact)
 
 
@@ -141,140 +186,3 @@ def corner_agreement(
         meeting: (M,) how many the pattern has there.
     """
     return (agreeing == meeting) | (agreeing >= 2), (agreeing == meeting) & (agreeing >= 2)
-
-
-@compiled
-def _cell_corners(center, triangle, slope, cell, vectors_mm, corner_ids, mirrored, size):  # type: ignore[no-untyped-def]
-    """``_CellCorners`` of the cells with a slope.
-
-    Clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2.
-
-    Args:
-        center: (N, 2) px; triangle: (N, 3, 2) px; slope: (N, 2, 2) px per mm, the local maps.
-        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
-        vectors_mm: (U, 3, 2) from the layout's centers to the corners; corner_ids: (U, 3) their markers.
-        size: width and height of the image, px.
-    """
-    here = np.flatnonzero(np.isfinite(slope[:, 0, 0]))
-    count, matched, corner_step = here.shape[0], 0, 1 if mirrored else 2
-    ids, corner, edge = np.empty((count, 3), np.int32), np.empty((count, 3, 2)), np.zeros(count)
-    fitted, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    rejected, misfit = np.full((count, 3, 2), np.nan), np.empty(3)
-    for n in range(count):
-        i, is_inside = here[n], True
-        u = cell[i]
-        for k in range(3):
-            x_mm, y_mm = vectors_mm[u, k, 0], vectors_mm[u, k, 1]
-            x = center[i, 0] + (slope[i, 0, 0] * x_mm + slope[i, 0, 1] * y_mm)
-            y = center[i, 1] + (slope[i, 1, 0] * x_mm + slope[i, 1, 1] * y_mm)
-            ids[n, k], corner[n, k, 0], corner[n, k, 1] = corner_ids[u, k], x, y
-            is_inside = is_inside and min(x, y, size[0] - 1 - x, size[1] - 1 - y) >= BORDER_PX
-        for k in range(3):
-            edge[n] += np.sqrt(_squared_corner_distance(corner, n, k, corner, n, (k + 1) % 3)) / 3
-        for first in range(3):
-            misfit[first] = 0.0
-            for k in range(3):
-                square = _squared_corner_distance(triangle, i, (first + corner_step * k) % 3, corner, n, k)
-                misfit[first] = square if not square <= misfit[first] else misfit[first]  # NaN is kept
-        best = misfit.argmin()
-        fitted[n] = misfit[best] < (MAX_CORNER_MISFIT * edge[n]) ** 2
-        matched += fitted[n]
-        is_clear = misfit[best] < MAX_AMBIGUITY_RATIO**2 * min(misfit[best - 1], misfit[best - 2])
-        for k in range(3):
-            at = (best + corner_step * k) % 3
-            x, y = triangle[i, at, 0], triangle[i, at, 1]
-            if fitted[n]:
-                corner[n, k, 0], corner[n, k, 1] = x, y
-            elif is_clear:
-                rejected[n, k, 0], rejected[n, k, 1] = x, y
-        kept[n] = fitted[n] or not is_inside
-    return _CellCorners(ids, corner, edge, fitted, kept, rejected, matched > MIN_SHARP_SHARE * count)
-
-
-@compiled
-def _squared_corner_distance(a, i, k, b, j, m):  # type: ignore[no-untyped-def]
-    """The squared distance between the corners (i, k) and (j, m) of triangles a and b (N, 3, 2)."""
-    x, y = a[i, k, 0] - b[j, m, 0], a[i, k, 1] - b[j, m, 1]
-    return x * x + y * y
-
-
-@compiled
-def _squared_point_distance(a, i, k, xy, m):  # type: ignore[no-untyped-def]
-    """The squared distance between the corner (i, k) of triangles (N, 3, 2) and the point m of (M, 2)."""
-    x, y = a[i, k, 0] - xy[m, 0], a[i, k, 1] - xy[m, 1]
-    return x * x + y * y
-
-
-@compiled
-def _average_corners(corners, count):  # type: ignore[no-untyped-def]
-    """``_MergedCorners`` of ``_CellCorners`` at ``count`` markers."""
-    sums = _corner_sums(corners, count)
-    xy, edge, unmatched = np.full((count, 2), np.nan), np.full(count, np.nan), np.zeros(count, np.bool_)
-    for m in range(count):
-        unmatched[m] = 0.0 < sums[m, WEIGHT] < 1.0
-        if sums[m, WEIGHT] > 0.0:
-            xy[m, 0], xy[m, 1] = sums[m, X] / sums[m, WEIGHT], sums[m, Y] / sums[m, WEIGHT]
-            edge[m] = sums[m, EDGE] / sums[m, WEIGHT]
-    agreeing = _update_disagreeing_and_count(corners, edge, xy)
-    ids = corners.ids
-    known_cells, rows = np.empty(ids.shape, np.int32), 0
-    for n in range(ids.shape[0]):
-        a, b, c = ids[n, 0], ids[n, 1], ids[n, 2]
-        is_known = np.isfinite(xy[a, 0]) and np.isfinite(xy[b, 0]) and np.isfinite(xy[c, 0])
-        if is_known and (corners.is_kept[n] or not corners.is_sharp):
-            known_cells[rows, 0], known_cells[rows, 1], known_cells[rows, 2] = a, b, c
-            rows += 1
-    return _MergedCorners(xy, edge, agreeing, known_cells[:rows], unmatched)
-
-
-@compiled
-def _corner_sums(corners, count):  # type: ignore[no-untyped-def]
-    """(M, 4) the weighted sums of x, y and edge, and of the weights, at each marker."""
-    sums = np.zeros((count, 4))
-    for n in range(corners.ids.shape[0]):
-        weight = 1.0 if corners.is_fitted[n] else PREDICTED_WEIGHT
-        for k in range(3):
-            m = corners.ids[n, k]
-            sums[m, X] += weight * corners.corner_px[n, k, 0]
-            sums[m, Y] += weight * corners.corner_px[n, k, 1]
-            sums[m, EDGE] += weight * corners.edge_px[n]
-            sums[m, WEIGHT] += weight
-    return sums
-
-
-@compiled
-def _update_disagreeing_and_count(corners, edge, xy):  # type: ignore[no-untyped-def]
-    """Set markers whose triangles disagree to NaN in ``xy`` (M, 2); (M,) int64, how many triangles agree."""
-    corner, mean, agreeing = corners.corner_px, xy.copy(), np.zeros(xy.shape[0], np.int64)
-    for n in range(corners.ids.shape[0]):
-        if not corners.is_fitted[n]:
-            continue
-        shortest = np.inf
-        for k in range(3):
-            shortest = min(shortest, _squared_corner_distance(corner, n, k, corner, n, (k + 1) % 3))
-        for k in range(3):
-            m = corners.ids[n, k]
-            square = _squared_point_distance(corner, n, k, mean, m)
-            if square > (MAX_CORNER_SPREAD * edge[m]) ** 2:
-                xy[m, 0], xy[m, 1] = np.nan, np.nan
-            agreeing[m] += square < MAX_AGREED_SPREAD**2 * shortest
-    return agreeing
-
-
-@compiled
-def _update_unmatched_markers(merged, agreed, unmatched, corners, marker_mm, table):  # type: ignore[no-untyped-def]
-    """Move ``unmatched`` markers (M,) to rejected triangles' corners that the ``agreed`` neighbours (M,) predict."""
-    xy, edge, ids, rejected = merged.xy_px, merged.edge_px, corners.ids, corners.rejected_px
-    agreed_xy = xy.copy()
-    agreed_xy[~agreed] = np.nan
-    predicted = predict_markers(agreed_xy, unmatched, marker_mm, table)
-    expected = predicted.xy_px
-    for n in range(ids.shape[0]):
-        for k in range(3):
-            m = ids[n, k]
-            variance = predicted.variance_px2[m] * (1.0 + predicted.leverage[m])
-            if unmatched[m] and variance < (MAX_PREDICTED_DEVIATION * edge[m]) ** 2:
-                distance = np.sqrt((xy[m, 0] - expected[m, 0]) ** 2 + (xy[m, 1] - expected[m, 1]) ** 2)
-                limit = min(MAX_PREDICTED_DISTANCE * edge[m], MAX_DISTANCE_RATIO * distance)
-                if _squared_point_distance(rejected, n, k, expected, m) < limit * limit:
-                    xy[m] = rejected[n, k]

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from extractor._native import numbering as native
 from extractor.cells.cells import Cells
 from extractor.cells.seeds import Seeds
 from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.cells.triangle_fit import Triangles
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.affine_maps import image_cell_of_layout_cell, linear_maps
+from extractor.localmap.affine_maps import LIMITS as AFFINE_MAP_LIMITS
 from extractor.numbering.lattice_walk import Numbering
-from extractor.numeric.compilation import compiled
 
 MIN_CELL_PX = 12  # px^2, area of a domain that may be a cell
 MIN_DOMAINS_PER_CELL = 1.0  # least number of such domains, per cell of the pattern
@@ -50,28 +50,10 @@ def fit_predicted_triangles(
     """
     if np.count_nonzero(numbering.cell >= 0) < len(lattice.ink):
         return None
-    corners, good = _predicted_corners(
-        cells.center_px, numbering.cell, lattice.layout_cells, numbering.mirrored
+    corners, good = native.predicted_corners(
+        cells.center_px, numbering.cell, lattice.layout_cells, numbering.mirrored, AFFINE_MAP_LIMITS
     )
     update_triangle_corners(view, corners, good)
     if np.count_nonzero(good) < MIN_FITTED_SHARE * len(lattice.ink):
         return None
     return Triangles(corners[good], cells.ink[good], np.flatnonzero(good).astype(np.int32))
-
-
-@compiled
-def _predicted_corners(center_px, cell, layout, mirrored):  # type: ignore[no-untyped-def]
-    """(N, 3, 2) px, the numbered cells' corners by the neighbours' centers, clockwise; (N,) bool, which are known."""
-    slope = linear_maps(center_px, cell, image_cell_of_layout_cell(cell, layout.ink.shape[0]), layout)
-    corners, good = np.full((cell.shape[0], 3, 2), np.nan), np.zeros(cell.shape[0], np.bool_)
-    # clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
-    corner_step = 1 if mirrored else 2
-    for i in range(cell.shape[0]):
-        if cell[i] < 0 or np.isnan(slope[i, 0, 0]):
-            continue
-        good[i] = True
-        for k in range(3):
-            x, y = layout.corner_vectors_mm[cell[i], corner_step * k % 3]
-            for axis in range(2):
-                corners[i, k, axis] = center_px[i, axis] + slope[i, axis, 0] * x + slope[i, axis, 1] * y
-    return corners, good

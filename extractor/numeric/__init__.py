@@ -1,4 +1,4 @@
-"""Numeric tools without knowledge of patterns: compilation, small systems, sampling, triangulation, the Gaussian.
+"""Numeric tools without knowledge of patterns: sampling, triangulation, nearest points, medians, the Gaussian.
 
 In: arrays. Out: arrays.
 """

@@ -1,23 +1,13 @@
-"""The median of a few numbers, for use inside compiled loops.
-
-Sorting takes an unpredictable branch per comparison; counting the smaller numbers of each takes none.
-"""
+"""The median of a few numbers, as the compiled loops take it."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from extractor.numeric.compilation import inlined_no_refcount
+from extractor._native import numeric as native
 
 
-@inlined_no_refcount
-def median_of(values, count):  # type: ignore[no-untyped-def]
+def median_of(values: NDArray[np.float64], count: int) -> float:
     """The median of the first ``count`` values, at least one and none of them NaN."""
-    low, high = -np.inf, -np.inf
-    for i in range(count):
-        own, smaller = values[i], 0
-        for j in range(count):
-            smaller += values[j] < own
-        low = max(low, own) if smaller <= (count - 1) // 2 else low
-        high = max(high, own) if smaller <= count // 2 else high
-    return 0.5 * (low + high)
+    return float(native.median_of(values, count))

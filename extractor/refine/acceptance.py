@@ -2,58 +2,99 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
+from extractor._native import markers as native
 from extractor.numbering.marker_places import MAX_PLACE_ERROR
-from extractor.numeric.compilation import compiled
-from extractor.refine.measure.gridline_bending import BEND_TO_END_SHIFT, mean_at_markers
+from extractor.refine.estimate import StartPlaces
+from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
 from extractor.refine.refinement_step import PRIOR_PX
-from extractor.refine.solve.fisher_information import covariances
-
-# All in units of the edges around the marker, except the last but one:
-MAX_SHIFT = 0.25  # from the start place,
-MAX_SHIFT_ALL_CELLS = 0.13  # and where all triangles agree on that: in steep views these lie so far off
-MAX_DEVIATION = 0.03  # of what is measured
-MAX_SHIFT_UNEXPLAINED = 0.13  # from the start place, where the drawing explains nothing well
-MAX_SHIFT_FROM_PREDICTION = 0.05  # from where the neighbours put an unaccepted marker
-DOT_GAIN_FACTOR = 2.0  # times the dot gain, added to MAX_SHIFT_UNEXPLAINED: corners move most
-UNEXPLAINED_DEVIATION = 0.015  # by dirt, of the visible part where the drawing does not explain the image
-DIRT_DEVIATION = 0.01  # by dirt, where it does, but no gridline of the marker has any weight
-DISAGREEMENT_SCALE = 0.03  # of profiles and triangles, where all triangles of a marker were found
+from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
+from extractor.refine.solve.fisher_information import Information, InformationLimits
 
 
-@compiled
-def accepted_markers(measured, information, bend_variance, edges, spokes, places, selected):  # type: ignore[no-untyped-def]
+class AcceptanceLimits(NamedTuple):
+    """Limits of accepted markers, in units of the edges around the marker where nothing else is said.
+
+    Attributes:
+        max_shift: from the start place,
+        max_shift_all_cells: and where all triangles agree on that: in steep views these lie so far off.
+        max_deviation: of what is measured.
+        min_information: 1/px^2, below which a marker counts as unknown: four times that before the measurement.
+        bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of its bending.
+        information: of the covariances.
+    """
+
+    max_shift: float = 0.25
+    max_shift_all_cells: float = 0.13
+    max_deviation: float = 0.03
+    min_information: float = 4 * PRIOR_PX**-2
+    bend_to_end_shift: float = BENDING_LIMITS.bend_to_end_shift
+    information: InformationLimits = INFORMATION_LIMITS
+
+
+class HiddenMarkerLimits(NamedTuple):
+    """Limits of markers that dirt hides, in units of the edges around the marker where nothing else is said.
+
+    Attributes:
+        max_shift_unexplained: from the start place, where the drawing explains nothing well.
+        max_shift_from_prediction: from where the neighbours put an unaccepted marker.
+        dot_gain_factor: times the dot gain, added to ``max_shift_unexplained``: corners move most.
+        unexplained_deviation: by dirt, of the visible part where the drawing does not explain the image.
+        dirt_deviation: by dirt, where it does, but no gridline of the marker has any weight.
+        disagreement_scale: of profiles and triangles, where all triangles of a marker were found.
+        max_place_error: between a marker's place by its gridlines and a correct initial place.
+    """
+
+    max_shift_unexplained: float = 0.13
+    max_shift_from_prediction: float = 0.05
+    dot_gain_factor: float = 2.0
+    unexplained_deviation: float = 0.015
+    dirt_deviation: float = 0.01
+    disagreement_scale: float = 0.03
+    max_place_error: float = MAX_PLACE_ERROR
+
+
+LIMITS = AcceptanceLimits()
+HIDDEN_MARKER_LIMITS = HiddenMarkerLimits()
+
+
+def accepted_markers(
+    measured: NDArray[np.float64],
+    information: Information,
+    bend_variance: NDArray[np.float64],
+    edges: NDArray[np.int32],
+    spokes: NDArray[np.int32],
+    places: StartPlaces,
+    selected: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The markers that lie near their start place with a small deviation.
 
     Args:
         measured: (M, 2) px.
-        information: ``Information`` about them.
+        information: about them.
         bend_variance: (E,) px^2.
         edges, spokes: (E, 2) and (M, 6).
-        places: ``StartPlaces``.
+        places: before refinement.
         selected: (M,) bool, the markers to test; no other is accepted.
 
     Returns:
         (M, 2) px and (M, 2, 2) px^2: markers and covariances, NaN where not accepted.
     """
-    xy, bending = measured.copy(), mean_at_markers(bend_variance, spokes)
-    blocks = information.diagonal, information.off_diagonal
-    cov = covariances(blocks[0], blocks[1], edges, spokes, 4 * PRIOR_PX**-2, selected)
-    start, edge = places.xy_px, places.edge_px
-    for m in range(xy.shape[0]):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        limit = (MAX_SHIFT_ALL_CELLS if places.is_intact[m] else MAX_SHIFT) * edge[m]
-        cov[m, 0, 0] += BEND_TO_END_SHIFT**2 * bending[m]
-        cov[m, 1, 1] += BEND_TO_END_SHIFT**2 * bending[m]
-        spread = cov[m, 0, 0] + cov[m, 1, 1]
-        if not (dx * dx + dy * dy < limit * limit and spread < (MAX_DEVIATION * edge[m]) ** 2):
-            xy[m], cov[m] = np.nan, np.nan
+    gridlines = bend_variance, edges, spokes
+    xy, cov = native.accepted_markers(measured, information, *gridlines, places, selected, LIMITS)
     return xy, cov
 
 
-@compiled
-def add_dirt_variance(cov, weight, spokes, edge):  # type: ignore[no-untyped-def]
+def add_dirt_variance(
+    cov: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    spokes: NDArray[np.int32],
+    edge: NDArray[np.float64],
+) -> None:
     """Add the variance by dirt to the covariances: dirt on some gridlines moves the others, too.
 
     Args:
@@ -62,19 +103,18 @@ def add_dirt_variance(cov, weight, spokes, edge):  # type: ignore[no-untyped-def
         spokes: (M, 6) the gridlines at each marker.
         edge: (M,) px, the length of the edges at each marker.
     """
-    for m in range(cov.shape[0]):
-        missing, count = 0.0, 0
-        for e in spokes[m]:
-            if e >= 0 and weight[e] > 0.0:
-                missing += 1.0 - weight[e]
-                count += 1
-        variance = (DIRT_DEVIATION * edge[m] * missing / max(count, 1)) ** 2
-        cov[m, 0, 0] += variance
-        cov[m, 1, 1] += variance
+    native.add_dirt_variance(cov, weight, spokes, edge, HIDDEN_MARKER_LIMITS)
 
 
-@compiled
-def update_unaccepted_markers(xy, cov, reliable, start, edge, unexplained, dot_gain):  # type: ignore[no-untyped-def]
+def update_unaccepted_markers(
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    reliable: NDArray[np.float64],
+    start: NDArray[np.float64],
+    edge: NDArray[np.float64],
+    unexplained: bool,
+    dot_gain: float,
+) -> tuple[NDArray[np.bool_], bool]:
     """The markers that are neither accepted nor reliable.
 
     Args:
@@ -88,18 +128,19 @@ def update_unaccepted_markers(xy, cov, reliable, start, edge, unexplained, dot_g
     Returns:
         (M,) bool, the markers with a start that are not accepted or not reliable; and whether there are any.
     """
-    out = np.zeros(xy.shape[0], np.bool_)
-    for m in range(xy.shape[0]):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        limit = MAX_SHIFT_UNEXPLAINED * edge[m] + DOT_GAIN_FACTOR * abs(dot_gain)
-        if unexplained and np.sqrt(dx * dx + dy * dy) > limit:
-            xy[m], cov[m] = np.nan, np.nan
-        out[m] = (np.isnan(xy[m, 0]) or np.isnan(reliable[m, 0])) and np.isfinite(start[m, 0])
-    return out, np.any(out)
+    markers, places = (xy, cov, reliable), (start, edge)
+    out = native.update_unaccepted_markers(*markers, *places, unexplained, dot_gain, HIDDEN_MARKER_LIMITS)
+    return out, bool(out.any())
 
 
-@compiled
-def update_lost_markers(xy, cov, unaccepted, predicted, start, edge):  # type: ignore[no-untyped-def]
+def update_lost_markers(
+    xy: NDArray[np.float64],
+    cov: NDArray[np.float64],
+    unaccepted: NDArray[np.bool_],
+    predicted: NDArray[np.float64],
+    start: NDArray[np.float64],
+    edge: NDArray[np.float64],
+) -> NDArray[np.bool_]:
     """The markers that are lost.
 
     Args:
@@ -111,35 +152,19 @@ def update_lost_markers(xy, cov, unaccepted, predicted, start, edge):  # type: i
     Returns:
         (M,) bool, the markers with a start that are not accepted.
     """
-    out = np.zeros(xy.shape[0], np.bool_)
-    for m in np.flatnonzero(unaccepted):
-        dx, dy = xy[m, 0] - predicted[m, 0], xy[m, 1] - predicted[m, 1]
-        if not dx * dx + dy * dy < (MAX_SHIFT_FROM_PREDICTION * edge[m]) ** 2:
-            xy[m], cov[m] = np.nan, np.nan
-        out[m] = np.isnan(xy[m, 0]) and np.isfinite(start[m, 0])
-    return out
+    return np.asarray(
+        native.update_lost_markers(xy, cov, unaccepted, predicted, start, edge, HIDDEN_MARKER_LIMITS)
+    )
 
 
-@compiled
-def update_obstructed_markers(xy, cov, selected, places):  # type: ignore[no-untyped-def]
+def update_obstructed_markers(
+    xy: NDArray[np.float64], cov: NDArray[np.float64], selected: NDArray[np.bool_], places: StartPlaces
+) -> None:
     """Put covered markers between the places by profiles and by triangles; NaN where these differ much.
 
     Args:
         xy, cov: (M, 2) px and (M, 2, 2) px^2 by profiles, written.
         selected: (M,) bool, the covered markers.
-        places: ``StartPlaces``, by triangles.
+        places: by triangles.
     """
-    start, edge = places.xy_px, places.edge_px
-    for m in np.flatnonzero(selected):
-        dx, dy = xy[m, 0] - start[m, 0], xy[m, 1] - start[m, 1]
-        distance = np.sqrt(dx * dx + dy * dy)
-        if not distance < MAX_PLACE_ERROR * edge[m]:
-            xy[m], cov[m] = np.nan, np.nan
-            continue
-        # all triangles around a marker are seldom wrong together: the larger the distance, the more they count
-        ratio = distance / (DISAGREEMENT_SCALE * edge[m])
-        share = 0.5 / (1.0 + ratio**2) if places.is_intact[m] else 0.5
-        xy[m, 0], xy[m, 1] = start[m, 0] + share * dx, start[m, 1] + share * dy
-        variance = 0.25 * distance**2 + (UNEXPLAINED_DEVIATION * edge[m]) ** 2
-        cov[m, 0, 0] += variance
-        cov[m, 1, 1] += variance
+    native.update_obstructed_markers(xy, cov, selected, places, HIDDEN_MARKER_LIMITS)

@@ -1,8 +1,4 @@
-"""A round of profiles: gridlines are read across, weighed, and the markers solved.
-
-One compiled function leads from the gridlines to the markers: between small functions, every array would pass through
-Python.
-"""
+"""A round of profiles: gridlines are read across, weighed, and the markers solved."""
 
 from __future__ import annotations
 
@@ -11,31 +7,51 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
-from extractor.numeric.compilation import compiled
 from extractor.refine.estimate import EdgeContrasts, Estimate
-from extractor.refine.measure.gridline_bending import bending_gridlines
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import ShiftGradients, weigh_gridlines
-from extractor.refine.measure.matched_filter import read_profiles
-from extractor.refine.outliers import suspect_markers
+from extractor.refine.measure.matched_filter import LIMITS as ROW_LIMITS
+from extractor.refine.measure.matched_filter import MatchedFilterLimits
+from extractor.refine.outliers import LIMITS as OUTLIER_LIMITS
+from extractor.refine.outliers import OutlierLimits
+from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
-    BendingPrior,
     MisfitRule,
+    StepLimits,
     StepSolution,
-    solve_step,
-    update_for_bending,
+    step_solution,
     with_solution,
 )
-from extractor.refine.solve.disagreement import variance_ratios, with_weight
-from extractor.refine.solve.fisher_information import GridlineSystem
-from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.residual_kernel import AA, A, B
+from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
+from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
 MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile
-SQUARED_CONTRAST = 3  # column of the clearance
+
+
+class ProfileLimits(NamedTuple):
+    """Limits of a round of profiles.
+
+    Attributes:
+        misfit_tolerance: of the contrast; what glare and uneven light make in a profile does not lower its weight.
+        rule: by which gridlines are weighed.
+        step: of the step.
+        rows: of the rows of pixels.
+        dot_gain: of the dot gain.
+        outliers: of the markers around which gridlines are judged.
+    """
+
+    misfit_tolerance: float = MISFIT_TOLERANCE
+    rule: MisfitRule = SAMPLE_MISFIT_RULE
+    step: StepLimits = STEP_LIMITS
+    rows: MatchedFilterLimits = ROW_LIMITS
+    dot_gain: DotGainLimits = DOT_GAIN_LIMITS
+    outliers: OutlierLimits = OUTLIER_LIMITS
+
+
+LIMITS = ProfileLimits()
 
 
 class ProfileStep(NamedTuple):
@@ -86,55 +102,10 @@ def profile_step(
         The estimate after the round, and (E,) 0 to 1, how well gridlines look like the pattern.
     """
     state = estimate.pattern_state()
-    step = _profile_step(view, lines, contrasts, state, topology, stations, judged)
+    found = native.profile_step(view, lines, contrasts, state, topology, stations, judged, LIMITS)
+    step = ProfileStep(*(*found[:-1], step_solution(*found[-1])))
     weights = step.weight, step.variance_ratio, step.dot_gain_offset
     look = contrasts.sides, contrasts.sides, contrasts.clearance, *weights
     reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
     others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
     return with_solution(estimate, step.solution, **others), step.profile_weight
-
-
-@compiled
-def _profile_step(view, lines, across, state, topology, stations, judged):  # type: ignore[no-untyped-def]
-    """``ProfileStep`` from the gridlines (E, 8), the ``EdgeContrasts`` across them, and the ``PatternState``."""
-    contrasts, clearance = across.contrasts, across.clearance
-    edges, spokes, edge_cells = topology.edges, topology.spokes, topology.edge_cells
-    sigma, noise, rule = state.sigma, state.noise, SAMPLE_MISFIT_RULE
-    bending = bending_gridlines(state.roughness, state.bend, edges)
-    sums = read_profiles(view, lines, across, sigma, bending, stations)
-    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
-    dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
-    dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
-    prior = BendingPrior(state.bend, state.roughness, state.weight)
-    bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, noise, rule)
-    pardon = MISFIT_TOLERANCE**2 * clearance[:, SQUARED_CONTRAST]
-    profile_weight, _, _ = weigh_gridlines(
-        sums, gradients, pardon, rule.values, rule.min_places, rule.default_weight
-    )
-    weight = profile_weight if judged else _lenient_weights(profile_weight, sums, edges, spokes)
-    system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
-    solution = solve_step(system, gradients, state.bend, bend_response, state.xy, state.hidden, False)
-    ratio = np.ones(len(edges))
-    if judged:
-        ratio = variance_ratios(system, gradients, solution.measured - state.xy)
-        system = with_weight(system, weight / ratio)
-        solution = solve_step(system, gradients, state.bend, bend_response, state.xy, state.hidden, False)
-    return ProfileStep(profile_weight, weight, ratio, bend_variance, dot_gain, dot_gain_offset, solution)
-
-
-@compiled
-def _lenient_weights(profile_weight, sums, edges, spokes):  # type: ignore[no-untyped-def]
-    """(E,) 0 to 1: weights of gridlines that are judged only around markers where little else is measured."""
-    read = sums[:, AA] > 0.0
-    suspect, _ = suspect_markers(profile_weight, read, spokes)
-    return np.where(_groups_with_any(suspect, edges), profile_weight, np.where(read, 1.0, 0.0))
-
-
-@compiled
-def _groups_with_any(selected, groups):  # type: ignore[no-untyped-def]
-    """(G,) bool, the groups (G, n) of markers that contain a selected one (M,) bool."""
-    out = np.zeros(groups.shape[0], np.bool_)
-    for g in range(groups.shape[0]):
-        for k in range(groups.shape[1]):
-            out[g] |= selected[groups[g, k]]
-    return out

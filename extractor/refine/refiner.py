@@ -8,14 +8,15 @@ such step is nearly enough.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import refine as native
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
-from extractor.numeric.compilation import compiled
 from extractor.presets import SCHEDULES, Preset
 from extractor.refine.acceptance import (
     accepted_markers,
@@ -64,6 +65,19 @@ MIN_BLUR_PX = 0.65  # or that blur
 UNEXPLAINED_NOISE_RATIO = 3.0
 
 
+class FullScaleLimits(NamedTuple):
+    """Limits of the markers at the full scale.
+
+    Attributes:
+        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree.
+    """
+
+    agreed_deviation: float = AGREED_DEVIATION
+
+
+FULL_SCALE_LIMITS = FullScaleLimits()
+
+
 class Refiner:
     """Refines the markers of one layout; its picture is kept from image to image, one for each thread."""
 
@@ -77,7 +91,7 @@ class Refiner:
     def __call__(
         self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None = None
     ) -> RefinedMarkers:
-        """Solve all markers together. A marker farther than ``acceptance.MAX_SHIFT`` edges from its place is lost.
+        """Solve all markers together. A marker farther than ``max_shift`` edges from its place is lost.
 
         Args:
             pyramid: the image.
@@ -235,7 +249,7 @@ class Refiner:
         assert reading is not None
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
-        xy, cov = _at_full_scale(xy, cov, start_places(places), scale)
+        xy, cov = native.at_full_scale(xy, cov, start_places(places), scale, FULL_SCALE_LIMITS)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look) if reading.drawn else None
         blur, noise = scale * estimate.sigma, scale * estimate.noise
@@ -246,8 +260,10 @@ class Refiner:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of an estimate; NaN where not accepted."""
         measured, spokes = (estimate.measured, estimate.information), self._topology.spokes
-        tables = self._topology.edges, spokes, start_places(places), self._every_marker
-        xy, cov = accepted_markers(*measured, estimate.bend_variance, *tables)
+        started = start_places(places)
+        xy, cov = accepted_markers(
+            *measured, estimate.bend_variance, self._topology.edges, spokes, started, self._every_marker
+        )
         assert estimate.reading is not None
         add_dirt_variance(cov, estimate.reading.weight, spokes, places.edge_px)
         if estimate.convergence_cov_px2 is not None:
@@ -282,17 +298,3 @@ def rescaled_contrasts(contrasts: EdgeContrasts, ratio: float) -> EdgeContrasts:
     clearance = contrasts.clearance.copy()
     clearance[:, 0] *= ratio
     return contrasts._replace(clearance=clearance)
-
-
-@compiled
-def _at_full_scale(xy, cov, places, scale):  # type: ignore[no-untyped-def]
-    """Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image; a lost one lies where its triangles agree."""
-    start, out, out_cov = places.xy_px, np.empty_like(xy), scale**2 * cov
-    for m in range(xy.shape[0]):
-        from_places = np.isnan(xy[m, 0]) and places.agreed[m] and np.isfinite(start[m, 0])
-        for axis in range(2):
-            out[m, axis] = ((start[m, axis] if from_places else xy[m, axis]) + 0.5) * scale - 0.5
-        if from_places:
-            out_cov[m, 0, 0] = out_cov[m, 1, 1] = scale**2 * (AGREED_DEVIATION * places.edge_px[m]) ** 2
-            out_cov[m, 0, 1] = out_cov[m, 1, 0] = 0.0
-    return out, out_cov

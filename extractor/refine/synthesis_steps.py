@@ -8,39 +8,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
-from extractor.numeric.compilation import compiled
 from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
-from extractor.refine.measure.gridline_bending import bending_misfit
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import (
-    ShiftGradients,
-    blur_after_step,
-    blur_change,
-    update_for_blur,
-    weigh_gridlines,
-)
+from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
-    BendingPrior,
+    MisfitRule,
+    StepLimits,
     StepSolution,
-    solve_step,
-    update_for_bending,
+    step_solution,
     with_pattern_moved,
     with_roughness,
     with_solution,
 )
-from extractor.refine.solve.convergence import (
-    WIDE_BLUR_REMAINDER,
-    convergence_covariance,
-)
-from extractor.refine.solve.disagreement import variance_ratios, with_weight
-from extractor.refine.solve.fisher_information import GridlineSystem
+from extractor.refine.solve.convergence import WIDE_BLUR_REMAINDER, convergence_covariance
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
-from extractor.refine.synthesis.dot_gain import measure_dot_gain, update_without_dot_gain
-from extractor.refine.synthesis.residual_kernel import A, B
+from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
+from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
@@ -48,6 +36,23 @@ WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like be
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
 MAX_PICTURES = 2  # kept, for images of so many shapes
 NO_CLEARANCE = np.empty((0, 4))
+
+
+class SynthesisLimits(NamedTuple):
+    """Limits of a step by synthesis.
+
+    Attributes:
+        rule: by which gridlines are weighed.
+        step: of the step.
+        dot_gain: of the dot gain.
+    """
+
+    rule: MisfitRule = PIXEL_MISFIT_RULE
+    step: StepLimits = STEP_LIMITS
+    dot_gain: DotGainLimits = DOT_GAIN_LIMITS
+
+
+LIMITS = SynthesisLimits()
 
 
 class SynthesisReading(NamedTuple):
@@ -139,7 +144,8 @@ class SynthesisSolver:
     def _update_estimate(self, estimate: Estimate, drawing: Synthesis, is_last: bool) -> Estimate:
         """The estimate after the step that the sums of the drawing ask for."""
         topology, levels = self._topology, drawing.corrected_levels
-        read = _update_and_solve(drawing, estimate.pattern_state(), topology, is_last)
+        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, is_last, LIMITS)
+        read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
         weights = read.weight, read.variance_ratio, read.dot_gain_offset
         how = NO_CLEARANCE, *weights, drawing.sigma, read.noise, True
         reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
@@ -157,33 +163,6 @@ class SynthesisSolver:
             levels=levels,
             dot_gain=read.dot_gain,
         )
-
-
-@compiled
-def _update_and_solve(drawing, state, topology, is_last):  # type: ignore[no-untyped-def]
-    """``SynthesisReading`` of a drawing."""
-    lines, contrasts, sums, sigma = drawing.lines, drawing.contrasts, drawing.sums.copy(), drawing.sigma
-    edges, spokes, edge_cells, rule = topology.edges, topology.spokes, topology.edge_cells, PIXEL_MISFIT_RULE
-    gradients = ShiftGradients(sums[:, A].copy(), sums[:, B].copy())
-    blur_px = blur_after_step(sigma, blur_change(sums, state.weight))
-    update_for_blur(sums, gradients, blur_px - sigma)
-    dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma)
-    dot_gain_offset = update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain)
-    prior = BendingPrior(drawing.bend, state.roughness, state.weight)
-    bend_variance, bend_response = update_for_bending(sums, gradients, prior, lines, edges, state.noise, rule)
-    pardon = bending_misfit(bend_variance, contrasts, sigma)
-    weight, _, found = weigh_gridlines(
-        sums, gradients, pardon, rule.values, rule.min_places, rule.default_weight
-    )
-    noise = found if np.isfinite(found) else state.noise
-    system = GridlineSystem(sums, weight, lines, contrasts, edges, spokes, sigma, noise**2)
-    solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
-    ratio = np.ones(len(edges))
-    if is_last:
-        ratio = variance_ratios(system, gradients, solution.measured - state.xy)
-        system = with_weight(system, weight / ratio)
-        solution = solve_step(system, gradients, drawing.bend, bend_response, state.xy, state.hidden, True)
-    return SynthesisReading(weight, ratio, bend_variance, dot_gain, dot_gain_offset, blur_px, noise, solution)
 
 
 def _without_bending(estimate: Estimate) -> Estimate:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout.reference import Reference
+from extractor.numeric.nearest_points import nearest_points
 from extractor.space.camera import Array, is_finite
 
 MIN_CUBIC_NEIGHBOURS = 10  # known neighbours for the polynomial of 9 terms
@@ -51,10 +52,8 @@ class Field:
         return type(self), (self._layout,)
 
     @cached_property
-    def _tree(self) -> Any:
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.xy_mm[self.triangles].mean(axis=1))
+    def _centers_mm(self) -> Array:
+        return np.asarray(self.xy_mm[self.triangles].mean(axis=1))
 
     def gradients(self, values: Array) -> Array:
         """(M, k, 2) derivatives of values (M, k) by the layout's x and y, per mm; NaN where unknown.
@@ -121,7 +120,7 @@ class Field:
     def find(self, xy_mm: Array) -> tuple[NDArray[np.intp], Array]:
         """(N,) the triangle that contains each point (N, 2) of the layout, -1 for none; (N, 3) barycentric."""
         count = min(CANDIDATES, len(self.triangles))
-        candidates = np.atleast_2d(self._tree.query(xy_mm, k=count)[1].reshape(-1, count))
+        candidates = nearest_points(self._centers_mm, xy_mm, count)
         triangle, inside = np.full(len(xy_mm), -1, np.intp), np.full((len(xy_mm), 3), np.nan)
         for k in range(count):
             open_points = np.flatnonzero(triangle < 0)
@@ -131,7 +130,7 @@ class Field:
             triangle[found], inside[found] = candidates[found, k], coordinates[hit]
         return triangle, inside
 
-    def _barycentric(self, triangle: NDArray[np.intp], xy_mm: Array) -> Array:
+    def _barycentric(self, triangle: NDArray[np.integer[Any]], xy_mm: Array) -> Array:
         """(N, 3) barycentric coordinates of points (N, 2) in these triangles (N,)."""
         a, b, c = np.moveaxis(self.xy_mm[self.triangles[triangle]], 1, 0)
         twice = _cross_2d(b - a, c - a)

@@ -6,13 +6,12 @@ one has the smallest final prediction error (Akaike 1969), chi^2 / (N - K) (1 + 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from extractor.errors import PoseError
 from extractor.space.camera import Array, View, is_finite
@@ -25,6 +24,7 @@ USUAL_GEL_INDEX, USUAL_WINDOW_INDEX = 1.41, 1.49  # silicone and acrylic, where 
 GEL_TOLERANCE_MM = 0.01
 STEPS = {"window_mm": 0.1, "gel_index": 0.01, "window_index": 0.01}
 TILT_STEP = 0.01  # rad
+GOLDEN = 0.5 * (5**0.5 - 1)
 LENS_STEP_PX, DISTORTION_STEP = 0.5, 1e-3
 ANYWHERE_MM2 = np.eye(3)  # covariance of markers that have moved
 
@@ -97,14 +97,27 @@ def _medium_error(found: RestViews) -> float:
         tried = refined(gel_mm)
         return tried.chi2 if tried is not None else float("inf")
 
-    best = minimize_scalar(
-        chi2, bounds=(0.0, 0.5 * room_mm), method="bounded", options={"xatol": GEL_TOLERANCE_MM}
-    )
-    likely = refined(float(best.x))
+    likely = refined(_least_place(chi2, 0.0, 0.5 * room_mm, GEL_TOLERANCE_MM))
     if likely is None:
         return float("inf")
     columns = list(_medium_columns(likely.views, rest.flat_mm))
     return _explained_error(found._replace(views=likely.views), likely.residual_px, columns)
+
+
+def _least_place(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
+    """The place of the least value of a function with one minimum, by golden sections (Kiefer 1953)."""
+    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_inner, at_outer = function(inner), function(outer)
+    while high - low > tolerance:
+        if at_inner <= at_outer:
+            high, outer, at_outer = outer, inner, at_inner
+            inner = high - GOLDEN * (high - low)
+            at_inner = function(inner)
+        else:
+            low, inner, at_inner = inner, outer, at_outer
+            outer = low + GOLDEN * (high - low)
+            at_outer = function(outer)
+    return 0.5 * (low + high)
 
 
 def _whole_medium(view: View) -> Medium:

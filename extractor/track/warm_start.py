@@ -16,18 +16,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import track as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers, corner_agreement
-from extractor.numeric.bilinear import fill_patch_mean
-from extractor.numeric.compilation import compiled
-from extractor.track.image_check import CONFIRMED, UNSEEN, check_cells
+from extractor.track.image_check import CONFIRMED, check_cells
 from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
 
-MIN_VERIFIED_SHARE = 0.95  # of the cells in view that the image must confirm
 MIN_PREDICTED = 0.8  # of the cells in view whose middles must show their ink under a predicted position
-MIN_CENTER_STRENGTH = 0.3  # of a middle's ink level, relative to the frame before
 MIN_WHITE_EDGES = 2  # of a cell's three edges across which it is bright, for the white cell and for a rival
+
+
+class WarmStartLimits(NamedTuple):
+    """Limits of the proof.
+
+    Attributes:
+        center_radius_px: of the disc over which a middle's color is averaged.
+        min_center_strength: of a middle's ink level, relative to the frame before, for the middle to show its ink.
+        min_verified_share: of the cells in view that the image must confirm.
+    """
+
+    center_radius_px: float = 0.5
+    min_center_strength: float = 0.3
+    min_verified_share: float = 0.95
+
+
+LIMITS = WarmStartLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,78 +72,6 @@ class VerifiedMarkers(NamedTuple):
     cell_count: NDArray[np.int64]
 
 
-@compiled
-def _count_matching_centers(image, xy, corners, ink, levels, nearest):  # type: ignore[no-untyped-def]
-    """Number of cells in view, and of those whose middle matches their own ink better than the two others."""
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    color = np.zeros(3)
-    visible, matching = 0, 0
-    for i in range(corners.shape[0]):
-        a, b, c = xy[corners[i, 0]], xy[corners[i, 1]], xy[corners[i, 2]]
-        x, y = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3
-        if not fill_patch_mean(flat, height, width, x, y, 0.5, color):  # outside the image, or NaN
-            continue
-        visible += 1
-        best, best_score = 0, -np.inf
-        for k in range(3):
-            other = levels[nearest[i, k]]
-            norm = np.sqrt(other[0] ** 2 + other[1] ** 2 + other[2] ** 2)
-            low = min(color[0], color[1], color[2])
-            score = other[0] * (color[0] - low) + other[1] * (color[1] - low) + other[2] * (color[2] - low)
-            if score / norm > best_score:
-                best, best_score = k + 1, score / norm
-        own = levels[i]
-        own_norm = np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
-        if best == ink[i] and best_score > MIN_CENTER_STRENGTH * own_norm:
-            matching += 1
-    return visible, matching
-
-
-@compiled
-def _connected_cells(verdict, first, known, corners, cells_of_marker):  # type: ignore[no-untyped-def]
-    """(C,) bool, the confirmed cells that are connected to the ``first`` ones (C,) over common markers; and whether
-    they are nearly all of the cells in view whose markers were ``known`` (M,)."""
-    count = corners.shape[0]
-    reached = first & (verdict == CONFIRMED)
-    queue = np.empty(count, np.int64)
-    head, tail = 0, 0
-    for i in range(count):
-        if reached[i]:
-            queue[tail] = i
-            tail += 1
-    while head < tail:
-        i = queue[head]
-        head += 1
-        for k in range(3):
-            for n in range(3):
-                j = cells_of_marker[corners[i, k], n]
-                if j >= 0 and verdict[j] == CONFIRMED and not reached[j]:
-                    reached[j] = True
-                    queue[tail] = j
-                    tail += 1
-    expected, found = 0, 0
-    for i in range(count):
-        if verdict[i] != UNSEEN and known[corners[i, 0]] and known[corners[i, 1]] and known[corners[i, 2]]:
-            expected += 1
-            found += reached[i]
-    return reached, tail > 0 and found >= MIN_VERIFIED_SHARE * expected
-
-
-@compiled
-def _verified_markers(xy, proved, corners):  # type: ignore[no-untyped-def]
-    """The ``VerifiedMarkers`` of the cells ``proved`` (C,) bool."""
-    kept = np.full(xy.shape, np.nan)
-    verified_count, cell_count = np.zeros(xy.shape[0], np.int64), np.zeros(xy.shape[0], np.int64)
-    for i in range(corners.shape[0]):
-        for k in range(3):
-            m = corners[i, k]
-            cell_count[m] += 1
-            if proved[i]:
-                verified_count[m] += 1
-                kept[m] = xy[m]
-    return VerifiedMarkers(kept, verified_count, cell_count)
-
-
 def select_prediction(
     image: NDArray[np.uint8],
     candidates: list[NDArray[np.float64]],
@@ -145,8 +87,8 @@ def select_prediction(
     """
     best, best_share = None, MIN_PREDICTED
     for candidate in candidates:
-        visible, matching = _count_matching_centers(
-            image, candidate, tables.corners, tables.ink, levels_before[0], tables.nearest
+        visible, matching = native.count_matching_centers(
+            np.ascontiguousarray(image), candidate, tables, levels_before[0], LIMITS
         )
         if matching > best_share * visible:
             best, best_share = candidate, matching / visible
@@ -182,10 +124,11 @@ def verify_prediction(
     if not by_rim and (check.white_count < MIN_WHITE_EDGES or check.white_missing_count > 0):
         return None
     first = tables.is_rim if by_rim else tables.is_at_white
-    proved, enough = _connected_cells(check.verdict, first, known, tables.corners, tables.cells_of_marker)
+    cells = tables.corners, tables.cells_of_marker
+    proved, enough = native.connected_cells(check.verdict, first, known, *cells, LIMITS)
     if not enough:
         return None
-    verified: VerifiedMarkers = _verified_markers(aligned.xy_px, proved, tables.corners)
+    verified = VerifiedMarkers(*native.verified_markers(aligned.xy_px, proved, tables.corners))
     agreement = corner_agreement(verified.verified_count, verified.cell_count)
     places = InitialMarkers(
         level.to_full_scale(verified.xy_px),

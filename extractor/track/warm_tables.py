@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import track as native
 from extractor.layout.reference import BLACK, WHITE, Reference
-from extractor.numeric.compilation import compiled
+from extractor.numeric.nearest_points import nearest_points
 
-NO_CELL, BLACK_CELL, WHITE_CELL = range(3)  # the layout's cell across an edge
+# The layout's cell across an edge; as in native/track/warm_tables.hpp.
+NO_CELL, BLACK_CELL, WHITE_CELL = range(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,35 +104,16 @@ def _completion_tables(reference: Reference) -> CompletionTables:
 
 def _nearest_by_ink(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[np.int32]:
     """(C, 3) int32, the nearest red, green and blue cell of each of C cells."""
-    from scipy.spatial import cKDTree
-
     nearest = np.empty((len(ink), 3), np.int32)
     for color in range(3):
         members = np.flatnonzero(ink == color + 1)
-        nearest[:, color] = members[cKDTree(center_mm[members]).query(center_mm)[1]]
+        nearest[:, color] = members[nearest_points(center_mm[members], center_mm)[:, 0]]
     return nearest
 
 
 def predict_missing_markers(tables: WarmTables, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The markers (M, 2) px; those that are NaN are predicted from known cells across one of their edges."""
-    return np.asarray(_predict_missing(tables.completion, tables.completion_weights, xy_px))
+    """The markers (M, 2) px; those that are NaN are predicted from known cells across one of their edges.
 
-
-@compiled
-def _predict_missing(completion, weights, xy):  # type: ignore[no-untyped-def]
-    """The same: the mean of all predictions of a marker."""
-    out, count = xy.copy(), np.zeros(xy.shape[0])
-    for row in range(completion.shape[0]):
-        a, b, c, d = completion[row]
-        if np.isfinite(xy[d, 0]) or not np.isfinite(xy[a, 0] + xy[b, 0] + xy[c, 0]):
-            continue
-        if count[d] == 0.0:
-            out[d] = 0.0
-        count[d] += 1.0
-        wa, wb, wc = weights[row]
-        for axis in range(2):
-            out[d, axis] += wa * xy[a, axis] + wb * xy[b, axis] + wc * xy[c, axis]
-    for m in range(xy.shape[0]):
-        if count[m] > 0.0:
-            out[m] /= count[m]
-    return out
+    A marker that several cells predict is placed at the mean of these places.
+    """
+    return np.asarray(native.predict_missing(tables.completion, tables.completion_weights, xy_px))

@@ -1,0 +1,40 @@
+// Room "cells" as Python sees it.
+#include "base/binding.hpp"
+#include "cells/cell_mesh.hpp"
+#include "cells/cells.hpp"
+#include "cells/region_growing.hpp"
+#include "cells/seeds.hpp"
+#include "cells/triangle_edges.hpp"
+#include "cells/triangle_fit.hpp"
+
+namespace cmp::cells {
+
+namespace {
+
+void fill(nb::module_& module) {
+  bind<&find_runs>(module, "find_runs", {"label"});
+  bind<&find_domains>(module, "find_domains", {"runs", "parent", "max_domains", "limits"});
+  bind<&seed_points>(module, "seed_points", {"runs", "domain", "area"});
+  bind<&domain_moments>(module, "domain_moments", {"runs", "domain", "seed_xy"});
+  bind<&grow>(module, "grow", {"hsv", "label", "seed_xy", "seed_ink", "limit_px", "limits"});
+  bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed", "limits"});
+  bind<&triangle_arrays>(module, "triangle_arrays", {"view", "moments", "seed", "ink", "scale", "limits"});
+  bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good", "limits"});
+  bind<&cell_arrays>(
+      module, "cell_arrays",
+      {"seed_center", "ink", "area_px", "region", "corner_px", "scale", "cluttered", "limits"});
+  bind<&equilateral_edge>(module, "equilateral_edge", {"area"});
+  bind<&is_intact>(module, "is_intact", {"center", "area", "corner", "limits"});
+  bind<&update_flipped_edges>(module, "update_flipped_edges",
+                              {"points", "ink", "faces", "neighbours", "limits"});
+  bind<&swelling>(module, "swelling", {"points", "ink", "corner", "faces", "limits"});
+  bind<&without_swelling>(module, "without_swelling", {"center", "corner", "swelling"});
+  bind<&classify_faces>(module, "classify_faces",
+                        {"points", "ink", "area", "corner", "faces", "neighbours", "limits"});
+}
+
+const Room room("cells", fill);
+
+}  // namespace
+
+}  // namespace cmp::cells

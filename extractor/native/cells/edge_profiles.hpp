@@ -1,0 +1,55 @@
+// The table of edges that are measured together, and the profiles of light across them.
+#pragma once
+
+#include "base/array.hpp"
+#include "cells/triangle_edges.hpp"
+#include "numeric/bilinear_batch.hpp"
+
+namespace cmp::cells {
+
+inline constexpr Index BATCH_CELLS = numeric::BATCH_POINTS / 3;  // triangles measured together
+
+// The begin of a column of the edges' table.
+constexpr Index column(Index k) { return k * numeric::BATCH_POINTS; }
+
+// the ends
+inline constexpr Index START_X = column(0), START_Y = column(1), END_X = column(2), END_Y = column(3);
+// the cell's center, the distance of its first corner from the center, and the profiles' reach
+inline constexpr Index CENTER_X = column(4), CENTER_Y = column(5), SIZE = column(6), REACH = column(7);
+// the normal, the edge's distance from the center, and the vector from the center to its middle
+inline constexpr Index NORMAL_X = column(8), NORMAL_Y = column(9), DEPTH = column(10);
+inline constexpr Index MEDIAN_X = column(11), MEDIAN_Y = column(12);
+// the ink's color; the weights that turn a color into a share of ink; the background's weighted color
+inline constexpr Index INK = column(13), WEIGHT = column(16), BACKGROUND = column(19);
+// 1 if the edge is valid, else 0
+inline constexpr Index VALID = column(20);
+// the profiles' middles, their step, and the areas under them
+inline constexpr Index FIRST_X = column(21), FIRST_Y = column(22), SECOND_X = column(23),
+                       SECOND_Y = column(24);
+inline constexpr Index STEP_X = column(25), STEP_Y = column(26), AREA = column(27), AREA_BEFORE = column(28);
+// the line n . p = d
+inline constexpr Index LINE_X = column(29), LINE_Y = column(30), LINE_D = column(31);
+inline constexpr Index COLUMNS = 32;
+
+// An image as the samples take it.
+struct ProfileImage {
+  View<const std::uint8_t, 1> flat;  // (3 H W,)
+  View<const float, 1> light;        // (256,) the light of each value
+  Index height, width;
+};
+
+// Writes the weights that separate each cell's ink from the color outside each edge, and the edges' validity.
+//
+// edges: the table; count: of edges, three for each cell: first edges, second edges, third edges.
+void fill_contrast_weights(const ProfileImage& image, View<double, 1> edges, Index count,
+                           numeric::SampleBuffers& buffers, const TriangleEdgeLimits& limits);
+
+// Writes the profiles' middles; edges with a profile that leaves the image become invalid.
+void fill_profile_places(const ProfileImage& image, View<double, 1> edges, Index count,
+                         const TriangleEdgeLimits& limits);
+
+// Writes the areas under the first or second profiles, in steps, and keeps the ones before in AREA_BEFORE.
+void fill_profile_areas(const ProfileImage& image, bool second, View<double, 1> edges, Index count,
+                        numeric::SampleBuffers& buffers, const TriangleEdgeLimits& limits);
+
+}  // namespace cmp::cells

@@ -1,0 +1,239 @@
+#include "complete/repair.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "complete/uncertain_markers.hpp"
+#include "localmap/neighbour_prediction.hpp"
+
+namespace cmp::complete {
+
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+// Status in extractor/result.py
+constexpr std::uint8_t LOST = 0, MEASURED = 1, REPAIRED = 2, FITTED = 3;
+
+using layout::RingTables;
+using Flags = Array<bool, 1>;
+
+double square(double x) { return x * x; }
+
+bool is_any(const Flags& flags) {
+  const auto all = flags.view();
+  return std::any_of(all.begin(), all.end(), [](bool one) { return one; });
+}
+
+// The edge at each marker; where it is NaN, the mean of the neighbours' edges, or NaN without any.
+Array<double, 1> interpolated_edges(View<const double, 1> edge_px, View<const std::int32_t, 2> neighbours) {
+  Array<double, 1> out(edge_px);
+  for (Index m = 0; m < edge_px.size(); ++m) {
+    if (!std::isnan(edge_px[m])) continue;
+    double total = 0.0, count = 0.0;
+    for (Index n : neighbours[m]) {
+      if (n < 0 || std::isnan(edge_px[n])) continue;
+      total += edge_px[n];
+      count += 1.0;
+    }
+    out[m] = count > 0.0 ? total / count : NOT_A_NUMBER;
+  }
+  return out;
+}
+
+// Predictions of M markers by the markers around them, NaN where unknown.
+struct RingPrediction {
+  localmap::MarkerPredictions both;  // by two rings
+  Array<double, 2> inner_xy_px;      // (M, 2) by the inner ring alone
+
+  RingPrediction(View<const double, 2> known, View<const bool, 1> wanted, const RingTables& tables,
+                 const RepairLimits& limits)
+      : both(localmap::predict_markers(known, wanted, tables.marker_mm, tables.neighbours, limits.maps)),
+        inner_xy_px(localmap::predict_markers(known, wanted, tables.marker_mm, tables.first_ring, limits.maps)
+                        .xy_px) {}
+};
+
+// The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe.
+double variance_by_neighbours(Index m, const RingPrediction& rings, double edge_px,
+                              const RepairLimits& limits) {
+  const double variance = rings.both.variance_px2[m], leverage = rings.both.leverage[m];
+  const auto place = rings.both.xy_px[m], inner = rings.inner_xy_px[m];
+  const double dx = place[0] - inner[0], dy = place[1] - inner[1];
+  // where the inner ring alone predicts another place, the surface is too bent for both predictions
+  const bool unconfirmed = std::isnan(inner[0]);
+  const double ring_error = square(limits.outer_ring_error * edge_px);
+  const double model_error = unconfirmed ? ring_error : (dx * dx + dy * dy) / 4;
+  const double upper_bound =
+      variance * (1 + leverage) + square(limits.model_deviation * edge_px) + model_error;
+  if (rings.both.neighbour_count[m] < limits.mild_support ||
+      !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
+    return NOT_A_NUMBER;
+  const double outer_error = unconfirmed ? 0.25 * ring_error : 0.0;
+  return square(limits.mild_error * leverage) * variance + outer_error;
+}
+
+// The same where the surface is bent, but the rings are nearly whole, from the residual of a cubic, px^2.
+double variance_by_cubic(double residual, double edge_px, const RepairLimits& limits) {
+  const double variance = square(limits.cubic_error) * residual + square(limits.model_deviation * edge_px);
+  return variance < square(limits.max_repaired_deviation * edge_px) ? variance : NOT_A_NUMBER;
+}
+
+// The same by the quadratic through the marker's layer, from the variance of its residual, px^2.
+double variance_by_layer(double residual, double edge_px, const RepairLimits& limits) {
+  if (!(residual + square(limits.fitted_model_sigmas * limits.model_deviation * edge_px) <
+        square(limits.max_fitted_deviation * edge_px)))
+    return NOT_A_NUMBER;
+  return limits.heavy_error * residual + square(limits.model_deviation * edge_px);
+}
+
+// The variance of the mean of the corners that a lost marker's cells imply (the article's eq. 6), px^2.
+//
+// NaN where the markers around predict another place, and at the image's border, which cuts cells. Where
+// gridlines bend sharply, the prediction by markers is hardly better.
+double variance_by_cells(Index m, const RingPrediction& rings, View<const double, 1> implied, double edge_px,
+                         const ImageSize& size, const RepairLimits& limits) {
+  const double x = implied[0], y = implied[1];
+  const double variance = rings.both.variance_px2[m], leverage = rings.both.leverage[m];
+  const double distance2 = square(x - rings.both.xy_px(m, 0)) + square(y - rings.both.xy_px(m, 1));
+  const double right = static_cast<double>(size[0] - 1) - x, bottom = static_cast<double>(size[1] - 1) - y;
+  const bool inside = std::min(std::min(std::min(x, y), right), bottom) > limits.border_width * edge_px;
+  const double limit2 = square(limits.max_implied_distance * edge_px);
+  if (!(inside && rings.both.neighbour_count[m] >= limits.min_rim_support && distance2 < limit2))
+    return NOT_A_NUMBER;
+  const double predicted_variance = variance * (1 + leverage),
+               own = square(limits.implied_deviation * edge_px);
+  if (!(leverage < limits.max_rim_leverage && predicted_variance < limit2 &&
+        distance2 < square(limits.max_implied_sigmas) * (predicted_variance + own)))
+    return NOT_A_NUMBER;
+  return 0.25 * distance2 + own;
+}
+
+// The repair of the lost markers and the fusion of the uncertain ones.
+class Repair {
+ public:
+  Repair(const UnrepairedMarkers& markers, const RingTables& tables, const ImageSize& size,
+         const RepairLimits& limits)
+      : xy_(markers.xy_px),
+        cov_(markers.cov_px2),
+        markers_(markers),
+        tables_(tables),
+        size_(size),
+        limits_(limits),
+        count_(markers.xy_px.size()),
+        edge_px_(interpolated_edges(markers.edge_px, tables.neighbours)),
+        lost_({count_}),
+        known_(View<const double, 2>(markers.xy_px)),
+        status_({count_}) {}
+
+  Array<std::uint8_t, 1> run() {
+    Flags wanted({count_});
+    for (Index m = 0; m < count_; ++m) {
+      const bool is_lost = std::isnan(xy_(m, 0)), uncertain = markers_.uncertain[m];
+      status_[m] = is_lost ? LOST : MEASURED;
+      lost_[m] = is_lost && tables_.present[m];
+      wanted[m] = lost_[m] || uncertain;
+      if (uncertain) known_[m].fill(NOT_A_NUMBER);
+    }
+    RingPrediction rings(known_, wanted, tables_, limits_);
+    fill_by_rings(rings, wanted);
+    add_fused_markers();
+    if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {
+      rings = RingPrediction(known_, lost_, tables_, limits_);
+      for_lost([&](Index m) {
+        lost_[m] = !fill(m, rings.both.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
+      });
+    }
+    for_lost([&](Index m) {
+      const auto implied = markers_.implied_px[m];
+      lost_[m] = !fill(m, implied, variance_by_cells(m, rings, implied, edge_px_[m], size_, limits_));
+    });
+    if (is_any(lost_)) fill_remaining(rings);
+    drop_outside();
+    return std::move(status_);
+  }
+
+ private:
+  template <class Visit>
+  void for_lost(Visit visit) {
+    for (Index m = 0; m < count_; ++m)
+      if (lost_[m]) visit(m);
+  }
+
+  // writes a marker's place and isotropic covariance; false if the variance is NaN or the place not in the
+  // image
+  bool fill(Index m, View<const double, 1> place, double variance) {
+    xy_(m, 0) = place[0];
+    xy_(m, 1) = place[1];
+    cov_(m, 0, 0) = cov_(m, 1, 1) = variance;
+    cov_(m, 0, 1) = cov_(m, 1, 0) = 0.0;
+    return variance >= 0.0 && is_inside_image(place[0], place[1], size_);
+  }
+
+  void fill_by_rings(const RingPrediction& rings, const Flags& wanted) {
+    for (Index m = 0; m < count_; ++m) {
+      if (!wanted[m]) continue;
+      const double variance = variance_by_neighbours(m, rings, edge_px_[m], limits_);
+      const auto place = rings.both.xy_px[m];
+      if (lost_[m]) {
+        lost_[m] = !fill(m, place, variance);
+        status_[m] = REPAIRED;
+      } else if (variance >= 0.0) {
+        update_by_fusion(xy_[m], cov_[m], place, variance);
+      }
+    }
+  }
+
+  void add_fused_markers() {
+    for (Index m = 0; m < count_; ++m) {
+      if (!markers_.uncertain[m]) continue;
+      known_(m, 0) = xy_(m, 0);
+      known_(m, 1) = xy_(m, 1);
+    }
+  }
+
+  // the weaker and slower predictions, only for the remaining markers
+  void fill_remaining(const RingPrediction& rings) {
+    Flags dense({count_});
+    for (Index m = 0; m < count_; ++m)
+      dense[m] = lost_[m] && rings.both.neighbour_count[m] >= limits_.maps.min_cubic_neighbours;
+    const auto by_cubic =
+        localmap::cubic_variance(known_, dense, tables_.marker_mm, tables_.neighbours, limits_.maps);
+    const auto [layer_xy, layer_variance] = predict_by_layer(known_, tables_.layers, limits_.layers);
+    for (Index m = 0; m < count_; ++m) {
+      if (!lost_[m] || fill(m, rings.both.xy_px[m], variance_by_cubic(by_cubic[m], edge_px_[m], limits_)))
+        continue;
+      status_[m] = FITTED;
+      fill(m, layer_xy[m], variance_by_layer(layer_variance[m], edge_px_[m], limits_));
+    }
+  }
+
+  void drop_outside() {
+    for (Index m = 0; m < count_; ++m) {
+      if (cov_(m, 0, 0) >= 0.0 && is_inside_image(xy_(m, 0), xy_(m, 1), size_)) continue;
+      xy_[m].fill(NOT_A_NUMBER);
+      cov_[m].fill(NOT_A_NUMBER);
+      status_[m] = LOST;
+    }
+  }
+
+  View<double, 2> xy_;
+  View<double, 3> cov_;
+  const UnrepairedMarkers& markers_;
+  const RingTables& tables_;
+  const ImageSize& size_;
+  const RepairLimits& limits_;
+  Index count_;
+  Array<double, 1> edge_px_;
+  Flags lost_;
+  Array<double, 2> known_;  // without the lost markers, and at first without the uncertain ones
+  Array<std::uint8_t, 1> status_;
+};
+
+}  // namespace
+
+Array<std::uint8_t, 1> fill_lost_markers(const UnrepairedMarkers& markers, const RingTables& tables,
+                                         const ImageSize& size, const RepairLimits& limits) {
+  return Repair(markers, tables, size, limits).run();
+}
+
+}  // namespace cmp::complete

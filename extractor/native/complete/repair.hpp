@@ -1,0 +1,67 @@
+// Lost markers are repaired where that is safe, and uncertain ones are fused with their predictions.
+//
+// Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers
+// of two rings do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers
+// of the same layer and sextant, read at equidistant places.
+#pragma once
+
+#include "complete/consistency_filter.hpp"
+#include "complete/layer_arcs.hpp"
+#include "layout/lattice_tables.hpp"
+#include "layout/neighbour_tables.hpp"
+
+namespace cmp::complete {
+
+// Limits of repaired markers; explained in extractor/complete/repair.py.
+struct RepairLimits {
+  double max_implied_distance, implied_deviation, max_implied_sigmas, border_width;
+  std::int64_t mild_support, min_rim_support;
+  double max_repaired_deviation, max_fitted_deviation, max_leverage, max_rim_leverage;
+  double outer_ring_error, model_deviation, fitted_model_sigmas;
+  double mild_error, heavy_error, cubic_error;
+  LayerLimits layers;
+  layout::NeighbourMapLimits maps;
+
+  template <class F>
+  static RepairLimits read(const F& f) {
+    return {f["max_implied_distance"],
+            f["implied_deviation"],
+            f["max_implied_sigmas"],
+            f["border_width"],
+            f["mild_support"],
+            f["min_rim_support"],
+            f["max_repaired_deviation"],
+            f["max_fitted_deviation"],
+            f["max_leverage"],
+            f["max_rim_leverage"],
+            f["outer_ring_error"],
+            f["model_deviation"],
+            f["fitted_model_sigmas"],
+            f["mild_error"],
+            f["heavy_error"],
+            f["cubic_error"],
+            f["layers"],
+            f["maps"]};
+  }
+};
+
+// What is known of M markers before repair.
+struct UnrepairedMarkers {
+  View<double, 2> xy_px;             // (M, 2) NaN where lost; written
+  View<double, 3> cov_px2;           // (M, 2, 2) NaN where lost; written
+  View<const bool, 1> uncertain;     // (M,)
+  View<const double, 1> edge_px;     // (M,) edge at each marker
+  View<const double, 2> implied_px;  // (M, 2) the places before refinement, which the cells imply
+
+  template <class F>
+  static UnrepairedMarkers read(const F& f) {
+    return {f["xy_px"], f["cov_px2"], f["uncertain"], f["edge_px"], f["implied_px"]};
+  }
+};
+
+// Writes places and covariances of the lost markers that are predicted, and fuses the uncertain ones; markers
+// outside the image become NaN. (M,) the status of all markers.
+Array<std::uint8_t, 1> fill_lost_markers(const UnrepairedMarkers& markers, const layout::RingTables& tables,
+                                         const ImageSize& size, const RepairLimits& limits);
+
+}  // namespace cmp::complete

@@ -1,0 +1,119 @@
+#include "complete/virtual_markers.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "refine/synthesis/gridlines.hpp"
+
+namespace cmp::complete {
+
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+// VirtualStatus in extractor/result.py
+constexpr std::uint8_t LOST = 0, MEASURED = 1, INTERPOLATED = 2;
+
+struct Vector {
+  double x, y;
+};
+
+double square(double x) { return x * x; }
+
+// The map's derivative along the edge at marker a, towards b, px per edge; the chord where it is unknown.
+Vector edge_tangent(const GridlineEnds& ends, const layout::Topology& topology, Index a, Index b,
+                    Vector chord) {
+  const auto map = ends.maps[a];
+  if (!std::isfinite(map(0, 0))) return chord;
+  for (Index k = 0; k < refine::FIRST_RING; ++k) {
+    if (topology.ring_markers(a, k) != b) continue;
+    const double u = topology.ring_vectors(a, k, 0), v = topology.ring_vectors(a, k, 1);
+    return {map(0, 0) * u + map(0, 1) * v, map(1, 0) * u + map(1, 1) * v};
+  }
+  return chord;
+}
+
+// A virtual marker from the start of its edge: place, covariance and status.
+struct Located {
+  double x, y, xx, cross, yy;
+  std::uint8_t status;
+};
+
+// The gridline along an edge: a cubic Hermite curve through both markers with the map's derivatives there.
+struct Gridline {
+  double x0, y0, length;
+  Vector chord, along, leaving, arriving;
+  View<const double, 2> cov_a, cov_b;
+
+  Gridline(const GridlineEnds& ends, const layout::Topology& topology, Index a, Index b)
+      : x0(ends.xy_px(a, 0)),
+        y0(ends.xy_px(a, 1)),
+        chord{ends.xy_px(b, 0) - x0, ends.xy_px(b, 1) - y0},
+        cov_a(ends.cov_px2[a]),
+        cov_b(ends.cov_px2[b]) {
+    length = std::sqrt(chord.x * chord.x + chord.y * chord.y);
+    along = {chord.x / length, chord.y / length};
+    leaving = edge_tangent(ends, topology, a, b, chord);
+    arriving = edge_tangent(ends, topology, b, a, {-chord.x, -chord.y});
+  }
+
+  // the interpolated point at the share t of the edge
+  Located at(double t, double bend_uncertainty) const {
+    const double s = 1.0 - t;
+    const double end = t * t * (3 - 2 * t), slope_a = s * s * t, slope_b = s * t * t;
+    const double x = end * chord.x + slope_a * leaving.x + slope_b * arriving.x;
+    const double y = end * chord.y + slope_a * leaving.y + slope_b * arriving.y;
+    const double bend_variance =
+        square(bend_uncertainty) * (square(x - t * chord.x) + square(y - t * chord.y));
+    return {x,
+            y,
+            s * s * cov_a(0, 0) + t * t * cov_b(0, 0) + bend_variance,
+            s * s * cov_a(0, 1) + t * t * cov_b(0, 1),
+            s * s * cov_a(1, 1) + t * t * cov_b(1, 1) + bend_variance,
+            INTERPOLATED};
+  }
+
+  // moves a point across the gridline to the measured one (3,), unless that is farther away than the limit
+  void update_to_measured(View<const double, 1> measured, double limit_px, Located& point) const {
+    const auto [tx, ty] = along;
+    const double across = (measured[1] - y0 - point.y) * tx - (measured[0] - x0 - point.x) * ty;
+    if (!(std::abs(across) < limit_px)) return;  // also for NaN, where no point was measured
+    point.x -= across * ty;
+    point.y += across * tx;
+    const double along2 = point.xx * tx * tx + 2 * point.cross * tx * ty + point.yy * ty * ty;
+    const double across2 = measured[2];
+    point.xx = along2 * tx * tx + across2 * ty * ty;
+    point.cross = (along2 - across2) * tx * ty;
+    point.yy = along2 * ty * ty + across2 * tx * tx;
+    point.status = MEASURED;
+  }
+};
+
+}  // namespace
+
+VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology& topology,
+                               View<const double, 3> points, const VirtualLimits& limits) {
+  const Index count = points.size(0), m = points.size(1);
+  Array<double, 3> xy({count, m, 2}, NOT_A_NUMBER);
+  Array<double, 4> cov({count, m, 2, 2}, NOT_A_NUMBER);
+  Array<std::uint8_t, 2> status({count, m}, LOST);
+  for (Index e = 0; e < count; ++e) {
+    const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
+    if (!(ends.known[a] && ends.known[b])) continue;
+    const Gridline gridline(ends, topology, a, b);
+    const double limit_px = limits.max_measured_offset * gridline.length;
+    for (Index j = 0; j < m; ++j) {
+      const double t = static_cast<double>(j + 1) / static_cast<double>(m + 1);
+      Located point = gridline.at(t, limits.bend_uncertainty);
+      gridline.update_to_measured(points[e][j], limit_px, point);
+      status(e, j) = point.status;
+      xy(e, j, 0) = gridline.x0 + point.x;
+      xy(e, j, 1) = gridline.y0 + point.y;
+      cov(e, j, 0, 0) = point.xx;
+      cov(e, j, 1, 1) = point.yy;
+      cov(e, j, 0, 1) = cov(e, j, 1, 0) = point.cross;
+    }
+  }
+  return {std::move(xy), std::move(cov), std::move(status)};
+}
+
+}  // namespace cmp::complete

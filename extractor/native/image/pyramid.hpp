@@ -1,0 +1,41 @@
+// An image at reduced scales: blurred or large images need no fine pixels.
+#pragma once
+
+#include "base/array.hpp"
+#include "image/response.hpp"
+
+namespace cmp::image {
+
+// The coordinates of polynomials over an image: (px - x) / scale, (py - y) / scale, for a pixel (px, py).
+struct PolynomialFrame {
+  double x, y, scale;
+
+  template <class F>
+  static PolynomialFrame read(const F& f) {
+    return {f["x"], f["y"], f["scale"]};
+  }
+};
+
+// An image at 1/scale of the full size.
+struct PyramidLevel {
+  View<const std::uint8_t, 3> image;  // (H, W, 3) the values of the mean light of scale x scale pixels
+  Index scale;                        // full-scale pixels per pixel
+  PolynomialFrame frame;              // the coordinates of polynomials over this image
+  ResponseTables response;            // from values to light
+
+  template <class F>
+  static PyramidLevel read(const F& f) {
+    return {f["image"], f["scale"], f["frame"], f["response"]};
+  }
+};
+
+// (H // scale, W // scale, 3): the values of the mean light of scale x scale pixels; image (H, W, 3).
+Array<std::uint8_t, 3> block_means(View<const std::uint8_t, 3> image, Index scale,
+                                   View<const std::uint16_t, 1> light_steps,
+                                   View<const std::uint8_t, 1> value_of_steps);
+
+// The same for 2 x 2 pixels, in half of the time.
+Array<std::uint8_t, 3> halved(View<const std::uint8_t, 3> image, View<const std::uint16_t, 1> light_steps,
+                              View<const std::uint8_t, 1> value_of_steps);
+
+}  // namespace cmp::image

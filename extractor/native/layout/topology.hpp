@@ -1,0 +1,47 @@
+// The topology of a layout: which edges, cells and neighbours belong to each other.
+#pragma once
+
+#include "base/array.hpp"
+
+namespace cmp::layout {
+
+// Tables of M markers, E edges, K drawn cells (the colored ones and the white one) and B black cells; -1:
+// none.
+struct Topology {
+  View<const std::int32_t, 2> edges;        // (E, 2) marker ids, the smaller first
+  View<const std::int32_t, 2> cells;        // (K, 3) marker ids of the drawn cells
+  View<const std::int32_t, 1> cell_color;   // (K,) red 0, green 1, blue 2, white 4
+  View<const std::int32_t, 2> cell_edges;   // (K, 3), edge k connects the corners k and k + 1
+  View<const std::int32_t, 2> black_cells;  // (B, 3) marker ids of the black cells
+  View<const std::int32_t, 2> edge_cells;   // (E, 2) the drawn cells on the two sides of an edge, in no order
+  View<const std::int32_t, 2> spokes;  // (M, 6) the edges that end at a marker, in the order of directions
+  // (M, 18) the markers in the two rings around, the first ring first
+  View<const std::int32_t, 2> ring_markers;
+  View<const double, 3> ring_vectors;  // (M, 18, 2) from a marker to these, in units of the mean edge, y up
+  View<const double, 3> derivative_stencil;  // (M, 2, 18) weights that give the map's derivatives, else 0
+  View<const double, 2> edge_vectors;        // (E, 2) from an edge's start to its end, in the same unit
+  // (E, 2) on the same gridline, the marker before an edge's start and the one after its end
+  View<const std::int32_t, 2> next_markers;
+  View<const double, 2> third_differences;  // (E, 2) the layout's third difference along these four markers
+  View<const std::int32_t, 2> next_edges;   // (M, 6) the edge that follows each spoke on the same gridline
+
+  template <class F>
+  static Topology read(const F& f) {
+    return {f["edges"],
+            f["cells"],
+            f["cell_color"],
+            f["cell_edges"],
+            f["black_cells"],
+            f["edge_cells"],
+            f["spokes"],
+            f["ring_markers"],
+            f["ring_vectors"],
+            f["derivative_stencil"],
+            f["edge_vectors"],
+            f["next_markers"],
+            f["third_differences"],
+            f["next_edges"]};
+  }
+};
+
+}  // namespace cmp::layout

@@ -1,0 +1,34 @@
+// Room "localmap" as Python sees it.
+#include "base/binding.hpp"
+#include "localmap/affine_maps.hpp"
+#include "localmap/cell_prediction.hpp"
+#include "localmap/neighbour_prediction.hpp"
+#include "localmap/regularised_maps.hpp"
+
+namespace cmp::localmap {
+
+namespace {
+
+std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<std::int32_t, 1>> predict(
+    View<const double, 2> xy_px, View<const bool, 1> wanted, View<const double, 2> marker_mm,
+    View<const std::int32_t, 2> table, const NeighbourMapLimits& limits) {
+  auto found = predict_markers(xy_px, wanted, marker_mm, table, limits);
+  return {std::move(found.xy_px), std::move(found.variance_px2), std::move(found.leverage),
+          std::move(found.neighbour_count)};
+}
+
+void fill(nb::module_& module) {
+  bind<&completed_linear_maps>(module, "completed_linear_maps",
+                               {"center_px", "corner_px", "cell", "mirrored", "layout", "limits"});
+  bind<&lattice_bases>(module, "lattice_bases", {"center", "axial", "limits"});
+  bind<&predict>(module, "predict_markers", {"xy_px", "wanted", "marker_mm", "table", "limits"});
+  bind<&cubic_variance>(module, "cubic_variance", {"xy_px", "wanted", "marker_mm", "table", "limits"});
+  bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
+                                    {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});
+}
+
+const Room room("localmap", fill);
+
+}  // namespace
+
+}  // namespace cmp::localmap

@@ -1,0 +1,33 @@
+// Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
+//
+// They serve markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour
+// has no weight.
+#pragma once
+
+#include "base/array.hpp"
+
+namespace cmp::localmap {
+
+// Limits of regularised maps; explained in extractor/localmap/regularised_maps.py.
+struct RegularisedMapLimits {
+  double min_sine2;
+  Index min_neighbours, min_curved_neighbours, min_firm_neighbours;
+  double firm_ridge, weak_ridge, linear_ridge;
+
+  template <class F>
+  static RegularisedMapLimits read(const F& f) {
+    return {f["min_sine2"],  f["min_neighbours"], f["min_curved_neighbours"], f["min_firm_neighbours"],
+            f["firm_ridge"], f["weak_ridge"],     f["linear_ridge"]};
+  }
+};
+
+// Writes the derivatives x, y, xx, xy, yy of the image coordinates where the neighbours determine them.
+//
+// xy (M, 2) px, the markers' places, NaN unknown; markers (n,) to evaluate; ring_markers (M, K) their
+// neighbours, or -1; ring_vectors (M, K, 2) the vectors to them in the layout; out (M, 2, 5) receives the
+// derivatives of x and y.
+void fill_quadratic_derivatives(View<const double, 2> xy, View<const std::int64_t, 1> markers,
+                                View<const std::int32_t, 2> ring_markers, View<const double, 3> ring_vectors,
+                                View<double, 3> out, const RegularisedMapLimits& limits);
+
+}  // namespace cmp::localmap

@@ -1,0 +1,40 @@
+// Room "numbering" as Python sees it.
+#include "base/binding.hpp"
+#include "numbering/lattice_walk.hpp"
+#include "numbering/marker_places.hpp"
+#include "numbering/mesh_parts.hpp"
+#include "numbering/outline_fit.hpp"
+#include "numbering/small_pattern.hpp"
+#include "numbering/white_search.hpp"
+#include "numbering/whiteness.hpp"
+
+namespace cmp::numbering {
+
+namespace {
+
+void fill(nb::module_& module) {
+  bind<&faces_by_component>(module, "faces_by_component", {"neighbours", "orientation"});
+  bind<&marker_turn_by_brightness>(module, "marker_turn_by_brightness",
+                                   {"image", "center", "faces", "orientation", "limits"});
+  bind<&walk_component>(
+      module, "walk_component",
+      {"center", "faces", "neighbours", "orientation", "component", "front", "reach", "limits"});
+  bind<&count_meshed_cells>(module, "count_meshed_cells", {"faces", "orientation", "count"});
+  bind<&align>(module, "align", {"axial", "layout_axial", "cell_lookup", "limits"});
+  bind<&measure_inks>(module, "measure_inks", {"image", "center", "area", "ink", "known", "limits"});
+  bind<&search_white_cell>(module, "search_white_cell",
+                           {"image", "center", "axial", "known", "inks", "layout", "limits"});
+  bind<&predicted_corners>(module, "predicted_corners",
+                           {"center_px", "cell", "layout", "mirrored", "limits"});
+  bind<&cell_corners>(module, "cell_corners", {"cells", "vectors_mm", "corner_ids", "size", "limits"});
+  bind<&average_corners>(module, "average_corners", {"corners", "count", "limits"});
+  bind<&update_unmatched_markers>(
+      module, "update_unmatched_markers",
+      {"xy_px", "edge_px", "agreed", "unmatched", "corners", "marker_mm", "table", "limits"});
+}
+
+const Room room("numbering", fill);
+
+}  // namespace
+
+}  // namespace cmp::numbering

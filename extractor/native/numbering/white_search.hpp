@@ -1,0 +1,54 @@
+// Searches the white cell, which fixes the rotation and the origin of a numbering.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+#include "localmap/cell_prediction.hpp"
+#include "numbering/white_cell.hpp"
+#include "numbering/whiteness.hpp"
+
+namespace cmp::numbering {
+
+// Limits of the search; explained in extractor/numbering/white_search.py.
+struct WhiteSearchLimits {
+  double min_white_ratio, max_black_ratio, min_black_share;
+  Index min_enclosed_places, max_white_candidates;
+  double min_weakest_channel, min_weakest_channel_far;
+  WhiteCellLimits cell;
+  WhitenessLimits whiteness;
+  localmap::CellPredictionLimits prediction;
+
+  template <class F>
+  static WhiteSearchLimits read(const F& f) {
+    return {f["min_white_ratio"],
+            f["max_black_ratio"],
+            f["min_black_share"],
+            f["min_enclosed_places"],
+            f["max_white_candidates"],
+            f["min_weakest_channel"],
+            f["min_weakest_channel_far"],
+            f["cell"],
+            f["whiteness"],
+            f["prediction"]};
+  }
+};
+
+// P bright places, the brightest first: ring, cell (P, N), inside (P,), missing (P,), center_px (P, 2),
+// brightness (P,), whiteness (P,) and fits (P,) of _WhiteCandidates.
+using WhiteCandidates =
+    std::tuple<Index, Array<std::int32_t, 2>, Array<std::int64_t, 1>, Array<std::int64_t, 1>,
+               Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<bool, 1>>;
+
+// The bright places of the first ring that holds the white cell.
+//
+// Places enclosed by three cells are measured as well as possible in ring 0: they are not measured again from
+// farther away, nor are the places that were tried.
+//
+// image (H, W, 3) BGR without gaps; center (N, 2) px; axial (N, 2).
+WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const double, 2> center,
+                                  View<const std::int32_t, 2> axial, const localmap::KnownCells& known,
+                                  const InkColors& inks, const WhiteCellLayout& layout,
+                                  const WhiteSearchLimits& limits);
+
+}  // namespace cmp::numbering

@@ -1,0 +1,56 @@
+// Measures the inks, and the brightness and whiteness of predicted places.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+
+namespace cmp::numbering {
+
+// Limits of whiteness; explained in extractor/numbering/whiteness.py.
+struct WhitenessLimits {
+  double min_channel_balance, sample_radius;
+
+  template <class F>
+  static WhitenessLimits read(const F& f) {
+    return {f["min_channel_balance"], f["sample_radius"]};
+  }
+};
+
+// The inks in the image.
+struct InkColors {
+  View<const double, 2>
+      colors;  // (4, 3) median BGR of red, green and blue in rows 1 to 3; 0 for an absent ink
+  View<const double, 1> strongest;  // (3,) the maximum of each channel
+
+  template <class F>
+  static InkColors read(const F& f) {
+    return {f["colors"], f["strongest"]};
+  }
+};
+
+// The colors of P predicted places.
+struct PlaceColors {
+  Array<double, 1> brightness;  // (P,) relative to the inks
+  Array<double, 1> whiteness;   // (P,) 0 for colored places
+  Array<double, 2> color;       // (P, 3) BGR, 0 outside the image
+};
+
+// The radii and levels (K,) of known cells, and the colors (4, 3) and strongest channels (3,) of the inks.
+//
+// image (H, W, 3) BGR without gaps; center (N, 2) px; area (N,) px^2; ink (N,) of the cells of the image;
+// known (K,), the cells that are measured.
+std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 2>, Array<double, 1>> measure_inks(
+    View<const std::uint8_t, 3> image, View<const double, 2> center, View<const double, 1> area,
+    View<const std::uint8_t, 1> ink, View<const std::int64_t, 1> known, const WhitenessLimits& limits);
+
+// The colors of predicted places.
+//
+// Far from the next cell a prediction may hit a colored cell: there the brightness is the whiteness.
+//
+// image (H, W, 3) BGR without gaps; means (P, 4) of the predicted places; strongest (3,) of the inks;
+// is_far, no known cell touches the places.
+PlaceColors measure_whiteness(View<const std::uint8_t, 3> image, View<const double, 2> means,
+                              View<const double, 1> strongest, bool is_far, const WhitenessLimits& limits);
+
+}  // namespace cmp::numbering

@@ -1,0 +1,39 @@
+// Room "numeric" as Python sees it.
+#include "base/binding.hpp"
+#include "numeric/bilinear.hpp"
+#include "numeric/delaunay.hpp"
+#include "numeric/gaussian.hpp"
+#include "numeric/median.hpp"
+#include "numeric/nearest_points.hpp"
+
+namespace cmp::numeric {
+
+namespace {
+
+// (Q, count) the points (N, 2) that are nearest to each query (Q, 2), the nearest first; count is at most N.
+Array<std::int32_t, 2> nearest_points(View<const double, 2> xy, View<const double, 2> queries, Index count) {
+  if (count > xy.size()) throw nb::value_error("count is larger than the number of points");
+  Array<std::int32_t, 2> index({queries.size(), count});
+  if (xy.size() == 0) return index;
+  Array<double, 1> squared_distance({count});
+  const BucketGrid grid = bucket_grid(xy);
+  for (Index q = 0; q < queries.size(); ++q)
+    fill_nearest_points(grid, queries(q, 0), queries(q, 1), index[q], squared_distance);
+  return index;
+}
+
+void fill(nb::module_& module) {
+  bind<&delaunay>(module, "delaunay", {"points"});
+  bind<&fill_patch_mean>(module, "fill_patch_mean", {"flat", "height", "width", "x", "y", "radius", "out"});
+  bind<&nearest_points>(module, "nearest_points", {"xy", "queries", "count"});
+  bind<&median_of>(module, "median_of", {"values", "count"});
+  bind<&normal_cdf>(module, "normal_cdf", {"z"});
+  bind<&fill_corner_terms>(module, "fill_corner_terms", {"r", "out"});
+  bind<&wedge_correlation>(module, "wedge_correlation", {"squares", "product", "corner"});
+}
+
+const Room room("numeric", fill);
+
+}  // namespace
+
+}  // namespace cmp::numeric

@@ -1,0 +1,28 @@
+// The nearest of many points in the plane, by a grid of buckets.
+#pragma once
+
+#include "base/array.hpp"
+
+namespace cmp::numeric {
+
+// Points sorted into square buckets, row by row.
+struct BucketGrid {
+  View<const double, 2> xy;      // (N, 2) the points, which belong to the caller
+  double low_x, low_y;           // the least coordinates of the points
+  double step;                   // side of a bucket, in the points' unit
+  Index columns;                 // buckets in a row
+  Array<std::int32_t, 1> begin;  // (rows * columns + 1,) index into `order` at which each bucket begins
+  Array<std::int32_t, 1> order;  // (N,) the points' indices, bucket by bucket
+};
+
+// The grid of points (N, 2), finite, at least one. It refers to `xy` without a copy.
+BucketGrid bucket_grid(View<const double, 2> xy);
+
+// Finds the points of a grid that are nearest to (x, y), the nearest first.
+//
+// index (K,) receives the points' indices, squared_distance (K,) their squared distances. Returns how many
+// points were written: the lesser of K and N.
+Index fill_nearest_points(const BucketGrid& grid, double x, double y, View<std::int32_t, 1> index,
+                          View<double, 1> squared_distance);
+
+}  // namespace cmp::numeric

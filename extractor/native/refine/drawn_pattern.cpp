@@ -1,0 +1,74 @@
+#include "refine/drawn_pattern.hpp"
+
+#include "refine/measure/gridline_bending.hpp"
+
+namespace cmp::refine {
+
+namespace {
+
+// What a drawing shows: the image, its pattern, and the picture that is drawn.
+struct DrawingInput {
+  const image::PyramidLevel& view;
+  const layout::Topology& topology;
+  View<const float, 3> picture;
+  const PatternState& state;
+};
+
+// The levels corrected by the residual in the middle of the cells.
+LevelArrays corrected_levels(const DrawingInput& input, const InkLevels& levels,
+                             const InkLevelLimits& limits) {
+  const auto& view = input.view;
+  const auto& topology = input.topology;
+  const auto xy = input.state.xy;
+  const auto light = view.response.light;
+  const auto means = [&](View<const std::int32_t, 2> cells) {
+    return cell_means(view.image, light, input.picture, xy, cells, 0.0, limits.disc);
+  };
+  Array<double, 2> own = means(topology.cells);
+  for (Index i = 0; i < own.size(); ++i) {
+    for (Index channel = 0; channel < 3; ++channel) own(i, channel) += levels.cell(i, channel);
+  }
+  const InkCells cells{topology.cells, topology.black_cells, topology.cell_color};
+  return smoothed_levels(own, means(topology.black_cells), xy, cells, input.state.noise, view, limits);
+}
+
+// Subtracts `others` and divides by `divisor`.
+void update_difference(Array<double, 2>& values, const Array<double, 2>& others, double divisor) {
+  const auto own = values.flat();
+  const auto other = others.view().flat();
+  for (Index k = 0; k < own.size(); ++k) own[k] = (own[k] - other[k]) / divisor;
+}
+
+}  // namespace
+
+DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topology& topology,
+                          View<float, 3> picture, const PatternState& state, const InkLevels& levels,
+                          View<const std::int64_t, 1> box, const DrawingLimits& limits) {
+  const auto xy = state.xy;
+  const auto cells = topology.cells, edges = topology.edges, edge_cells = topology.edge_cells;
+  const double sigma = state.sigma;
+  const auto& frame = view.frame;
+  Array<double, 2> lines =
+      gridlines(xy, state.maps, state.bend, edges, topology.edge_vectors, limits.gridlines);
+  Array<double, 2> sides = gridline_sides(lines, xy, cells, edge_cells, levels, frame);
+  fill_zeros(picture, box);
+  draw_cells({xy, cells, topology.cell_edges, edges, lines}, {levels.cell, levels.slope, sigma}, box,
+             picture);
+  LevelArrays corrected = corrected_levels({view, topology, picture, state}, levels, limits.levels);
+  Array<double, 2> added = gridline_sides(lines, xy, cells, edge_cells, levels_of(corrected), frame);
+  update_difference(added, sides, 1.0);
+  add_black(added, lines, levels.black, frame);
+  const LevelArrays wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma,
+                                           (1.0 + limits.blur_step) * sigma, limits.bleed);
+  Array<double, 2> bleed = gridline_sides(lines, xy, cells, edge_cells, levels_of(wider), frame);
+  update_difference(bleed, sides, limits.blur_step);
+  const Array<bool, 1> bending = bending_gridlines(state.roughness, state.bend, edges);
+  Array<double, 2> sums =
+      accumulate_residual_sums(view, picture, {lines, sides, added, bleed, bending}, sigma, box, limits.rows);
+  Array<double, 2> contrasts = value_contrasts(sides, view.response.encoded);
+  const double edge_px = median_edge(xy, edges, limits.weights);
+  return {std::move(lines),     std::move(sides), std::move(contrasts), std::move(added), std::move(sums),
+          std::move(corrected), edge_px};
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,54 @@
+// Offsets of the gridlines at virtual markers, measured where refinement last compared the image with the
+// pattern.
+#pragma once
+
+#include "base/array.hpp"
+#include "image/pyramid.hpp"
+
+namespace cmp::refine {
+
+// Limits of the offsets; explained in extractor/refine/measure/gridline_offsets.py.
+struct OffsetLimits {
+  double clear_sigma, min_weight_sum, min_offset_weight, band;
+
+  template <class F>
+  static OffsetLimits read(const F& f) {
+    return {f["clear_sigma"], f["min_weight_sum"], f["min_offset_weight"], f["band"]};
+  }
+};
+
+// The gridlines and the levels beside them, where refinement last compared the image with the pattern.
+struct GridlineReading {
+  View<const double, 2> lines;      // (E, 8), as gridlines gives them
+  View<const double, 2> sides;      // (E, 6), the light on both sides, as gridline_sides gives it
+  View<const double, 2> added;      // (E, 6), the light to add to the drawing; the sides where none was drawn
+  View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it; used where nothing was drawn
+  View<const double, 1> weight;     // (E,) 0 to 1
+  View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
+  View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
+  double sigma;                           // px, the blur
+  double noise;                           // gray levels
+  bool drawn;                             // the pattern was drawn
+
+  template <class F>
+  static GridlineReading read(const F& f) {
+    return {f["lines"],          f["sides"],           f["added"], f["clearance"], f["weight"],
+            f["variance_ratio"], f["dot_gain_offset"], f["sigma"], f["noise"],     f["drawn"]};
+  }
+};
+
+// The offsets of the gridlines around their virtual markers, count of each gridline.
+//
+// model (H, W, 3), the light of the drawn pattern; empty where nothing was drawn.
+// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain; px^2, its variance. NaN where the
+// gridline has no contrast or little weight or leaves the image, or where another gridline is near what was
+// not drawn.
+Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
+                                 const GridlineReading& reading, Index count, const OffsetLimits& limits);
+
+// (E, m, 3) x and y, px at full scale, and the variance across the gridline, px^2.
+//
+// lines (E, 8); offsets (E, m, 2), as measure_offsets gives them; scale, full-scale pixels per pixel.
+Array<double, 3> virtual_markers(View<const double, 2> lines, View<const double, 3> offsets, double scale);
+
+}  // namespace cmp::refine

@@ -1,0 +1,130 @@
+// Gradients by shifts of the gridlines, the gridlines' weights by their misfit, and the markers after a step.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+
+namespace cmp::refine {
+
+// Limits of weights, noise and steps; explained in extractor/refine/measure/gridline_weights.py.
+struct GridlineWeightLimits {
+  double min_noise, prior_hidden_px, informed_factor, min_information_share, rim_deviation_px;
+  double min_clean_share, min_marker_weight, min_sigma_px, max_blur_change;
+  double chance_factor, chance_deviations, min_misfit, min_determinant_share, min_determinant, min_edge_px;
+
+  template <class F>
+  static GridlineWeightLimits read(const F& f) {
+    return {f["min_noise"],
+            f["prior_hidden_px"],
+            f["informed_factor"],
+            f["min_information_share"],
+            f["rim_deviation_px"],
+            f["min_clean_share"],
+            f["min_marker_weight"],
+            f["min_sigma_px"],
+            f["max_blur_change"],
+            f["chance_factor"],
+            f["chance_deviations"],
+            f["min_misfit"],
+            f["min_determinant_share"],
+            f["min_determinant"],
+            f["min_edge_px"]};
+  }
+};
+
+// Gradients of the log-likelihood by shifts of the gridlines' ends, times the noise's variance.
+struct ShiftGradients {
+  Array<double, 1> start, end;  // (E,) gray levels^2 / px, by a shift of each end along the normal (-uy, ux)
+};
+
+// The weights of the gridlines.
+struct GridlineWeights {
+  Array<double, 1> weight;  // (E,) 0 to 1
+  double median_misfit;     // gray levels^2, NaN where nothing was read
+  double noise;             // gray levels, NaN where nothing was read
+};
+
+// The markers after a step, (M, 2) px; the same with NaN for markers with little information.
+struct ShiftedMarkers {
+  Array<double, 2> measured, reliable;
+};
+
+// The gradients in the sums (E, 24), copied.
+ShiftGradients shift_gradients(View<const double, 2> sums);
+
+// (E,) gray levels^2: the mean squared residual of each gridline once its ends are moved; NaN where there is
+// none.
+//
+// sums (E, 24); values, of each place: 3 for a pixel and 1 for a sample along the contrast; a gridline with
+// no more than min_places has no misfit.
+Array<double, 1> gridline_misfits(View<const double, 2> sums, const ShiftGradients& gradients, double values,
+                                  double min_places, const GridlineWeightLimits& limits);
+
+// (E,) 0 to 1, the weights of gridlines; 1 where the misfit is below the tolerance or explained by chance.
+//
+// sums (E, 24); misfit (E,) gray levels^2, NaN for none; median_misfit gray levels^2, of gridlines that look
+// like the pattern; tolerance (E,) gray levels^2, a misfit that does not lower the weight; values of each
+// place; default_weight of gridlines that were read but have no misfit.
+Array<double, 1> misfit_weights(View<const double, 2> sums, View<const double, 1> misfit,
+                                double median_misfit, View<const double, 1> tolerance, double values,
+                                double default_weight, const GridlineWeightLimits& limits);
+
+// gray levels^2, the median of the misfits (E,) that are not NaN; NaN without any.
+double median_of_misfits(View<const double, 1> misfit, const GridlineWeightLimits& limits);
+
+// The weights of gridlines, 1 for those that look like the pattern once their ends are moved.
+//
+// The arguments are those of gridline_misfits and misfit_weights.
+GridlineWeights weigh_gridlines(View<const double, 2> sums, const ShiftGradients& gradients,
+                                View<const double, 1> tolerance, double values, double min_places,
+                                double default_weight, const GridlineWeightLimits& limits);
+
+// (M,), the markers whose gridlines have enough weight (E,); spokes (M, 6).
+Array<bool, 1> well_weighted_markers(View<const double, 1> weight, View<const std::int32_t, 2> spokes,
+                                     const GridlineWeightLimits& limits);
+
+// Two lengths, px, that all edges exceed but for one in `rarity`, and but for one in `other_rarity`.
+//
+// xy (M, 2) px; edges (E, 2); other_rarity is not greater than rarity. 0 and 0 without any known edge.
+std::tuple<double, double> short_edges(View<const double, 2> xy, View<const std::int32_t, 2> edges,
+                                       Index rarity, Index other_rarity);
+
+// The median length of the edges (E, 2), px; limits.min_edge_px without any.
+double median_edge(View<const double, 2> xy, View<const std::int32_t, 2> edges,
+                   const GridlineWeightLimits& limits);
+
+// The change of the blur, px, that the gridlines' pixels ask for, once the ends of each gridline are moved.
+//
+// sums (E, 24); gridline_weight (E,) 0 to 1.
+double blur_change(View<const double, 2> sums, View<const double, 1> gridline_weight,
+                   const GridlineWeightLimits& limits);
+
+// The blur, px, where gridlines show a change, px, of the drawn blur sigma, px.
+double blur_after_step(double sigma, double change, const GridlineWeightLimits& limits);
+
+// Takes a change of the blur, px, out of the sums (E, 24) and the gradients.
+void update_for_blur(View<double, 2> sums, ShiftGradients& gradients, double change);
+
+// (M,) 1/px^2, the information about each of `count` markers in its worst direction, with bending taken as
+// known.
+//
+// sums (E, 24), weight (E,), lines (E, 8), edges (E, 2); variance of the noise, gray levels^2.
+Array<double, 1> least_information(View<const double, 2> sums, View<const double, 1> weight,
+                                   View<const double, 2> lines, View<const std::int32_t, 2> edges,
+                                   double variance, Index count);
+
+// The markers after a step.
+//
+// xy (M, 2) px; shift (M, 2) px; information (M,) 1/px^2, as least_information gives it; weight (E,) 0 to 1;
+// spokes (M, 6).
+ShiftedMarkers markers_after_shift(View<const double, 2> xy, View<const double, 2> shift,
+                                   View<const double, 1> information, View<const double, 1> weight,
+                                   View<const std::int32_t, 2> spokes, const GridlineWeightLimits& limits);
+
+// (4,) px, x from, y from, x to, y to: the part of the image with the pattern and a margin, px.
+//
+// xy (M, 2) px, NaN where unknown; zeros where no marker is known.
+Array<std::int64_t, 1> pattern_box(View<const double, 2> xy, double margin, Index width, Index height);
+
+}  // namespace cmp::refine

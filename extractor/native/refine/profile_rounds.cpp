@@ -1,0 +1,70 @@
+#include "refine/profile_rounds.hpp"
+
+#include "refine/synthesis/residual_kernel.hpp"
+
+namespace cmp::refine {
+
+namespace {
+
+// (E,) 0 to 1: weights of gridlines that are judged only around markers where little else is measured.
+Array<double, 1> lenient_weights(View<const double, 1> profile_weight, View<const double, 2> sums,
+                                 View<const std::int32_t, 2> edges, View<const std::int32_t, 2> spokes,
+                                 const OutlierLimits& limits) {
+  Array<bool, 1> read({sums.size()});
+  for (Index e = 0; e < sums.size(); ++e) read[e] = sums(e, AA) > 0.0;
+  const Array<bool, 1> suspect = suspect_markers<bool>(profile_weight, read, spokes, limits);
+  Array<double, 1> out({edges.size()});
+  for (Index e = 0; e < edges.size(); ++e) {
+    const bool is_judged = suspect[edges(e, 0)] || suspect[edges(e, 1)];
+    out[e] = is_judged ? profile_weight[e] : read[e] ? 1.0 : 0.0;
+  }
+  return out;
+}
+
+// (E,) squared gray levels: the misfit by glare and uneven light that does not lower a gridline's weight.
+Array<double, 1> pardoned_misfit(View<const double, 2> clearance, double tolerance) {
+  Array<double, 1> out({clearance.size()});
+  for (Index e = 0; e < clearance.size(); ++e)
+    out[e] = tolerance * tolerance * clearance(e, SQUARED_CONTRAST);
+  return out;
+}
+
+}  // namespace
+
+ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> lines,
+                         const EdgeContrasts& across, const PatternState& state,
+                         const layout::Topology& topology, Index stations, bool judged,
+                         const ProfileLimits& limits) {
+  const auto contrasts = across.contrasts;
+  const auto edges = topology.edges, spokes = topology.spokes, edge_cells = topology.edge_cells;
+  const auto& rule = limits.rule;
+  const Array<bool, 1> bending = bending_gridlines(state.roughness, state.bend, edges);
+  Array<double, 2> sums = read_profiles(view, lines, across, state.sigma, bending, stations, limits.rows);
+  ShiftGradients gradients = shift_gradients(sums);
+  const double dot_gain =
+      measure_dot_gain(sums, gradients, contrasts, edge_cells, state.sigma, limits.dot_gain);
+  Array<double, 1> dot_gain_offset =
+      update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
+  EliminatedBending bent = update_for_bending(sums, gradients, {state.bend, state.roughness, state.weight},
+                                              lines, edges, state.noise, rule, limits.step);
+  const Array<double, 1> pardon = pardoned_misfit(across.clearance, limits.misfit_tolerance);
+  Array<double, 1> profile_weight =
+      weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
+                      static_cast<double>(rule.min_places), rule.default_weight, limits.step.weights)
+          .weight;
+  Array<double, 1> weight = judged ? Array<double, 1>(profile_weight.view())
+                                   : lenient_weights(profile_weight, sums, edges, spokes, limits.outliers);
+  const GridlineSystem system{sums,  weight, lines,       contrasts,
+                              edges, spokes, state.sigma, state.noise * state.noise};
+  WeighedSolution solved = solve_weighed(system, gradients, state.bend, bent.response,
+                                         {state.xy, state.hidden}, false, judged, limits.step);
+  return {std::move(profile_weight),
+          std::move(weight),
+          std::move(solved.variance_ratio),
+          std::move(bent.variance),
+          dot_gain,
+          std::move(dot_gain_offset),
+          as_tuple(std::move(solved.solution))};
+}
+
+}  // namespace cmp::refine

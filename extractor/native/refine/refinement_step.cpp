@@ -1,0 +1,99 @@
+#include "refine/refinement_step.hpp"
+
+#include <cmath>
+
+namespace cmp::refine {
+
+namespace {
+
+template <int N>
+bool has_any(View<const double, N> values) {
+  const auto all = values.flat();
+  return std::any_of(all.begin(), all.end(), [](double value) { return value != 0.0; });
+}
+
+}  // namespace
+
+ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
+                                        const GridlineLimits& limits) {
+  const auto near = topology.ring_markers;
+  const auto offset = topology.ring_vectors;
+  Array<double, 3> maps = local_maps(xy, near, offset, topology.derivative_stencil, limits);
+  ExtrapolatedMarkers markers = extrapolate_markers(xy, maps, near, offset);
+  return {std::move(markers.xy), std::move(markers.predicted), std::move(maps)};
+}
+
+EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradients,
+                                     const BendingPrior& prior, View<const double, 2> lines,
+                                     View<const std::int32_t, 2> edges, double noise, const MisfitRule& rule,
+                                     const StepLimits& limits) {
+  Array<double, 1> bend_variance({sums.size()}, 0.0);
+  double variance = 1.0;
+  if (has_any(prior.roughness) || has_any(prior.bend)) {
+    // a misfit that all gridlines have is not bending; without tolerance, as the variances are still 0
+    const double found =
+        weigh_gridlines(sums, gradients, bend_variance, static_cast<double>(rule.values),
+                        static_cast<double>(rule.min_places), rule.default_weight, limits.weights)
+            .noise;
+    const double most = std::isfinite(found) ? std::max(noise, found) : noise;
+    variance = most * most;
+    bend_variance = estimate_bend_variance(sums, gradients, prior, lines, edges, variance, limits.bending);
+  }
+  auto response = update_without_bending(sums, gradients, prior.bend, bend_variance, variance);
+  return {std::move(bend_variance), std::move(response)};
+}
+
+StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
+                        View<const double, 2> bend, View<const double, 2> bend_response,
+                        const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits) {
+  const auto lines = system.lines;
+  const auto edges = system.edges;
+  InformationArrays information =
+      fisher_information(system, prior_information(drawn.hidden, limits), overlapping, limits.information);
+  const Array<double, 2> right = gradient(system, gradients.start, gradients.end);
+  const Array<double, 2> shift =
+      solve_shifts(information.diagonal, information.off_diagonal, edges, right, limits.information);
+  const Array<double, 1> least =
+      least_information(system.sums, system.weight, lines, edges, system.variance, drawn.xy.size());
+  ShiftedMarkers markers =
+      markers_after_shift(drawn.xy, shift, least, system.weight, system.spokes, limits.weights);
+  return {std::move(markers.measured), std::move(markers.reliable),
+          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending), std::move(information)};
+}
+
+WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
+                              View<const double, 2> bend, View<const double, 2> bend_response,
+                              const DrawnMarkers& drawn, bool overlapping, bool judged,
+                              const StepLimits& limits) {
+  WeighedSolution out{Array<double, 1>({system.weight.size()}, 1.0),
+                      solve_step(system, gradients, bend, bend_response, drawn, overlapping, limits)};
+  if (!judged) return out;
+  Array<double, 2> shift(drawn.xy.shape());
+  for (Index m = 0; m < shift.size(); ++m) {
+    for (Index axis = 0; axis < 2; ++axis)
+      shift(m, axis) = out.solution.measured(m, axis) - drawn.xy(m, axis);
+  }
+  out.variance_ratio = variance_ratios(system, gradients, shift, limits.disagreement);
+  Array<double, 1> weight({system.weight.size()});
+  for (Index e = 0; e < weight.size(); ++e) weight[e] = system.weight[e] / out.variance_ratio[e];
+  GridlineSystem weighed = system;
+  weighed.weight = weight;
+  out.solution = solve_step(weighed, gradients, bend, bend_response, drawn, overlapping, limits);
+  return out;
+}
+
+SolutionArrays as_tuple(StepSolution&& solution) {
+  InformationArrays& information = solution.information;
+  return {std::move(solution.measured), std::move(solution.reliable), std::move(solution.bend),
+          std::tuple(std::move(information.diagonal), std::move(information.off_diagonal))};
+}
+
+Array<double, 1> prior_information(View<const bool, 1> hidden, const StepLimits& limits) {
+  const double of_hidden = 1.0 / (limits.weights.prior_hidden_px * limits.weights.prior_hidden_px);
+  const double of_visible = 1.0 / (limits.prior_px * limits.prior_px);
+  Array<double, 1> out({hidden.size()});
+  for (Index m = 0; m < hidden.size(); ++m) out[m] = hidden[m] ? of_hidden : of_visible;
+  return out;
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,104 @@
+// What every step of refinement does, by profiles or by synthesis: bending of the gridlines, then the
+// markers.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+#include "layout/topology.hpp"
+#include "refine/measure/gridline_bending.hpp"
+#include "refine/measure/gridline_weights.hpp"
+#include "refine/solve/disagreement.hpp"
+#include "refine/solve/fisher_information.hpp"
+#include "refine/synthesis/gridlines.hpp"
+
+namespace cmp::refine {
+
+// How a gridline is weighed by its misfit.
+struct MisfitRule {
+  Index values, min_places;  // that each pixel or sample adds; pixels or samples, above which it is weighed
+  double default_weight;     // of a gridline with fewer
+
+  template <class F>
+  static MisfitRule read(const F& f) {
+    return {f["values"], f["min_places"], f["default_weight"]};
+  }
+};
+
+// Limits of a step; explained in extractor/refine/refinement_step.py.
+struct StepLimits {
+  double prior_px;
+  GridlineWeightLimits weights;
+  BendingLimits bending;
+  InformationLimits information;
+  DisagreementLimits disagreement;
+
+  template <class F>
+  static StepLimits read(const F& f) {
+    return {f["prior_px"], f["weights"], f["bending"], f["information"], f["disagreement"]};
+  }
+};
+
+// The bending of the gridlines as it was eliminated.
+struct EliminatedBending {
+  Array<double, 1> variance;  // (E,) px^2
+  Array<double, 2> response;  // (E, 6), as update_without_bending gives it
+};
+
+// The markers as drawn.
+struct DrawnMarkers {
+  View<const double, 2> xy;    // (M, 2) px
+  View<const bool, 1> hidden;  // (M,)
+};
+
+// Markers and gridlines after a step; the arrays as in Estimate.
+struct StepSolution {
+  Array<double, 2> measured, reliable, bend;
+  InformationArrays information;
+};
+
+// The same with (E,) the ratio of the variance along each gridline to that of noise.
+struct WeighedSolution {
+  Array<double, 1> variance_ratio;
+  StepSolution solution;
+};
+
+// measured, reliable and bend of StepSolution, and the blocks of its information.
+using SolutionArrays = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>,
+                                  std::tuple<Array<double, 2>, Array<double, 2>>>;
+
+// xy (M, 2), hidden (M,) and maps (M, 2, 5) of ExtrapolatedPattern.
+using ExtrapolatedPattern = std::tuple<Array<double, 2>, Array<bool, 1>, Array<double, 3>>;
+
+// The markers (M, 2) px, NaN where unknown, with those just beyond the known ones.
+ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
+                                        const GridlineLimits& limits);
+
+// Eliminates the bending of gridlines from the sums (E, 24) and the gradients.
+//
+// lines (E, 8) and edges (E, 2); noise, gray levels, one channel.
+EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradients,
+                                     const BendingPrior& prior, View<const double, 2> lines,
+                                     View<const std::int32_t, 2> edges, double noise, const MisfitRule& rule,
+                                     const StepLimits& limits);
+
+// Moves the markers by the shifts that the gradients ask for.
+//
+// system and gradients, bending eliminated from both; bend (E, 2) px and bend_response (E, 6), as
+// bend_after_shift takes them; overlapping, the sums include the gridlines' ends.
+StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
+                        View<const double, 2> bend, View<const double, 2> bend_response,
+                        const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits);
+
+// The same; where judged, once more with the gridlines' weights divided by variance_ratios, which else are 1.
+WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
+                              View<const double, 2> bend, View<const double, 2> bend_response,
+                              const DrawnMarkers& drawn, bool overlapping, bool judged,
+                              const StepLimits& limits);
+
+SolutionArrays as_tuple(StepSolution&& solution);
+
+// (M,) 1/px^2, the information about each marker before it is measured; hidden (M,).
+Array<double, 1> prior_information(View<const bool, 1> hidden, const StepLimits& limits);
+
+}  // namespace cmp::refine

@@ -1,0 +1,50 @@
+#include "refine/solve/convergence.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace cmp::refine {
+
+namespace {
+
+// The median of the numbers that are not NaN; NaN without any.
+double median_of_known(View<const double, 1> values) {
+  Array<double, 1> known({values.size()});
+  double* const begin = known.begin();
+  double* const end =
+      std::copy_if(values.begin(), values.end(), begin, [](double v) { return !std::isnan(v); });
+  if (begin == end) return std::numeric_limits<double>::quiet_NaN();
+  double* const middle = begin + (end - begin) / 2;
+  std::nth_element(begin, middle, end);
+  return (end - begin) % 2 != 0 ? *middle : (*std::max_element(begin, middle) + *middle) / 2;
+}
+
+}  // namespace
+
+Array<double, 3> convergence_covariance(View<const double, 2> shift, double sigma, double remaining_share,
+                                        const ConvergenceLimits& limits) {
+  const Index count = shift.size();
+  Array<double, 3> out({count, 2, 2}, 0.0);
+  Array<double, 1> square({count});
+  const auto cov = out.view();
+  for (Index m = 0; m < count; ++m) {
+    const double x = shift(m, 0), y = shift(m, 1);
+    square[m] = x * x + y * y;
+    const double share =
+        std::min(limits.remaining_share * std::sqrt(square[m]) / sigma, limits.max_remaining_share);
+    cov(m, 0, 0) = (share * x) * (share * x);
+    cov(m, 1, 1) = (share * y) * (share * y);
+    cov(m, 0, 1) = cov(m, 1, 0) = share * share * x * y;
+  }
+  if (remaining_share > 0.0) {
+    const double share = std::min(remaining_share, 1.0);
+    const double variance = 0.5 * (share * share) * limits.mean_over_median * median_of_known(square);
+    for (Index m = 0; m < count; ++m) {
+      cov(m, 0, 0) += variance;
+      cov(m, 1, 1) += variance;
+    }
+  }
+  return out;
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,203 @@
+#include "refine/solve/fisher_information.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "refine/solve/ring_elimination.hpp"
+#include "refine/synthesis/gridlines.hpp"
+#include "refine/synthesis/residual_kernel.hpp"
+
+namespace cmp::refine {
+
+namespace {
+
+// Writes the product of the matrix and a vector (M, 2) into out (M, 2).
+void fill_product(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
+                  View<const std::int32_t, 2> edges, View<const double, 2> vector, View<double, 2> out) {
+  for (Index m = 0; m < diagonal.size(); ++m) {
+    const double x = vector(m, 0), y = vector(m, 1);
+    out(m, 0) = diagonal(m, 0) * x + diagonal(m, 1) * y;
+    out(m, 1) = diagonal(m, 1) * x + diagonal(m, 2) * y;
+  }
+  for (Index e = 0; e < edges.size(); ++e) {
+    const double b0 = off_diagonal(e, 0), b1 = off_diagonal(e, 1), b2 = off_diagonal(e, 2),
+                 b3 = off_diagonal(e, 3);
+    if (b0 == 0.0 && b3 == 0.0) continue;
+    const Index a = edges(e, 0), b = edges(e, 1);
+    const double ax = vector(a, 0), ay = vector(a, 1), bx = vector(b, 0), by = vector(b, 1);
+    out(a, 0) += b0 * bx + b1 * by;
+    out(a, 1) += b2 * bx + b3 * by;
+    out(b, 0) += b0 * ax + b2 * ay;
+    out(b, 1) += b1 * ax + b3 * ay;
+  }
+}
+
+// (M, 3) the inverses of the diagonal blocks.
+Array<double, 2> inverse_blocks(View<const double, 2> diagonal) {
+  Array<double, 2> out({diagonal.size(), 3});
+  const auto inverse = out.view();
+  for (Index m = 0; m < diagonal.size(); ++m) {
+    const double xx = diagonal(m, 0), xy = diagonal(m, 1), yy = diagonal(m, 2);
+    const double determinant = xx * yy - xy * xy;
+    inverse(m, 0) = yy / determinant;
+    inverse(m, 1) = -xy / determinant;
+    inverse(m, 2) = xx / determinant;
+  }
+  return out;
+}
+
+// Writes the preconditioned residual (M, 2) into descent; the product of the two.
+double fill_descent(View<const double, 2> inverse, View<const double, 2> residual, View<double, 2> descent) {
+  double total = 0.0;
+  for (Index m = 0; m < residual.size(); ++m) {
+    const double x = residual(m, 0), y = residual(m, 1);
+    const double dx = inverse(m, 0) * x + inverse(m, 1) * y, dy = inverse(m, 1) * x + inverse(m, 2) * y;
+    descent(m, 0) = dx;
+    descent(m, 1) = dy;
+    total += x * dx + y * dy;
+  }
+  return total;
+}
+
+// The product of two vectors (M, 2).
+double dot(View<const double, 2> one, View<const double, 2> other) {
+  double total = 0.0;
+  for (Index m = 0; m < one.size(); ++m) total += one(m, 0) * other(m, 0) + one(m, 1) * other(m, 1);
+  return total;
+}
+
+// The numbers of the selected markers that are known.
+Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_information,
+                                     View<const bool, 1> selected) {
+  Array<std::int64_t, 1> out({selected.size()});
+  Index count = 0;
+  for (Index m = 0; m < selected.size(); ++m) {
+    if (selected[m] && diagonal(m, 0) + diagonal(m, 2) > min_information) out[count++] = m;
+  }
+  return out.first(count);
+}
+
+}  // namespace
+
+InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
+                                     bool overlapping, const InformationLimits& limits) {
+  const auto sums = system.sums, lines = system.lines;
+  const auto edges = system.edges;
+  InformationArrays out{Array<double, 2>({system.spokes.size(), 3}),
+                        Array<double, 2>({edges.size(), 4}, 0.0)};
+  const auto diagonal = out.diagonal.view(), off_diagonal = out.off_diagonal.view();
+  for (Index m = 0; m < diagonal.size(); ++m) {
+    diagonal(m, 0) = diagonal(m, 2) = prior[m];
+    diagonal(m, 1) = 0.0;
+  }
+  const double own = 1.0 + limits.smooth_map_coupling, between = 1.0 - limits.smooth_map_coupling;
+  for (Index e = 0; e < edges.size(); ++e) {
+    const double w = system.weight[e] * lines(e, KNOWN) / system.variance;
+    if (w == 0.0) continue;
+    const double nx = -lines(e, UY), ny = lines(e, UX);
+    for (Index side = 0; side < 2; ++side) {
+      const Index m = edges(e, side);
+      const double value = w * own * (side == 0 ? sums(e, AA) : sums(e, BB));
+      diagonal(m, 0) += value * nx * nx;
+      diagonal(m, 1) += value * nx * ny;
+      diagonal(m, 2) += value * ny * ny;
+    }
+    const double value = w * between * sums(e, AB);
+    off_diagonal(e, 0) += value * nx * nx;
+    off_diagonal(e, 1) += value * nx * ny;
+    off_diagonal(e, 2) += value * ny * nx;
+    off_diagonal(e, 3) += value * ny * ny;
+  }
+  if (overlapping) add_shared_pixels(system, diagonal, off_diagonal, limits.shared);
+  return out;
+}
+
+Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gradient_start,
+                          View<const double, 1> gradient_end) {
+  const auto lines = system.lines;
+  const auto edges = system.edges;
+  Array<double, 2> out({system.spokes.size(), 2}, 0.0);
+  const auto at = out.view();
+  for (Index e = 0; e < edges.size(); ++e) {
+    if (lines(e, KNOWN) == 0.0) continue;
+    const double nx = -lines(e, UY), ny = lines(e, UX);
+    for (Index side = 0; side < 2; ++side) {
+      const Index m = edges(e, side);
+      const double value =
+          system.weight[e] * (side == 0 ? gradient_start[e] : gradient_end[e]) / system.variance;
+      at(m, 0) += value * nx;
+      at(m, 1) += value * ny;
+    }
+  }
+  return out;
+}
+
+Array<double, 2> solve_shifts(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
+                              View<const std::int32_t, 2> edges, View<const double, 2> right,
+                              const InformationLimits& limits) {
+  const Index count = diagonal.size();
+  const Array<double, 2> inverse = inverse_blocks(diagonal);
+  Array<double, 2> residuals(right), shifts({count, 2}, 0.0), searches({count, 2}, 0.0);
+  Array<double, 2> products({count, 2}), descents({count, 2});
+  const auto residual = residuals.view(), shift = shifts.view(), search = searches.view();
+  const auto product = products.view(), descent = descents.view();
+  double before = 1.0, start = 0.0;
+  for (Index step = 0; step < limits.max_steps; ++step) {
+    const double now = fill_descent(inverse, residual, descent);
+    if (step == 0) start = now;
+    if (!(now > limits.precision * limits.precision * start)) break;
+    const double blend = step > 0 ? now / before : 0.0;
+    for (Index m = 0; m < count; ++m) {
+      search(m, 0) = descent(m, 0) + blend * search(m, 0);
+      search(m, 1) = descent(m, 1) + blend * search(m, 1);
+    }
+    fill_product(diagonal, off_diagonal, edges, search, product);
+    const double curvature = dot(search, product);
+    if (!(curvature > 0.0)) break;
+    const double length = now / curvature;
+    for (Index m = 0; m < count; ++m) {
+      for (Index axis = 0; axis < 2; ++axis) {
+        shift(m, axis) += length * search(m, axis);
+        residual(m, axis) -= length * product(m, axis);
+      }
+    }
+    before = now;
+  }
+  return shifts;
+}
+
+Array<double, 3> covariances(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
+                             View<const std::int32_t, 2> edges, View<const std::int32_t, 2> spokes,
+                             double min_information, View<const bool, 1> selected,
+                             const InformationLimits& limits) {
+  Array<double, 3> out({diagonal.size(), 2, 2}, std::numeric_limits<double>::quiet_NaN());
+  const auto cov = out.view();
+  const Array<std::int64_t, 1> asked = known_markers(diagonal, min_information, selected);
+  const EliminationBlocks blocks = prepare_elimination(diagonal, off_diagonal, edges, spokes);
+  RingLanes ring;
+  const auto& middle_xx = ring.tail[MIDDLE];
+  const auto& middle_xy = ring.tail[MIDDLE + 1];
+  const auto& middle_yy = ring.tail[MIDDLE + 2];
+  for (Index start = 0; start < asked.size(); start += RING_LANES) {
+    const auto markers = asked.view().slice(start, std::min(start + RING_LANES, asked.size()));
+    ring.clear();
+    for (Index lane = 0; lane < markers.size(); ++lane) {
+      fill_ring(markers[lane], lane, blocks, ring);
+      for (Index c = 0; c < 3; ++c) ring.tail[MIDDLE + c][lane] = diagonal(markers[lane], c);
+    }
+    update_without_ring(ring);
+    for (Index lane = 0; lane < markers.size(); ++lane) {
+      const Index m = markers[lane];
+      const double xx = middle_xx[lane], xy = middle_xy[lane], yy = middle_yy[lane];
+      const double determinant = xx * yy - xy * xy, trace = xx + yy;
+      if (xx > 0.0 && determinant > limits.min_determinant * (trace * trace) && trace > min_information) {
+        cov(m, 0, 0) = yy / determinant;
+        cov(m, 1, 1) = xx / determinant;
+        cov(m, 0, 1) = cov(m, 1, 0) = -xy / determinant;
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,87 @@
+// The Fisher information matrix of the markers, its sparse solution and the diagonal blocks of its inverse.
+#pragma once
+
+#include "base/array.hpp"
+#include "refine/solve/shared_pixels.hpp"
+
+namespace cmp::refine {
+
+// Blocks of the information matrix, 1/px^2.
+struct Information {
+  View<const double, 2> diagonal;      // (M, 3) xx, xy, yy of every marker
+  View<const double, 2> off_diagonal;  // (E, 4) xx, xy, yx, yy from an edge's smaller to its larger marker
+
+  template <class F>
+  static Information read(const F& f) {
+    return {f["diagonal"], f["off_diagonal"]};
+  }
+};
+
+// The same, with memory of its own.
+struct InformationArrays {
+  Array<double, 2> diagonal, off_diagonal;
+
+  operator Information() const { return {diagonal, off_diagonal}; }
+};
+
+// Gridlines with the measurements along them, and the markers that they join.
+struct GridlineSystem {
+  View<const double, 2> sums;          // (E, 24) sums over the pixels, columns of residual_kernel
+  View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
+  View<const double, 2> lines;         // (E, 8), as gridlines gives them
+  View<const double, 2> contrasts;     // (E, 3) gray levels
+  View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
+  View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
+  double sigma;                        // the blur, px
+  double variance;                     // of the noise, squared gray levels, one channel
+};
+
+// Limits of the information; explained in extractor/refine/solve/fisher_information.py.
+struct InformationLimits {
+  double smooth_map_coupling, held_information;
+  Index max_steps;
+  double precision, min_determinant;
+  SharedPixelLimits shared;
+
+  template <class F>
+  static InformationLimits read(const F& f) {
+    return {f["smooth_map_coupling"], f["held_information"], f["max_steps"],
+            f["precision"],           f["min_determinant"],  f["shared"]};
+  }
+};
+
+// The information about the markers.
+//
+// prior (M,) 1/px^2, before the measurement; overlapping, the sums include the gridlines' ends, where
+// gridlines share their pixels.
+InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
+                                     bool overlapping, const InformationLimits& limits);
+
+// (M, 2) 1/px, the gradient of the log-likelihood at each marker.
+//
+// gradient_start, gradient_end (E,) squared gray levels / px, along the normal of each gridline at its ends.
+Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gradient_start,
+                          View<const double, 1> gradient_end);
+
+// (M, 2) px, the shifts of the markers, by conjugate gradients preconditioned with the diagonal blocks.
+//
+// The descent ends early where the whole matrix is not positive definite. diagonal (M, 3) positive definite
+// blocks and off_diagonal (E, 4), 1/px^2; edges (E, 2), the markers that each off-diagonal block joins; right
+// (M, 2) 1/px, the gradient.
+Array<double, 2> solve_shifts(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
+                              View<const std::int32_t, 2> edges, View<const double, 2> right,
+                              const InformationLimits& limits);
+
+// (M, 2, 2) px^2, the markers' covariances: diagonal blocks of the inverse, from each marker and its
+// neighbours; NaN where nothing is known and where not selected.
+//
+// The markers beyond the neighbours are eliminated one by one, as if they were not connected to each other,
+// then the neighbours. diagonal (M, 3) and off_diagonal (E, 4), 1/px^2; edges (E, 2) and spokes (M, 6), as in
+// Topology; min_information 1/px^2, below which a marker counts as unknown; selected (M,), the markers to
+// compute.
+Array<double, 3> covariances(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
+                             View<const std::int32_t, 2> edges, View<const std::int32_t, 2> spokes,
+                             double min_information, View<const bool, 1> selected,
+                             const InformationLimits& limits);
+
+}  // namespace cmp::refine

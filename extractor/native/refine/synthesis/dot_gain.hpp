@@ -1,0 +1,45 @@
+// Dot gain: all cells look larger than they are, by the same width, as inks run out or the camera is not
+// linear.
+//
+// Every gridline then lies off towards the black beside the gridline. Around a marker where colored and black
+// cells alternate this cancels. At the pattern's rim it does not: an acute corner there moves outward by
+// several widths.
+#pragma once
+
+#include "base/array.hpp"
+#include "refine/measure/gridline_weights.hpp"
+
+namespace cmp::refine {
+
+// Limits of dot gain; explained in extractor/refine/synthesis/dot_gain.py.
+struct DotGainLimits {
+  Index min_gridlines, max_gridlines;
+  double min_dot_gain, min_sine;
+
+  template <class F>
+  static DotGainLimits read(const F& f) {
+    return {f["min_gridlines"], f["max_gridlines"], f["min_dot_gain"], f["min_sine"]};
+  }
+};
+
+// px, the dot gain: the median shift outward of the sides of cells at the pattern's rim; 0 where the shift is
+// small, or few gridlines were read.
+//
+// sums (E, 24), as accumulate_residual_sums gives them; contrasts (E, 3) gray levels; edge_cells (E, 2) the
+// drawn cells on both sides, -1 for none; sigma px, the blur.
+double measure_dot_gain(View<const double, 2> sums, const ShiftGradients& gradients,
+                        View<const double, 2> contrasts, View<const std::int32_t, 2> edge_cells, double sigma,
+                        const DotGainLimits& limits);
+
+// Removes a dot gain, px, from the gridlines' sums (E, 24) and gradients, in place.
+//
+// (E,) px, the shift of each gridline along its normal by the dot gain.
+Array<double, 1> update_without_dot_gain(View<double, 2> sums, ShiftGradients& gradients,
+                                         View<const double, 2> contrasts,
+                                         View<const std::int32_t, 2> edge_cells, double dot_gain);
+
+// (M, 2) px: markers xy, which are means of the corners of the enlarged cells (K, 3), moved back inward.
+Array<double, 2> markers_without_dot_gain(View<const double, 2> xy, View<const std::int32_t, 2> cells,
+                                          double dot_gain, const DotGainLimits& limits);
+
+}  // namespace cmp::refine

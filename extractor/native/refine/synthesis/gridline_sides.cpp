@@ -1,0 +1,93 @@
+#include "refine/synthesis/gridline_sides.hpp"
+
+#include <cmath>
+
+#include "image/response.hpp"
+#include "refine/synthesis/gridlines.hpp"
+
+namespace cmp::refine {
+
+namespace {
+
+struct Point {
+  double x, y;
+};
+
+// The middle of the chord of a gridline (8,), px.
+Point chord_middle(View<const double, 1> line) {
+  const double half = 0.5 * line[LENGTH];
+  return {line[X] + half * line[UX], line[Y] + half * line[UY]};
+}
+
+// The centroid of a cell (3,), px.
+Point cell_centroid(View<const double, 2> xy, View<const std::int32_t, 1> cell) {
+  const Index a = cell[0], b = cell[1], c = cell[2];
+  return {(xy(a, 0) + xy(b, 0) + xy(c, 0)) / 3, (xy(a, 1) + xy(b, 1) + xy(c, 1)) / 3};
+}
+
+}  // namespace
+
+Array<double, 2> gridline_sides(View<double, 2> lines, View<const double, 2> xy,
+                                View<const std::int32_t, 2> cells, View<const std::int32_t, 2> edge_cells,
+                                const InkLevels& levels, const image::PolynomialFrame& frame) {
+  Array<double, 2> sides({lines.size(), SIDE_COLUMNS}, 0.0);
+  const auto out = sides.view();
+  const auto cell = levels.cell;
+  const auto slope = levels.slope;
+  for (Index e = 0; e < lines.size(); ++e) {
+    const auto line = lines[e];
+    if (line[KNOWN] == 0.0) continue;
+    const auto [mx, my] = chord_middle(line);
+    for (Index k = 0; k < 2; ++k) {
+      const Index i = edge_cells(e, k);
+      if (i < 0) continue;
+      const auto [cx, cy] = cell_centroid(xy, cells[i]);
+      if (!std::isfinite(cx)) {
+        // a cell with an unknown corner is not drawn, and no gridline beside that cell is read
+        line[KNOWN] = 0.0;
+        break;
+      }
+      const Index side = (cy - my) * line[UX] - (cx - mx) * line[UY] > 0.0 ? BEYOND : BEFORE;
+      for (Index channel = 0; channel < 3; ++channel) {
+        const double rise = slope(i, channel, 0) * (mx - cx) + slope(i, channel, 1) * (my - cy);
+        out(e, side + channel) += cell(i, channel) + rise;
+      }
+    }
+    if (line[KNOWN] == 0.0) out[e].fill(0.0);
+  }
+  add_black(out, lines, levels.black, frame);
+  return sides;
+}
+
+void add_black(View<double, 2> sides, View<const double, 2> lines, View<const double, 2> black,
+               const image::PolynomialFrame& frame) {
+  for (Index e = 0; e < lines.size(); ++e) {
+    const auto line = lines[e];
+    if (line[KNOWN] == 0.0) continue;
+    const auto [mx, my] = chord_middle(line);
+    const Monomials terms = monomials((mx - frame.x) / frame.scale, (my - frame.y) / frame.scale);
+    std::array<double, 3> level{};
+    for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) {
+      for (Index channel = 0; channel < 3; ++channel) level[channel] += terms[k] * black(channel, k);
+    }
+    for (Index channel = 0; channel < 3; ++channel) {
+      sides(e, BEFORE + channel) += level[channel];
+      sides(e, BEYOND + channel) += level[channel];
+    }
+  }
+}
+
+Array<double, 2> value_contrasts(View<const double, 2> sides, View<const float, 1> encoded) {
+  Array<double, 2> out({sides.size(), 3});
+  for (Index e = 0; e < sides.size(); ++e) {
+    for (Index channel = 0; channel < 3; ++channel) {
+      const auto before = static_cast<float>(sides(e, BEFORE + channel));
+      const auto beyond = static_cast<float>(sides(e, BEYOND + channel));
+      const float contrast = encoded[image::table_place(before)] - encoded[image::table_place(beyond)];
+      out(e, channel) = static_cast<double>(contrast);
+    }
+  }
+  return out;
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,170 @@
+#include "refine/synthesis/gridlines.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace cmp::refine {
+
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+// The first derivatives of x and y by the layout's x (u) and y (v).
+struct FirstDerivatives {
+  double xu, xv, yu, yv;
+};
+
+// NaN where a neighbour is unknown. near (K,), stencil (2, K).
+FirstDerivatives cubic_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
+                                   View<const double, 2> stencil) {
+  const auto to_u = stencil[0], to_v = stencil[1];
+  const double x = xy(m, 0), y = xy(m, 1);
+  double xu = 0.0, xv = 0.0, yu = 0.0, yv = 0.0;
+  for (Index k = 0; k < near.size(); ++k) {
+    const Index n = near[k];
+    const double dx = xy(n, 0) - x, dy = xy(n, 1) - y, u = to_u[k], v = to_v[k];
+    xu += u * dx;
+    xv += v * dx;
+    yu += u * dy;
+    yv += v * dy;
+  }
+  return {xu, xv, yu, yv};
+}
+
+// The slope of a gridline, `along` (2,) in the layout, against its chord (ux, uy) at a marker with a map (2,
+// 5); NaN where the map is unknown or wrong.
+double slope_at(View<const double, 2> map, View<const double, 1> along, double ux, double uy,
+                double max_slope) {
+  const double tx = map(0, 0) * along[0] + map(0, 1) * along[1];
+  const double ty = map(1, 0) * along[0] + map(1, 1) * along[1];
+  const double forward = tx * ux + ty * uy;
+  const double slope = (ty * ux - tx * uy) / forward;
+  return forward > 0.0 && std::abs(slope) < max_slope ? slope : NOT_A_NUMBER;
+}
+
+// The place at (u, v) in the layout from a marker, along one axis of the image, by the marker's map (5,).
+double mapped(double place, View<const double, 1> map, double u, double v) {
+  return place + u * map[0] + v * map[1];
+}
+
+double curvature(View<const double, 1> map, double u, double v) {
+  return 0.5 * u * u * map[2] + u * v * map[3] + 0.5 * v * v * map[4];
+}
+
+}  // namespace
+
+Array<double, 3> local_maps(View<const double, 2> xy, View<const std::int32_t, 2> near,
+                            View<const double, 3> offset, View<const double, 3> stencil,
+                            const GridlineLimits& limits) {
+  Array<bool, 1> known({xy.size()});
+  for (Index m = 0; m < xy.size(); ++m) known[m] = std::isfinite(xy(m, 0));
+  return local_maps_at(xy, known, near, offset, stencil, limits);
+}
+
+Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> which,
+                               View<const std::int32_t, 2> near, View<const double, 3> offset,
+                               View<const double, 3> stencil, const GridlineLimits& limits) {
+  Array<double, 3> maps({xy.size(), 2, 5}, NOT_A_NUMBER);
+  Array<std::int64_t, 1> incomplete({xy.size()});
+  const auto out = maps.view();
+  Index count = 0;
+  for (Index m = 0; m < xy.size(); ++m) {
+    if (!which[m]) continue;
+    // the stencil has weights where both rings are complete
+    const bool is_complete = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
+    const FirstDerivatives first = is_complete ? cubic_derivatives(xy, m, near[m], stencil[m])
+                                               : FirstDerivatives{NOT_A_NUMBER, 0.0, 0.0, 0.0};
+    if (std::isfinite(first.xu)) {
+      out[m].fill(0.0);
+      out(m, 0, 0) = first.xu;
+      out(m, 0, 1) = first.xv;
+      out(m, 1, 0) = first.yu;
+      out(m, 1, 1) = first.yv;
+    } else {
+      incomplete[count++] = m;
+    }
+  }
+  localmap::fill_quadratic_derivatives(xy, incomplete.slice(0, count), near, offset, out, limits.maps);
+  return maps;
+}
+
+ExtrapolatedMarkers extrapolate_markers(View<const double, 2> xy, View<const double, 3> maps,
+                                        View<const std::int32_t, 2> near, View<const double, 3> offset) {
+  ExtrapolatedMarkers out{Array<double, 2>(xy), Array<bool, 1>({xy.size()}, false)};
+  for (Index m = 0; m < xy.size(); ++m) {
+    if (std::isfinite(xy(m, 0))) continue;
+    double x = 0.0, y = 0.0;
+    Index count = 0;
+    for (Index k = 0; k < FIRST_RING; ++k) {
+      const Index n = near(m, k);
+      if (n < 0 || !std::isfinite(maps(n, 0, 0))) continue;
+      const double u = -offset(m, k, 0), v = -offset(m, k, 1);
+      const auto map_x = maps[n][0], map_y = maps[n][1];
+      x += mapped(xy(n, 0), map_x, u, v);
+      x += curvature(map_x, u, v);
+      y += mapped(xy(n, 1), map_y, u, v);
+      y += curvature(map_y, u, v);
+      ++count;
+    }
+    if (count > 0) {
+      out.xy(m, 0) = x / static_cast<double>(count);
+      out.xy(m, 1) = y / static_cast<double>(count);
+      out.predicted[m] = true;
+    }
+  }
+  return out;
+}
+
+Array<double, 2> extrapolate_rings(View<const double, 2> xy, View<const std::int32_t, 2> near,
+                                   View<const double, 3> offset, View<const double, 3> stencil, Index rings,
+                                   const GridlineLimits& limits) {
+  Array<double, 2> out(xy);
+  for (Index ring = 0; ring < rings; ++ring) {
+    Array<bool, 1> needed({xy.size()}, false);
+    bool is_any_needed = false;
+    for (Index m = 0; m < xy.size(); ++m) {
+      if (std::isfinite(out(m, 0))) continue;
+      for (Index k = 0; k < FIRST_RING; ++k) {
+        const Index n = near(m, k);
+        if (n < 0 || !std::isfinite(out(n, 0))) continue;
+        needed[n] = true;
+        is_any_needed = true;
+      }
+    }
+    if (!is_any_needed) break;
+    out =
+        extrapolate_markers(out, local_maps_at(out, needed, near, offset, stencil, limits), near, offset).xy;
+  }
+  return out;
+}
+
+Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps, View<const double, 2> bend,
+                           View<const std::int32_t, 2> edges, View<const double, 2> along,
+                           const GridlineLimits& limits) {
+  Array<double, 2> out({edges.size(), LINE_COLUMNS}, 0.0);
+  for (Index e = 0; e < edges.size(); ++e) {
+    const Index a = edges(e, 0), b = edges(e, 1);
+    const double dx = xy(b, 0) - xy(a, 0), dy = xy(b, 1) - xy(a, 1);
+    const double length = std::sqrt(dx * dx + dy * dy);
+    if (!(length > limits.min_length_px)) continue;
+    const double ux = dx / length, uy = dy / length;
+    double leave = slope_at(maps[a], along[e], ux, uy, limits.max_slope);
+    double arrive = slope_at(maps[b], along[e], ux, uy, limits.max_slope);
+    // where one end's direction is unknown the gridline is a parabola, where both are, straight
+    if (!std::isfinite(arrive)) arrive = -leave;
+    if (!std::isfinite(leave)) leave = -arrive;
+    if (!std::isfinite(leave)) leave = arrive = 0.0;
+    const auto line = out[e];
+    line[X] = xy(a, 0);
+    line[Y] = xy(a, 1);
+    line[UX] = ux;
+    line[UY] = uy;
+    line[LENGTH] = length;
+    line[LEAVE] = leave + (bend(e, 1) + bend(e, 0)) / length;
+    line[ARRIVE] = arrive + (bend(e, 1) - bend(e, 0)) / length;
+    line[KNOWN] = 1.0;
+  }
+  return out;
+}
+
+}  // namespace cmp::refine

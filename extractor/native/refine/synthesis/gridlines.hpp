@@ -1,0 +1,80 @@
+// The gridlines between the current markers: cubic curves of the smooth map that the markers define.
+//
+// Gridlines are straight in the layout; the map to the image curves them. The map's derivative at every
+// marker is estimated from the two rings of neighbours, and gives the direction of each gridline at that
+// marker. The gridline is the cubic between two markers with these directions, as a C1-smooth interpolation
+// of the map (Clough-Tocher) has it.
+#pragma once
+
+#include "base/array.hpp"
+#include "localmap/regularised_maps.hpp"
+
+namespace cmp::refine {
+
+// columns of a gridline: start, unit vector and length of the chord (px), slopes against the chord at both
+// ends, known
+inline constexpr Index X = 0, Y = 1, UX = 2, UY = 3, LENGTH = 4, LEAVE = 5, ARRIVE = 6, KNOWN = 7;
+inline constexpr Index LINE_COLUMNS = 8;
+inline constexpr Index FIRST_RING = 6;
+
+// Limits of gridlines; explained in extractor/refine/synthesis/gridlines.py.
+struct GridlineLimits {
+  double max_slope, min_length_px;
+  localmap::RegularisedMapLimits maps;
+
+  template <class F>
+  static GridlineLimits read(const F& f) {
+    return {f["max_slope"], f["min_length_px"], f["maps"]};
+  }
+};
+
+// Markers (M, 2) px with predictions, and (M,) the predicted ones.
+struct ExtrapolatedMarkers {
+  Array<double, 2> xy;
+  Array<bool, 1> predicted;
+};
+
+// (M, 2, 5), the local map at each marker: derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2;
+// NaN where unknown.
+//
+// Where both rings are complete, the first derivatives are those of a cubic, and the second are 0, as they
+// are not used. Elsewhere they are those of a quadratic, whose second derivatives are regularised towards 0
+// and are 0 where fewer than five neighbours are known. xy (M, 2) px, NaN where unknown; near, offset and
+// stencil: ring_markers, ring_vectors and derivative_stencil of the topology.
+Array<double, 3> local_maps(View<const double, 2> xy, View<const std::int32_t, 2> near,
+                            View<const double, 3> offset, View<const double, 3> stencil,
+                            const GridlineLimits& limits);
+
+// The same at some of the known markers, which (M,), only.
+Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> which,
+                               View<const std::int32_t, 2> near, View<const double, 3> offset,
+                               View<const double, 3> stencil, const GridlineLimits& limits);
+
+// xy (M, 2) px with unknown markers beside known ones predicted by their neighbours' maps (M, 2, 5).
+ExtrapolatedMarkers extrapolate_markers(View<const double, 2> xy, View<const double, 3> maps,
+                                        View<const std::int32_t, 2> near, View<const double, 3> offset);
+
+// (M, 2) px: xy with ring after ring of unknown markers around the known ones predicted, `rings` times.
+//
+// The predictions are those of extrapolate_markers, with maps only at the known markers beside unknown ones.
+Array<double, 2> extrapolate_rings(View<const double, 2> xy, View<const std::int32_t, 2> near,
+                                   View<const double, 3> offset, View<const double, 3> stencil, Index rings,
+                                   const GridlineLimits& limits);
+
+// (E, 8): start and unit vector of the chord, its length, px; slopes against the chord at both ends, towards
+// (-uy, ux); 1 where known. All 0 where unknown.
+//
+// xy (M, 2) px; maps (M, 2, 5), as local_maps gives them; bend (E, 2) px, b and s of the gridlines' bending,
+// which add to the slopes; edges (E, 2) marker ids; along (E, 2), the topology's edge_vectors.
+Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps, View<const double, 2> bend,
+                           View<const std::int32_t, 2> edges, View<const double, 2> along,
+                           const GridlineLimits& limits);
+
+// px, the offset of a gridline from its chord at the fraction t of the chord; straight beyond the ends.
+inline double sagitta(double t, double length, double leave, double arrive) {
+  if (t <= 0.0) return length * leave * t;
+  if (t >= 1.0) return length * arrive * (t - 1.0);
+  return length * t * (1.0 - t) * (leave * (1.0 - t) - arrive * t);
+}
+
+}  // namespace cmp::refine

@@ -1,0 +1,29 @@
+// Room "track" as Python sees it.
+#include "base/binding.hpp"
+#include "track/image_check.hpp"
+#include "track/ink_alignment.hpp"
+#include "track/warm_start.hpp"
+#include "track/warm_tables.hpp"
+
+namespace cmp::track {
+
+namespace {
+
+void fill(nb::module_& module) {
+  bind<&predict_missing>(module, "predict_missing", {"completion", "weights", "xy"});
+  bind<&check_cells>(module, "check_cells", {"image", "xy", "tables", "before", "compare", "limits"});
+  bind<&measure_shifts>(module, "measure_shifts", {"image", "xy", "tables", "levels", "limits"});
+  bind<&update_shifts_and_move_markers>(module, "update_shifts_and_move_markers",
+                                        {"xy", "shift", "corners", "limits"});
+  bind<&count_matching_centers>(module, "count_matching_centers",
+                                {"image", "xy", "tables", "levels", "limits"});
+  bind<&connected_cells>(module, "connected_cells",
+                         {"verdict", "first", "known", "corners", "cells_of_marker", "limits"});
+  bind<&verified_markers>(module, "verified_markers", {"xy", "proved", "corners"});
+}
+
+const Room room("track", fill);
+
+}  // namespace
+
+}  // namespace cmp::track
