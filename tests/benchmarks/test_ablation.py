@@ -1,11 +1,10 @@
-"""The trial of rules: their texts, what a trial measures, and which rules stay."""
+"""The trial of rules: their texts, copies of the reader without them, what a trial measures, and which rules stay."""
 
 from __future__ import annotations
 
 import ast
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,17 +13,25 @@ from benchmarks.ablation.run import comparison_line, main, try_rules
 from benchmarks.suites.ablation.comparison import LEAST_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
-from benchmarks.suites.ablation.rules import RULES, Rule
+from benchmarks.suites.ablation.rule import Rule
+from benchmarks.suites.ablation.rules import RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
 from benchmarks.suites.ablation.worker import Reading
-from benchmarks.support.code_copy import ROOT, path_of, replace_text
+from benchmarks.support.code_copy import ROOT, CodeCopy, Replacement, replaced_text
 from cmpdesign.scene import standard_layout
 from extractor import Status
 
-PACKAGE = "extractor"
-PIPELINE = f"{PACKAGE}.pipeline"
+PIPELINE = "extractor/pipeline.py"
 NOTHING = Rule("nothing", "", "accuracy", PIPELINE, "import annotations\n", "import annotations \n")
 READING = Rule("reading", "", "accuracy", PIPELINE, "        if bgr is None:\n", "        if True:\n")
+NATIVE_READING = Rule(
+    "native reading",
+    "",
+    "accuracy",
+    "extractor/native/image/ink_segmentation.cpp",
+    "out[x] = static_cast<std::uint8_t>(inside[x] * (one + 2 * two + 3 * three));",
+    "out[x] = static_cast<std::uint8_t>(0 * inside[x] * (one + 2 * two + 3 * three));",
+)
 
 
 def score(**fields: float) -> PictureScore:
@@ -33,56 +40,50 @@ def score(**fields: float) -> PictureScore:
     return PictureScore(**{**usual, **sums, **fields})  # type: ignore[arg-type]
 
 
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> CodeCopy:
+    return CodeCopy(tmp_path_factory.mktemp("copy"))
+
+
 def rule_of(kind: str) -> Rule:
     return next(rule for rule in RULES if rule.kind == kind)
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
-def test_a_rules_text_occurs_once_and_leaves_a_module_without_it(rule: Rule) -> None:
-    text = path_of(rule.module, ROOT).read_text(encoding="utf-8")
-    assert text.count(rule.text) == 1, rule.text
-    without = text.replace(rule.text, rule.without)
-    assert ast.dump(ast.parse(without)) != ast.dump(ast.parse(text))
+def test_a_rules_text_occurs_once_and_leaves_a_file_without_it(rule: Rule) -> None:
+    text = (ROOT / rule.file).read_text(encoding="utf-8")
+    without = replaced_text(text, rule.change)
+    if rule.change.is_native:
+        assert "".join(without.split()) != "".join(text.split())
+    else:
+        assert ast.dump(ast.parse(without)) != ast.dump(ast.parse(text))
 
 
 def test_rules_are_told_apart_by_name() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
     assert {rule.kind for rule in RULES} == {"accuracy", "no wrong id"}
-
-
-def test_a_text_that_occurs_twice_or_never_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "extractor").mkdir()
-    (tmp_path / "extractor" / "some.py").write_text("a = 1\nb = 1\n")
-    for old, count in (("= 1", 2), ("= 3", 0)):
-        with pytest.raises(ValueError, match=f"occurs {count} times"):
-            replace_text(f"{PACKAGE}.some", old, "= 2", tmp_path)
-    replace_text(f"{PACKAGE}.some", "a = 1", "a = 2", tmp_path)
-    assert (tmp_path / "extractor" / "some.py").read_text().startswith("a = 2\nb = 1\n")
-
-
-def test_caches_of_what_changed_and_of_its_users_go_and_others_stay_valid(tmp_path: Path) -> None:
-    texts = {
-        "low": "LIMIT = 100\n\ndef f():\n    return LIMIT\n\ndef g():\n    return 2\n",
-        "middle": "from extractor.low import f\n\ndef h():\n    return f()\n\ndef k():\n    return 0\n",
-        "high": "from extractor import middle\n\ndef m():\n    return middle.h()\n",
-        "beside": "from extractor.low import g\n\ndef n():\n    return g()\n",
+    assert {rule.stage for rule in RULES} == {
+        *("pipeline", "image", "cells", "numbering", "localmap", "complete")
     }
-    package = tmp_path / "extractor"
-    (package / "__pycache__").mkdir(parents=True)
-    functions = ("low.f", "low.g", "middle.h", "middle.k", "high.m", "beside.n")
-    for name, text in texts.items():
-        (package / f"{name}.py").write_text(text)
-    for name in functions:
-        (package / "__pycache__" / f"{name}-3.py311.nbi").write_text("")
-    before = (package / "low.py").stat()
-    replace_text(f"{PACKAGE}.low", "LIMIT = 100\n", "LIMIT = 2\n", tmp_path)
-    left = {path.name.partition("-")[0] for path in (package / "__pycache__").iterdir()}
-    assert left == {"low.g", "middle.k", "beside.n"}
-    after = (package / "low.py").stat()
-    assert (after.st_mtime_ns, after.st_size) == (before.st_mtime_ns, before.st_size)
-    scope: dict[str, Any] = {}
-    exec((package / "low.py").read_text(), scope)
-    assert scope["f"]() == 2
+
+
+def test_a_text_that_occurs_twice_or_never_is_refused() -> None:
+    for old, count in (("= 1", 2), ("= 3", 0)):
+        with pytest.raises(ValueError, match=f"some.py: the text occurs {count} times"):
+            replaced_text("a = 1\nb = 1\n", Replacement("some.py", old, "= 2"))
+    assert replaced_text("a = 1\nb = 1\n", Replacement("some.py", "a = 1", "a = 2")) == "a = 2\nb = 1\n"
+
+
+def test_texts_are_put_back_whatever_happens(copy: CodeCopy) -> None:
+    path, old = copy.folder / PIPELINE, (ROOT / PIPELINE).read_text(encoding="utf-8")
+    with copy.replaced([NOTHING.change, READING.change]):
+        assert path.read_text(encoding="utf-8").count("        if True:\n") == 1 + old.count(
+            "        if True:\n"
+        )
+    assert path.read_text(encoding="utf-8") == old
+    with pytest.raises(ValueError, match="0 times"), copy.replaced([READING.change, READING.change]):
+        pass
+    assert path.read_text(encoding="utf-8") == old
 
 
 def test_a_rule_that_does_nothing_makes_no_difference_and_one_that_breaks_reading_is_worse(
@@ -98,11 +99,28 @@ def test_a_rule_that_does_nothing_makes_no_difference_and_one_that_breaks_readin
     assert "keep" in comparison_line(reading) and "goes" in comparison_line(nothing)
 
 
-def test_a_reader_that_does_not_start_is_an_error_and_no_score(tmp_path: Path) -> None:
+def test_a_reader_that_does_not_start_is_an_error_and_no_score(tmp_path: Path, copy: CodeCopy) -> None:
     pictures = list(keep_pictures("plain", 1, 1, tmp_path))
     broken = NOTHING._replace(without="import annotations, nothing\n")
     with pytest.raises(RuntimeError, match="without nothing"):
-        read_without((broken,), pictures, "fast")
+        read_without((broken,), pictures, "fast", copy)
+
+
+@pytest.mark.slow
+@pytest.mark.longest
+def test_rules_in_cpp_compile_and_are_switched_off_and_on_again(copy: CodeCopy, tmp_path: Path) -> None:
+    """Builds the module of the reader, and every file with a rule once more for each of its rules."""
+    pictures = list(keep_pictures("plain", 2, 1, tmp_path))
+    for rule in RULES:
+        if rule.change.is_native:
+            with copy.replaced([rule.change]):
+                pass
+    visible = sum(int(picture.truths[0].visible.sum()) for picture in pictures)
+    lost = [
+        sum(score.lost for score in read_without(rules, pictures, "fast", copy))
+        for rules in ((), (NATIVE_READING,), (NOTHING,))
+    ]
+    assert lost[0] < 0.01 * visible and lost[1] == visible and lost[2] == lost[0]
 
 
 def test_a_rule_stays_if_lost_wrong_or_rms_rise_by_the_least_loss_in_most_pictures() -> None:

@@ -40,7 +40,7 @@ ROOMS = {
     ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign", "cmpdesign.writers"}  # the tops, and what is kept for old programs
-EXTRACTOR_NEEDS = {"numpy", "cv2", "scipy", "numba", "llvmlite"}
+EXTRACTOR_NEEDS = {"numpy", "cv2"}
 MAX_FILES, MAX_LINES, MAX_FUNCTION_LINES, MAX_PARAMETERS = 12, 500, 80, 8
 Rule = Callable[[Path], list[str]]
 

@@ -137,7 +137,7 @@ def test_long_work_ends_within_five_seconds(kind: str, tmp_path: Path) -> None:
     """Calls into the CAD kernel of more than five seconds, and trials in several processes."""
     code, errors, took_s = interrupted(tmp_path, *LONG[kind], wait_s=6)
     assert code == 130 and took_s < 5, (code, took_s, errors)
-    lines = [line for line in errors.splitlines() if not line.startswith("compiling for this machine")]
+    lines = errors.splitlines()
     assert len(lines) == 1 and "interrupted" in lines[0]
     left = [path.name for path in tmp_path.rglob("*") if path.is_file()]
     assert left in ([], ["journal.jsonl"])
@@ -154,7 +154,7 @@ class Missing:
 sys.meta_path.insert(0, Missing())
 """
 # Without these nothing runs at all.
-BASE = {"numpy", "scipy", "numba", "opencv-contrib-python-headless", "pydantic", "typer", "rich"}
+BASE = {"numpy", "scipy", "opencv-contrib-python-headless", "pydantic", "typer", "rich"}
 SMALL = ("build", "honeycomb", "--set", "layers=1", "-o", "out", "--only")
 LIBRARIES = {
     "svgwrite": ("svgwrite", (*SMALL, "svg")),

@@ -99,7 +99,6 @@ KILLED = """
 import os, signal
 replace = os.replace
 def kill(source, target, **options):
-    # The compiler renames files of its cache elsewhere.
     if os.path.realpath(target).startswith(os.getcwd()):
         os.kill(os.getpid(), signal.SIGKILL)
     replace(source, target, **options)

@@ -370,7 +370,6 @@ def test_what_is_absent_is_not_even_imported(tmp_path: Path) -> None:
         "cv2",
         "extractor",
         "cmpdesign.files.video_writer",
-        "cmpdesign.scene.drawing.occlusion_compiled",
     }
     flat = loaded("size_px = [96, 80]\n[camera]\npitch_px = 16")
     assert flat & optional == set()

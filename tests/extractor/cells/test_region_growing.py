@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from extractor.cells.region_growing import GROW_THRESHOLD, grow
+from extractor.cells.region_growing import LIMITS, grow
 from extractor.cells.seeds import find_seeds
 from extractor.image.ink_segmentation import Segmentation
 from tests.support.layouts import small_layout
@@ -112,7 +112,7 @@ def plain_growing(
         product = there @ mean
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = np.sqrt(((there - mean) ** 2).sum(axis=1)) / np.sqrt(product)
-        similar = (product > 0) & (distance < GROW_THRESHOLD)
+        similar = (product > 0) & (distance < LIMITS.threshold)
         if not similar.any():
             return region
         wave = ring

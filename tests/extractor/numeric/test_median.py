@@ -6,13 +6,12 @@ Inside: of many medians in an image a wrong one is an outlier more, which other 
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from extractor.numeric.median import median_of
 
 
-@settings(deadline=None)  # the first call may compile
 @given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=24), st.integers(0, 3))
 def test_it_is_numpys(values: list[float], beyond: int) -> None:
     """Equal numbers among them, and whatever stands behind them."""
