@@ -1,4 +1,4 @@
-"""Whole processes: what a command costs from the shell, and how long and how large the largest pattern builds.
+"""Whole processes: the first markers, what a command costs from the shell, and how the largest pattern builds.
 
 python -m benchmarks.startup [--quick] [--json FILE]
 """
@@ -40,6 +40,16 @@ COMMANDS = {
     ],
     "cmpdesign build honeycomb": ["build", "honeycomb", "-o", "made"],
 }
+# From the start of a process to the markers of one PNG, beside the import of what reads it.
+LIBRARIES = "import numpy, cv2"
+FIRST_MARKERS = """
+import sys
+import cv2
+from extractor import Extractor, load_layout
+markers = Extractor(load_layout("layout.json")).extract(cv2.imread("view.png"))
+assert (markers.status == 1).sum() == 331, markers.reason
+"""
+PEAK = "\nimport resource; print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
 # The child process reports its own peak memory, which the system states in kB.
 LARGEST = """
 import json, resource, sys, time
@@ -60,6 +70,16 @@ class ProcessTime:
     command: str
     median_s: float
     best_s: float
+
+
+@dataclass(frozen=True)
+class FirstMarkers:
+    """Wall-clock seconds and peak memory up to the first markers, and of importing numpy and OpenCV alone."""
+
+    seconds: float
+    libraries_s: float
+    peak_mb: float
+    libraries_mb: float
 
 
 @dataclass(frozen=True)
@@ -90,10 +110,34 @@ def measure_process(command: str, runs: int, folder: Path) -> ProcessTime:
     return ProcessTime(command, float(np.median(seconds[1:])), min(seconds[1:]))
 
 
+def measure_first_markers(runs: int, folder: Path) -> FirstMarkers:
+    """Medians over runs in turns; the picture has 640x480 px and 331 markers."""
+    run_python(CLI, ["build", "honeycomb", "--only", "layout", "-o", "."], folder)
+    run_python(CLI, ["render", "layout.json", "-o", "view.png", "--noise", "2", "--size", "640x480"], folder)
+    seconds: dict[str, list[float]] = {LIBRARIES: [], FIRST_MARKERS: []}
+    peaks = {code: float(run_python(code + PEAK, [], folder)) for code in seconds}
+    for _ in range(runs):
+        for code, times in seconds.items():
+            start = time.perf_counter()
+            run_python(code, [], folder)
+            times.append(time.perf_counter() - start)
+    first, libraries = (float(np.median(seconds[code])) for code in (FIRST_MARKERS, LIBRARIES))
+    return FirstMarkers(first, libraries, peaks[FIRST_MARKERS], peaks[LIBRARIES])
+
+
 def measure_largest(pattern: str, runs: int, folder: Path) -> LargestBuild:
     results = [json.loads(run_python(LARGEST, [pattern], folder)) for _ in range(runs)]
     best = min(results, key=lambda result: float(result["seconds"]))
     return LargestBuild(pattern, best["markers"], best["seconds"], best["peak_mb"])
+
+
+def first_markers_text(first: FirstMarkers) -> str:
+    return (
+        f"From the start of a process to the markers of one 640x480 PNG: {first.seconds:.2f} s, "
+        f"{first.peak_mb:.0f} MB; "
+        f"import numpy, cv2 alone: {first.libraries_s:.2f} s, {first.libraries_mb:.0f} MB; "
+        f"ratio {first.seconds / first.libraries_s:.2f}"
+    )
 
 
 def process_table(results: Sequence[ProcessTime]) -> Table:
@@ -124,19 +168,25 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     runs = 3 if options.quick else 15
     with tempfile.TemporaryDirectory() as folder:
+        first = measure_first_markers(runs, Path(folder))
         processes = [measure_process(command, runs, Path(folder)) for command in COMMANDS]
         layouts = [
             measure_largest(pattern, max(1, runs // 5), Path(folder))
             for pattern in ("honeycomb", "round", "elliptical")
         ]
     console = Console()
+    console.print(first_markers_text(first), soft_wrap=True)
     console.print(process_table(processes))
     console.print(largest_table(layouts))
     console.print(conditions_text(), style="dim", soft_wrap=True)
     if options.json:
         write_json(
             options.json,
-            {"processes": [asdict(r) for r in processes], "largest": [asdict(r) for r in layouts]},
+            {
+                "first_markers": asdict(first),
+                "processes": [asdict(r) for r in processes],
+                "largest": [asdict(r) for r in layouts],
+            },
         )
     return 0
 
