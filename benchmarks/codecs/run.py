@@ -148,17 +148,16 @@ def result_table(results: Sequence[CodecResult]) -> Table:
     """The table."""
     table = Table(title="Video codecs", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
     table.add_column("codec", no_wrap=True)
-    for name in ("moved", "worst", "error", "of PNG", "z", "lost", "kB", "ms"):
+    for name in ("moved", "worst", "error", "of PNG", "z", "kB", "ms"):
         table.add_column(name, justify="right", no_wrap=True)
     for one in results:
         table.add_row(
             one.codec,
             f"{one.moved_px:.4f}",
-            f"{one.worst_px:.3f}",
+            f"{one.worst_px:.2f}",
             f"{one.error_px:.4f}",
             f"{one.of_png:.2f}",
             f"{one.z:.2f}",
-            f"{one.lost_share:.1%}",
             f"{one.kb_a_frame:.0f}",
             f"{one.ms_a_frame:.0f}",
         )
