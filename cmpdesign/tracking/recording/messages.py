@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,15 +33,20 @@ class Lens(NamedTuple):
     area_px: Sequence[int] = (0, 0, 0, 0)
 
 
+def _as_array(data: bytes) -> Any:
+    return np.frombuffer(data, np.uint8)
+
+
 class Messages:
     """Makes messages.
 
     Args:
-        types: the classes of the message types by their names, as of a ``Typestore``.
+        types: the classes of the message types by their names, as of a ``Typestore``, or ROS's own.
+        octets: makes the value of a field of bytes; by default an array, as rosbags takes it.
     """
 
-    def __init__(self, types: Mapping[str, Any]) -> None:
-        self._types = types
+    def __init__(self, types: Mapping[str, Any], octets: Callable[[bytes], Any] = _as_array) -> None:
+        self._types, self._octets = types, octets
 
     def points(self, stamp: Stamp, records: NDArray[np.void]) -> Any:
         """A PointCloud2 of (M,) records; its data are the records' bytes."""
@@ -54,7 +59,7 @@ class Messages:
             is_bigendian=False,
             point_step=size,
             row_step=size * len(records),
-            data=np.frombuffer(records.tobytes(), np.uint8),
+            data=self._octets(records.tobytes()),
             is_dense=False,
         )
 
@@ -88,8 +93,7 @@ class Messages:
 
     def image(self, stamp: Stamp, png: bytes) -> Any:
         """A CompressedImage of a PNG file's bytes."""
-        data = np.frombuffer(png, np.uint8)
-        return self._types[IMAGE](header=self._header(stamp), format="png", data=data)
+        return self._types[IMAGE](header=self._header(stamp), format="png", data=self._octets(png))
 
     def camera(self, stamp: Stamp, size_px: tuple[int, int], lens: Lens) -> Any:
         """A CameraInfo of an image (width, height); (cx, cy) is in the frame of the full image."""
