@@ -55,7 +55,7 @@ class DataSet:
     """
 
     fps: float
-    task: str = "tactile recording"
+    task: str = "contact"
     robot: str | None = None
     images: tuple[str, ...] = ()
     most_pixels: int = MOST_PIXELS

@@ -20,7 +20,7 @@ def lerobot(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Data set to write; a new folder.")
     ],
-    task: Annotated[str, typer.Option(help="What the runs show, in words.")] = "tactile recording",
+    task: Annotated[str, typer.Option(help="What the runs show, in words.")] = "contact",
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: as the runs' times say]")
     ] = None,
