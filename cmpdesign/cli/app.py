@@ -22,6 +22,7 @@ from cmpdesign.cli.commands import (
     verify,
 )
 from cmpdesign.cli.commands.calibrate import group as calibrate
+from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
 
 app = typer.Typer(
@@ -46,6 +47,7 @@ for function in (
     app.command(function.__name__, cls=Command)(function)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(export.app, name="export")
 
 
 def _print_version(wanted: bool) -> None:

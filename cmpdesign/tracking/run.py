@@ -70,7 +70,7 @@ class TrackingRun:
     def _track(self, watch: Callable[[Any], None]) -> None:
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
-            self.sink.add(tracked)
+            self.sink.add(tracked, frame.image)
             self.statistics.add(tracked)
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)

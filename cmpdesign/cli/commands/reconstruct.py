@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
+from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_with_status,
@@ -26,6 +28,7 @@ from cmpdesign.inputs.files import MOST_PIXELS
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
+    from cmpdesign.tracking.recording.options import Recording
     from cmpdesign.tracking.run import TrackingRun
     from extractor.image.input import Channels
     from extractor.image.response import Response
@@ -47,9 +50,7 @@ def reconstruct(
             help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
-    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
     from_rest: Annotated[
         bool, typer.Option("--from-rest", help="Place all views by REST, also those whose pose RIG gives.")
     ] = False,
@@ -78,6 +79,8 @@ def reconstruct(
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
+    frame_id: FrameIdOption = "tactile",
+    with_images: WithImagesOption = False,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -88,6 +91,9 @@ def reconstruct(
 
         recover_and_report(output, _points_in(load_layout(layout)))
         return
+    from cmpdesign.tracking.recording.options import Recording
+
+    recording = Recording(frame_id, with_images)
     require_positive("--fps", fps)
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
@@ -109,6 +115,7 @@ def reconstruct(
         side,
         channels,
         max_pixels,
+        recording,
     )
     run = _prepare_run(options)
     run.limit = frames
@@ -140,6 +147,7 @@ class _Options(NamedTuple):
     side: Side
     channels: Channels
     max_pixels: int
+    recording: Recording
 
 
 def _points_in(layout: Reference) -> int:
@@ -171,7 +179,8 @@ def _prepare_run(options: _Options) -> TrackingRun:
     for warning in reconstructor.warnings:
         print_warning(warning)
     continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-    sink = open_sink(options.output, ShapeTable(reconstructor, continuation))
+    recording = replace(options.recording, views=rig.views)
+    sink = open_sink(options.output, ShapeTable(reconstructor, continuation), recording)
     tracker = ShapeTracker(
         reconstructor, warm=not options.cold, response=options.response, channels=options.channels
     )

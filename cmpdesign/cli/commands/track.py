@@ -12,6 +12,7 @@ import typer
 
 from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
 from cmpdesign.cli.paths import require_suffix
+from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_with_status,
@@ -26,6 +27,7 @@ from cmpdesign.errors import OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
+    from cmpdesign.tracking.recording.options import Recording
     from cmpdesign.tracking.run import TrackingRun
     from extractor.image.input import Channels
     from extractor.image.response import Response
@@ -41,9 +43,7 @@ def track(
             metavar="SOURCE", help="A video, a folder of images, a camera's number, or rtsp://..."
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Table to write: .npz, .parquet or .csv.")
-    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
     rest: Annotated[
         str | None,
         typer.Option(
@@ -71,6 +71,8 @@ def track(
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
+    frame_id: FrameIdOption = "tactile",
+    with_images: WithImagesOption = False,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -81,6 +83,9 @@ def track(
 
         recover_and_report(output, len(load_layout(layout).layer))
         return
+    from cmpdesign.tracking.recording.options import Recording
+
+    recording = Recording(frame_id, with_images)
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
     require_suffix("--quiver", quiver, [".png"])
@@ -89,7 +94,7 @@ def track(
     reference = load_layout(layout)
     reading = _Reading(not cold, parse_reading_response(response), side, channels)
     run = _prepare_run(
-        reference, _Options(source, output, rest, mm_per_px, fps, overlay, reading, max_pixels)
+        reference, _Options(source, output, rest, mm_per_px, fps, overlay, reading, max_pixels, recording)
     )
     run.limit = frames
     try:
@@ -123,6 +128,7 @@ class _Options(NamedTuple):
     overlay: Path | None
     reading: _Reading
     max_pixels: int
+    recording: Recording
 
 
 def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
@@ -142,9 +148,8 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     frames = open_source(source, fps, most_pixels)
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
-    return TrackingRun(
-        frames, tracker, open_sink(options.output, TrackTable(tracker)), TrackStatistics(reference), video
-    )
+    sink = open_sink(options.output, TrackTable(tracker), options.recording)
+    return TrackingRun(frames, tracker, sink, TrackStatistics(reference), video)
 
 
 def _write_summary(

@@ -1,4 +1,4 @@
-"""Chunks assembled into one .npz or .parquet file, with the memory of one chunk."""
+"""Chunks assembled into one .npz or .parquet file or one recording, with the memory of one chunk."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from cmpdesign.files.atomic import staged_file
 from cmpdesign.tracking.columns import Columns
+from cmpdesign.tracking.recording.options import is_recording
 from cmpdesign.tracking.sinks.chunk_files import Chunk, read_column, read_frames
 from cmpdesign.tracking.sinks.unfinished import require_pyarrow
 from cmpdesign.tracking.table import table_long_form
@@ -21,14 +22,26 @@ def assemble_table(chunks: Sequence[Chunk], about: Columns, path: Path) -> int:
     Args:
         chunks: whole chunks in order.
         about: the columns that all frames share.
-        path: the table, .npz or .parquet.
+        path: the table, .npz or .parquet; or a recording, which needs the columns of a ``RecordedTable``.
 
     Raises:
         OSError: the file cannot be written; an earlier file is unchanged.
     """
-    with staged_file(path) as staged:
-        (_write_npz if path.suffix == ".npz" else _write_parquet)(chunks, about, staged)
+    if is_recording(path):
+        _write_recording(chunks, about, path)
+    else:
+        with staged_file(path) as staged:
+            (_write_npz if path.suffix == ".npz" else _write_parquet)(chunks, about, staged)
     return sum(len(chunk.frames) for chunk in chunks)
+
+
+def _write_recording(chunks: Sequence[Chunk], about: Columns, path: Path) -> None:
+    """Write the frames' messages; images lie beside the chunks."""
+    from cmpdesign.tracking.recording.bag import write_recording
+
+    if not chunks:
+        raise OSError(0, "no frame was tracked")
+    write_recording((read_frames(chunk) for chunk in chunks), about, path, chunks[0].path.parent)
 
 
 def _write_npz(chunks: Sequence[Chunk], about: Columns, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The sink of .npz and .parquet: frames in chunks of some seconds, which are assembled at the end."""
+"""The sink of .npz, .parquet and recordings: frames in chunks of some seconds, which are assembled at the end."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from cmpdesign.errors import OutputError
 from cmpdesign.tracking.columns import FrameTable
+from cmpdesign.tracking.recording.images import keep_images
 from cmpdesign.tracking.sinks.assembly import assemble_table
 from cmpdesign.tracking.sinks.chunk_files import find_chunks, save_chunk
 from cmpdesign.tracking.sinks.unfinished import FLUSH_S, lock_folder, part_path, release_lock
@@ -17,20 +18,36 @@ CHUNK_FRAMES = 256
 
 
 class ChunkSink:
-    """Writes frames in chunks of some seconds, which are assembled at the end."""
+    """Writes frames in chunks of some seconds, which are assembled at the end.
 
-    def __init__(self, path: Path, table: FrameTable) -> None:
+    Args:
+        path: the file to come.
+        table: the frames' columns.
+        with_images: keep the frames' images beside the chunks, for a recording.
+    """
+
+    def __init__(self, path: Path, table: FrameTable, with_images: bool = False) -> None:
         self._path, self._part, self._table = path, part_path(path), table
+        self._with_images = with_images
         self._part.mkdir()
         self._lock = lock_folder(self._part)
         self._frames: list[Any] = []
         self._chunks, self._kept = 0, 0
         self._last = time.monotonic()
 
-    def add(self, frame: Any) -> None:
+    def add(self, frame: Any, image: Any = None) -> None:
+        if self._with_images:
+            self._keep_images(frame.index, image)
         self._frames.append(frame)
         if len(self._frames) >= CHUNK_FRAMES or time.monotonic() - self._last > FLUSH_S:
             self._flush()
+
+    def _keep_images(self, frame: int, image: Any) -> None:
+        """Images are written before the chunk of their frame, so that every whole chunk has its images."""
+        try:
+            keep_images(self._part, frame, image)
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
     def _flush(self) -> None:
         try:

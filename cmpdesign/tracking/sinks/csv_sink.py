@@ -30,7 +30,7 @@ class CsvSink:
         self._end, self._frames, self._last = 0, 0, time.monotonic()
         self._write((",".join((*HEAD, *self._table.digits)) + "\n").encode())
 
-    def add(self, frame: Any) -> None:
+    def add(self, frame: Any, image: Any = None) -> None:
         columns = table_long_form(self._table.batch([frame]), self._table.about())
         try:
             self._write(_csv_lines(columns, self._table.digits))

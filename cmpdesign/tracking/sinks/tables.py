@@ -12,6 +12,7 @@ from cmpdesign.files.atomic import remove_abandoned_stages
 from cmpdesign.files.locks import is_in_use
 from cmpdesign.inputs.files import is_folder, is_regular_file, open_file
 from cmpdesign.tracking.columns import FrameTable
+from cmpdesign.tracking.recording.options import RecordedTable, Recording, is_recording
 from cmpdesign.tracking.sinks.assembly import assemble_table
 from cmpdesign.tracking.sinks.chunk_files import find_chunks
 from cmpdesign.tracking.sinks.chunk_sink import ChunkSink
@@ -19,33 +20,45 @@ from cmpdesign.tracking.sinks.csv_recovery import recover_csv
 from cmpdesign.tracking.sinks.csv_sink import CsvSink
 from cmpdesign.tracking.sinks.unfinished import Recovered, part_path, require_pyarrow
 
-KINDS = (".npz", ".parquet", ".csv")
+KINDS = (".npz", ".parquet", ".csv", ".mcap")
 
 
 class FrameSink(Protocol):
     """A table that is written frame by frame.
 
-    ``add`` and ``close`` raise ``OutputError``. ``kept`` states the number of written frames and their file.
+    ``add`` takes a tracked frame and its image; only a recording that was opened for images keeps these. ``add`` and
+    ``close`` raise ``OutputError``. ``kept`` states the number of written frames and their file.
     """
 
-    def add(self, frame: Any) -> None: ...
+    def add(self, frame: Any, image: Any = None) -> None: ...
 
     def close(self) -> None: ...
 
     def kept(self) -> str: ...
 
 
-def open_sink(path: Path, table: FrameTable) -> FrameSink:
+def open_sink(path: Path, table: FrameTable, recording: Recording | None = None) -> FrameSink:
     """Open the sink for the suffix of a file. The place of a killed run that holds no frame is cleared.
 
+    Args:
+        path: a file's name with an ending of ``KINDS``; or a name without ending, for a rosbag2 folder.
+        table: the frames' columns.
+        recording: the options of a recording.
+
     Raises:
-        CmpDesignError: another suffix, Parquet without pyarrow, or frames of an interrupted or another run exist.
+        CmpDesignError: another suffix, Parquet or a recording without its library, images for a table, or frames of
+            an interrupted or another run exist.
         OutputError: the file cannot be written.
     """
+    recording = recording or Recording()
     _require_kind(path)
+    if recording.with_images and not is_recording(path):
+        raise CmpDesignError(
+            f"--with-images: {path} is a table and holds no images; give a name that ends in .mcap, or without ending"
+        )
     part = part_path(path)
     if is_folder(path):
-        raise OutputError(f"{path}: is a folder; give a file's name")
+        raise OutputError(f"{path}: is a folder; give a file's name, or that of a new folder")
     if os.path.lexists(part):
         _require_not_in_use(part, path)
         if _holds_frames(part):
@@ -55,7 +68,10 @@ def open_sink(path: Path, table: FrameTable) -> FrameSink:
     try:
         _remove(part)
         path.parent.mkdir(parents=True, exist_ok=True)
-        return CsvSink(path, table) if path.suffix == ".csv" else ChunkSink(path, table)
+        if path.suffix == ".csv":
+            return CsvSink(path, table)
+        recorded = RecordedTable(table, recording) if is_recording(path) else table
+        return ChunkSink(path, recorded, recording.with_images)
     except (OSError, ValueError) as error:  # ValueError: a NUL, or characters that no path can hold
         reason = getattr(error, "strerror", None) or error
         raise OutputError(f"{path}: cannot be written ({reason})") from None
@@ -100,10 +116,16 @@ def _recover_chunks(part: Path, path: Path) -> Recovered:
 
 
 def _require_kind(path: Path) -> None:
-    if path.suffix not in KINDS:
-        raise CmpDesignError(f"{path}: unknown ending; expected one of {', '.join(KINDS)}")
+    if path.suffix not in (*KINDS, ""):
+        raise CmpDesignError(
+            f"{path}: unknown ending; expected one of {', '.join(KINDS)}, or none for a rosbag2 folder"
+        )
     if path.suffix == ".parquet":
         require_pyarrow()
+    if is_recording(path):
+        from cmpdesign.tracking.recording.bag import require_rosbags
+
+        require_rosbags()
 
 
 def _require_not_in_use(part: Path, path: Path) -> None:

@@ -11,17 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from cmpdesign import layout_to_json
-from cmpdesign.design.design import load_design
-from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import Medium, render
 from tests.support.command import refused, run
+from tests.support.tracking.press import FRAMES, seen_from_the_back, write_press
 from tests.support.view_scenes import (
     HALF,
     SMALL,
     binocular,
     binocular_scene,
-    binocular_shot,
     contact,
     reference,
     rig_of,
@@ -31,35 +28,11 @@ from tests.support.view_scenes import (
 LAYOUT = reference(layers=SMALL)
 MARKERS = len(LAYOUT.xy_mm)
 POINTS = MARKERS + len(LAYOUT.edges) * LAYOUT.virtual_per_edge
-FRAMES = 4
-
-
-def seen_from_the_back() -> str:
-    """The layout file of the views' pattern: they look at its back."""
-    options = {"layers": str(SMALL), "pitch_mm": "1.5", "mirrored": "true"}
-    return layout_to_json(build_layout(load_design("honeycomb", options)))
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A layout, a rig, the frames of a press as PNG files (frame 2 has lost its right half), and the truth."""
-    folder = tmp_path_factory.mktemp("made")
-    (folder / "layout.json").write_text(seen_from_the_back(), encoding="utf-8")
-    (folder / "rig.toml").write_text(rig_text(rig_of(binocular())), encoding="utf-8")
-    truth = []
-    for name in ("frames", "left", "right"):
-        (folder / name).mkdir()
-    for k in range(FRAMES):
-        shot = binocular_shot(None if k == 0 else contact, 40 + k)
-        image = shot.image.copy()
-        if k == 2:
-            image[:, HALF[0] :] = 0
-        cv2.imwrite(str(folder / "frames" / f"{k}.png"), image)
-        for name, part in (("left", image[:, : HALF[0]]), ("right", image[:, HALF[0] :])):
-            cv2.imwrite(str(folder / name / f"{k}.png"), part)
-        truth.append(np.concatenate([shot.truth.marker_xyz_mm, shot.truth.virtual_xyz_mm.reshape(-1, 3)]))
-    np.save(folder / "truth.npy", truth)
-    return folder
+    return write_press(tmp_path_factory.mktemp("made"))
 
 
 def arrays(made: Path, output: Path, *options: object, source: str = "frames") -> dict[str, np.ndarray]:

@@ -1,0 +1,1 @@
+"""``python -m benchmarks.codecs``: how far the compression of video moves markers."""

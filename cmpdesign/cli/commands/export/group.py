@@ -1,0 +1,17 @@
+"""``cmpdesign export``: runs as data sets for the training of policies."""
+
+from __future__ import annotations
+
+import typer
+
+from cmpdesign.cli.command import Command
+from cmpdesign.cli.commands.export.lerobot import lerobot
+from cmpdesign.cli.commands.export.zarr import zarr
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Export runs as data sets for the training of policies.",
+)
+app.command("lerobot", cls=Command)(lerobot)
+app.command("zarr", cls=Command)(zarr)

@@ -1,0 +1,52 @@
+"""The source's images beside the chunks of a run: one PNG file for each frame and image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmpdesign.errors import InputError
+from cmpdesign.inputs.files import read_file
+
+_PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
+
+
+def keep_images(folder: Path, frame: int, images: Any) -> None:
+    """Write a frame's images, without loss.
+
+    Args:
+        folder: where the run's chunks are.
+        frame: the frame's number.
+        images: (H, W, 3) BGR of 8 or 16 bits, or None; or a list of these, one for each view.
+
+    Raises:
+        OSError: an image cannot be written.
+    """
+    import cv2
+
+    named = enumerate(images) if isinstance(images, list) else [(None, images)]
+    for view, image in named:
+        if isinstance(image, np.ndarray):
+            data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
+            _image_path(folder, frame, view).write_bytes(data.tobytes())
+
+
+def kept_image(folder: Path, frame: int, view: int | None) -> bytes | None:
+    """A frame's image as PNG; None where the frame has none, or where a killed run left only a part of it.
+
+    Args:
+        folder: where the run's chunks are.
+        frame: the frame's number.
+        view: the view that has an image of its own; None for the image with all views.
+    """
+    try:
+        data = read_file(_image_path(folder, frame, view))
+    except InputError:
+        return None
+    return data if data.startswith(_PNG_START) and data.endswith(_PNG_END) else None
+
+
+def _image_path(folder: Path, frame: int, view: int | None) -> Path:
+    return folder / (f"{frame:09d}.png" if view is None else f"{frame:09d}.{view}.png")
