@@ -19,8 +19,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":  # before numpy and numba: times are of one core
-    os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+if __name__ == "__main__":  # before numpy: times are of one core
+    os.environ["OMP_NUM_THREADS"] = "1"
 
 import cv2
 import numpy as np

@@ -2,7 +2,7 @@
 
     python -m benchmarks.extraction [--quick] [--json FILE] [--publish]
 
-One core, compiled code, every image new to the extractor (no previous frame is used). Found markers are counted too;
+One core, every image new to the extractor (no previous frame is used). Found markers are counted too;
 ``benchmarks.accuracy`` measures their precision.
 """
 
@@ -17,8 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":  # before numpy and numba: times are of one core
-    os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
+if __name__ == "__main__":  # before numpy: times are of one core
+    os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2

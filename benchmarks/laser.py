@@ -180,7 +180,7 @@ def print_areas() -> None:
 
 def main() -> None:
     print(json.dumps({"python": sys.version.split()[0]}))
-    make_laser(make_design(3), build_layout(make_design(3)))  # compiles what is compiled on first use
+    make_laser(make_design(3), build_layout(make_design(3)))  # loads what is loaded on first use
     print_areas()
     print_travel()
     print_format_times()

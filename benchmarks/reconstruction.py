@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
+os.environ["OMP_NUM_THREADS"] = "1"  # before numpy
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2

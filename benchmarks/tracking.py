@@ -20,7 +20,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
+os.environ["OMP_NUM_THREADS"] = "1"  # before numpy
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
 
 import cv2

@@ -6,7 +6,7 @@
 The rooms (folders and modules) in their order; a room imports only rooms before it, and the small modules ``errors``,
 ``quality``, ``result`` and ``presets``:
 
-- ``numeric``: compilation, linear systems, sampling of images, nearest points.
+- ``numeric``: sampling of images, nearest points, triangulation, homographies.
 - ``layout``: ``layout.json`` and the tables of a layout.
 - ``image``: stages 1 and 2, from pixels to inks.
 - ``cells``: stages 3 to 6, from inks to triangles, cells and their mesh.
@@ -112,7 +112,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import numba and OpenCV only when something that needs them is asked for."""
+    """Import OpenCV only when something that needs them is asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -4,8 +4,8 @@
     .venv/bin/python tools/mutations.py --only extractor.layout.lattice:layer_of:0
 
 A place is a sign (+ and -), a comparison (< and >=, == and !=), an index or a number (a whole number becomes one more,
-another half as much again). The faults are made in a copy of the checkout. Compiled code is cached by file, so the
-copy's caches of what uses the broken function are emptied.
+another half as much again) in a function of a Python module. The faults are made in a copy of the checkout, which holds
+the native modules as built. The loops in C++ are not broken.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.support.code_copy import PACKAGES, ROOT, path_of, replace_source
+from benchmarks.support.code_copy import PACKAGES, ROOT
 
 SWAPPED: dict[type, type] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Lt: ast.GtE, ast.GtE: ast.Lt,
@@ -107,11 +107,17 @@ def places(root: Path) -> list[Place]:
     return found
 
 
+def path_of(module: str, root: Path) -> Path:
+    """The file of a dotted module below ``root``."""
+    path = root / module.replace(".", "/")
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
 def notices(place: Place, root: Path, limit_s: float) -> str:
     """What the tests say of one fault: "noticed by ..." or "not noticed"."""
     path = path_of(place.module, root)
     text = path.read_text(encoding="utf-8")
-    replace_source(place.module, broken(text, place), root)
+    path.write_text(broken(text, place), encoding="utf-8")
     files = sorted((root / "tests").rglob("test_*.py"), key=lambda file: relevance(file, place, root))
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, files)]
     try:
@@ -121,7 +127,7 @@ def notices(place: Place, root: Path, limit_s: float) -> str:
     except subprocess.TimeoutExpired:
         return f"not noticed in {limit_s:.0f} s"
     finally:
-        replace_source(place.module, text, root)
+        path.write_text(text, encoding="utf-8")
     if result.returncode == 0:
         return "not noticed"
     said = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
@@ -156,8 +162,9 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         copy = Path(name) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", "out", ".git"))  # with caches
-        chosen = [Place(*word.split(":")[:2], int(word.split(":")[2])) for word in options.only]
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", ".git", "build", "dist", "out"))
+        words = [word.split(":") for word in options.only]
+        chosen = [Place(module, function, int(k)) for module, function, k in words]
         chosen = chosen or random.Random(options.seed).sample(places(copy), options.count)
         counts = 0
         for place in chosen:
@@ -169,4 +176,6 @@ def main() -> None:
 
 if __name__ == "__main__":
     os.environ.pop("PYTHONPATH", None)
+    # bytecode of a text that is changed twice within a second would be taken for valid
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     main()

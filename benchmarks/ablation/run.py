@@ -10,7 +10,8 @@ zero (bootstrap over pictures). Without a seed, that of the commit's hash is tak
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
 are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
-processor times.
+processor times. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each such rule
+compiles the changed file.
 """
 
 from __future__ import annotations
@@ -22,12 +23,15 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from queue import SimpleQueue
 
 from benchmarks.suites.ablation.comparison import Change, Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
-from benchmarks.suites.ablation.rules import BY_NAME, RULES, Kind, Rule
+from benchmarks.suites.ablation.rule import Kind, Rule
+from benchmarks.suites.ablation.rules import BY_NAME, RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without
 from benchmarks.suites.camera.cases import commit_seed
+from benchmarks.support.code_copy import CodeCopy
 from benchmarks.support.machine import conditions_text, write_json
 from extractor.presets import PRESETS
 
@@ -41,11 +45,11 @@ HEAD = (
 
 
 def scores_by_suite(
-    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str
+    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, copy: CodeCopy
 ) -> dict[str, list[PictureScore]]:
     """The scores without the rules, by suite."""
     found: dict[str, list[PictureScore]] = {picture.suite: [] for picture in pictures}
-    for picture, score in zip(pictures, read_without(rules, pictures, preset), strict=True):
+    for picture, score in zip(pictures, read_without(rules, pictures, preset, copy), strict=True):
         found[picture.suite].append(score)
     return found
 
@@ -53,12 +57,20 @@ def scores_by_suite(
 def try_rules(
     rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
 ) -> Iterable[Comparison]:
-    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules."""
-    full = scores_by_suite((), pictures, preset)
+    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules.
+
+    Each process has a copy of the reader for itself. If a rule is native, all copies are built from their sources.
+    """
+    full: dict[str, list[PictureScore]] = {}
+    idle: SimpleQueue[CodeCopy] = SimpleQueue()
 
     def try_rule(rule: Rule) -> Comparison:
         own = [picture for picture in pictures if picture.suite in SUITES[rule.kind]]
-        without = scores_by_suite((rule,), own, preset)
+        copy = idle.get()
+        try:
+            without = scores_by_suite((rule,), own, preset, copy)
+        finally:
+            idle.put(copy)
         suites = list(without)
         return compare(
             rule,
@@ -66,7 +78,13 @@ def try_rules(
             [score for suite in suites for score in without[suite]],
         )
 
-    with ThreadPoolExecutor(processes) as pool:
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(processes) as pool:
+        copies = [CodeCopy(Path(folder) / str(number)) for number in range(processes)]
+        for copy in copies:
+            if any(rule.change.is_native for rule in rules):
+                copy.build()
+            idle.put(copy)
+        full |= scores_by_suite((), pictures, preset, copies[0])
         yield from pool.map(try_rule, rules)
 
 

@@ -18,7 +18,7 @@ import argparse
 import os
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # before numpy and numba
+os.environ["OMP_NUM_THREADS"] = "1"  # before numpy
 
 import cv2
 import numpy as np

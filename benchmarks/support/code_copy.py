@@ -1,129 +1,111 @@
-"""Copies of the code with changed texts, in which what was compiled before stays valid.
-
-Compiled functions are cached by file, time of modification and size of the file, function and line. A copy keeps these.
-A changed module keeps its time, and its size where the new text is not longer. So only the caches of changed
-definitions and of what uses them, directly or not, have to be removed: their code is compiled into that of their users.
-"""
+"""A copy of the packages in which texts of sources are replaced and native modules are built anew."""
 
 from __future__ import annotations
 
-import ast
 import os
 import shutil
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("extractor", "cmpdesign")
-EVERYTHING = "*"  # the name that stands for all definitions of a module
+NATIVE_SUFFIXES = (".cpp", ".hpp")
+READER_MODULE = "extractor_native"  # the target of cmake/CMakeLists.txt
+CMAKE_OPTIONS = ("-DSKBUILD_STATE=editable", f"-DPython_EXECUTABLE={sys.executable}")
 
 
-class Definition(NamedTuple):
-    """A function, class or constant at the top of a module (dotted)."""
+class Replacement(NamedTuple):
+    """A change of one source: the file, relative to the checkout, a text that occurs in it once, and the new text."""
 
-    module: str
-    name: str
+    file: str
+    text: str
+    new: str
 
-
-def path_of(module: str, root: Path) -> Path:
-    """The file of a dotted module below ``root``."""
-    path = root / module.replace(".", "/")
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-
-
-def copy_package(package: str, root: Path) -> None:
-    """Copy a package of this checkout, with its caches, into the folder ``root``."""
-    shutil.copytree(ROOT / package, root / package)
+    @property
+    def is_native(self) -> bool:
+        return self.file.endswith(NATIVE_SUFFIXES)
 
 
-def replace_text(module: str, old: str, new: str, root: Path) -> None:
-    """Replace a text of the module below ``root``, see ``replace_source``.
+def replaced_text(text: str, change: Replacement) -> str:
+    """The text of a file after the change.
 
     Raises:
-        ValueError: the text does not occur exactly once.
+        ValueError: the text to be replaced does not occur exactly once.
     """
-    text = path_of(module, root).read_text(encoding="utf-8")
-    if text.count(old) != 1:
-        raise ValueError(f"{module}: the text occurs {text.count(old)} times, not once: {old!r}")
-    replace_source(module, text.replace(old, new), root)
+    count = text.count(change.text)
+    if count != 1:
+        raise ValueError(f"{change.file}: the text occurs {count} times, not once: {change.text!r}")
+    return text.replace(change.text, change.new)
 
 
-def replace_source(module: str, text: str, root: Path) -> None:
-    """Give the module below ``root`` another text, and remove the caches that this makes invalid."""
-    path = path_of(module, root)
-    before, stat = path.read_text(encoding="utf-8"), path.stat()
-    missing = stat.st_size - len(text.encode())
-    if missing > 0 and before.count("\n") == text.count("\n"):
-        text += "#" * missing
-    changed = changed_names(before, text)
-    stale = users({Definition(module, name) for name in changed}, root)  # by the graph before the change
-    path.write_text(text, encoding="utf-8")
-    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-    stale |= users({Definition(module, name) for name in changed}, root)
-    for cache in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
-        cache.unlink()  # valid by time and size, too
-    for user in stale:
-        source = path_of(user.module, root)
-        for cache in (source.parent / "__pycache__").glob(f"{source.stem}.{user.name}[-.]*.nb[ic]"):
-            cache.unlink()
+def environment(folder: Path) -> dict[str, str]:
+    """The environment of a process that imports the packages of a folder and the benchmarks of this checkout.
+
+    No bytecode is written: of a text that is replaced and put back within a second it would be taken for valid.
+    """
+    path = os.pathsep.join((str(folder), str(ROOT)))
+    return {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def changed_names(before: str, after: str) -> set[str]:
-    """The top-level names that are defined differently; ``EVERYTHING`` where other statements differ."""
-    old, new = _dumps(before), _dumps(after)
-    return {name for name in old.keys() | new.keys() if old.get(name) != new.get(name)}
+class CodeCopy:
+    """A copy of the packages, at first with the native modules of this checkout.
 
+    Attributes:
+        folder: holds the packages, ``cmake`` and the build tree.
+    """
 
-def users(changed: set[Definition], root: Path) -> set[Definition]:
-    """The changed definitions and all of ``PACKAGES`` below ``root`` that use one of them, directly or not."""
-    texts = {
-        ".".join(path.relative_to(root).with_suffix("").parts): path.read_text(encoding="utf-8")
-        for package in PACKAGES
-        for path in (root / package).rglob("*.py")
-    }
-    uses = {user: used for module, text in texts.items() for user, used in _uses(module, text, texts)}
-    whole = {each.module for each in changed if each.name == EVERYTHING}
-    found: set[Definition] = set()
-    new = set(changed) | {user for user in uses if user.module in whole}
-    while new:
-        found |= new
-        of_modules = new | {Definition(each.module, EVERYTHING) for each in new}
-        new = {user for user, used in uses.items() if not used.isdisjoint(of_modules)} - found
-    return found
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        for package in PACKAGES:
+            shutil.copytree(ROOT / package, folder / package)
+        (folder / "cmake").mkdir()
+        shutil.copy2(ROOT / "cmake" / "CMakeLists.txt", folder / "cmake")
+        self._tree = folder / "tree"
 
+    def build(self) -> None:
+        """Build the reader's native module from the copied sources; later only of what has changed since.
 
-def _names(statement: ast.stmt) -> list[str]:
-    """What a top-level statement defines; ``EVERYTHING`` for one that is no definition."""
-    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-        return [statement.name]
-    if isinstance(statement, ast.Assign | ast.AnnAssign):
-        targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
-        return [node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)]
-    return [EVERYTHING]
+        Raises:
+            RuntimeError: the build failed.
+        """
+        if not (self._tree / "build.ninja").exists():
+            places = "-S", str(self.folder / "cmake"), "-B", str(self._tree)
+            self._run("cmake", *places, "-G", "Ninja", *CMAKE_OPTIONS)
+        self._run("cmake", "--build", str(self._tree), "--target", READER_MODULE)
 
+    @contextmanager
+    def replaced(self, changes: Iterable[Replacement]) -> Iterator[None]:
+        """Replace texts for as long as the context lasts. A native module once built is always that of the texts.
 
-def _dumps(text: str) -> dict[str, str]:
-    """The texts of a module's definitions without their places in the file."""
-    found: dict[str, str] = {}
-    for statement in ast.parse(text).body:
-        for name in _names(statement):
-            found[name] = found.get(name, "") + ast.dump(statement)
-    return found
+        Raises:
+            ValueError: a text to be replaced does not occur exactly once.
+            RuntimeError: the build failed.
+        """
+        before: dict[Path, str] = {}
+        is_native = self._tree.exists()
+        try:
+            for change in changes:
+                path = self.folder / change.file
+                text = path.read_text(encoding="utf-8")
+                new = replaced_text(text, change)
+                before.setdefault(path, text)
+                path.write_text(new, encoding="utf-8")
+                is_native |= change.is_native
+            if is_native:
+                self.build()
+            yield
+        finally:
+            for path, text in before.items():
+                path.write_text(text, encoding="utf-8")
 
-
-def _uses(module: str, text: str, texts: dict[str, str]) -> Iterator[tuple[Definition, set[Definition]]]:
-    """Every definition of a module with what it uses; of an imported module it may use everything."""
-    tree = ast.parse(text)
-    meaning = {name: Definition(module, name) for node in tree.body for name in _names(node)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                meaning[alias.asname or alias.name] = (
-                    Definition(inner, EVERYTHING) if inner in texts else Definition(node.module, alias.name)
-                )
-    for statement in tree.body:
-        used = {node.id for node in ast.walk(statement) if isinstance(node, ast.Name)}
-        for name in _names(statement):
-            yield Definition(module, name), {meaning[other] for other in used if other in meaning}
+    def _run(self, *command: str) -> None:
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        result = subprocess.run(
+            command, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+        )
+        if result.returncode != 0:
+            raise RuntimeError(f"{' '.join(command)}: {(result.stdout + result.stderr)[-4000:]}")

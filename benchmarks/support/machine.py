@@ -1,4 +1,4 @@
-"""The conditions of measured figures, machine and versions, and the writing of a benchmark's results."""
+"""The conditions of measured figures, machine, versions and compiler, and the writing of a benchmark's results."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ import json
 import math
 import os
 import platform
+import re
 from collections.abc import Mapping
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from cmpdesign.files.atomic import write_file
 
-PACKAGES = ("numpy", "opencv-contrib-python-headless", "numba", "scipy")
+PACKAGES = ("numpy", "opencv-contrib-python-headless", "scipy")
+NATIVE_MODULE = "extractor._native"
+COMPILER_NOTE = re.compile(rb"(clang) version (\d+[.\d]*)|(GCC): \([^)]*\) (\d+[.\d]*)")  # in a module's file
 
 
 def processor_name() -> str:
@@ -27,22 +31,35 @@ def processor_name() -> str:
     return platform.processor() or platform.machine()
 
 
+def compiler_name() -> str:
+    """The compiler that the native module's file names, and its version, if the file names one."""
+    module = find_spec(NATIVE_MODULE)
+    data = Path(module.origin).read_bytes() if module and module.origin else b""
+    # a module by clang also has the notes of the system's start files, which are by GCC
+    found = sorted(b" ".join(filter(None, note)) for note in COMPILER_NOTE.findall(data))
+    return found[-1].decode() if found else "unknown compiler"
+
+
 def machine_conditions() -> dict[str, str]:
-    """Machine and versions by name."""
+    """Machine, versions and compiler by name."""
     load = f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown"
     conditions = {
         "cpu": f"{processor_name()}, {os.cpu_count()} cores, load {load}",
         "system": f"{platform.system()} {platform.machine()}",
     }
     conditions["python"] = platform.python_version()
-    return conditions | {name: version(name) for name in PACKAGES}
+    return conditions | {name: version(name) for name in PACKAGES} | {"compiler": compiler_name()}
 
 
 def conditions_text(conditions: Mapping[str, str] | None = None) -> str:
-    """The given or the present conditions on one line, for a table's caption."""
+    """The given or the present conditions on one line, for a table's caption; earlier ones have no compiler."""
     conditions = conditions or machine_conditions()
-    packages = ", ".join(f"{name.partition('-')[0]} {conditions[name]}" for name in PACKAGES)
-    return f"{conditions['cpu']}; {conditions['system']}; Python {conditions['python']}, {packages}"
+    versions = [f"{name.partition('-')[0]} {conditions[name]}" for name in PACKAGES]
+    if "compiler" in conditions:
+        versions.append(conditions["compiler"])
+    return (
+        f"{conditions['cpu']}; {conditions['system']}; Python {conditions['python']}, {', '.join(versions)}"
+    )
 
 
 def null_for_nan(value: Any) -> Any:

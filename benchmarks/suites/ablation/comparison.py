@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.ablation.rules import Rule
+from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
 LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that stays
@@ -152,4 +152,4 @@ def _root(sums: Floats) -> Floats:
     """The root of the first sums (N, 2) over the second ones; NaN where nothing was measured."""
     out = np.full(len(sums), np.nan)
     np.divide(sums[:, 0], sums[:, 1], out=out, where=sums[:, 1] > 0)
-    return np.sqrt(out)
+    return np.asarray(np.sqrt(out))

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
-from benchmarks.suites.ablation.rules import Rule
+from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
 from benchmarks.suites.scoring.calibration import squared_distances
-from benchmarks.support.code_copy import ROOT, copy_package, replace_text
+from benchmarks.support.code_copy import CodeCopy, environment
 from extractor import Status
 
 WRONG_POSITION, SAME_PLACE = (
@@ -57,36 +54,33 @@ class PictureScore(NamedTuple):
         return self.wrong_ids + self.wrong_positions
 
 
-def read_without(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> list[PictureScore]:
-    """The scores of the pictures, read by a copy of the reader without these rules.
-
-    Without any rule this checkout's own reader reads them, which leaves its compiled functions to the copies.
+def read_without(
+    rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, copy: CodeCopy
+) -> list[PictureScore]:
+    """The scores of the pictures, read by the copy of the reader without these rules.
 
     Raises:
         ValueError: a rule's text does not occur exactly once.
-        RuntimeError: the reader cannot be run.
+        RuntimeError: the reader cannot be built or run.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder, out = Path(name) if rules else ROOT, Path(name) / "readings"
-        if rules:
-            copy_package("extractor", folder)
-        for rule in rules:
-            replace_text(rule.module, rule.text, rule.without, folder)
-        names = ", ".join(rule.name for rule in rules) or "any change"
+    names = ", ".join(rule.name for rule in rules) or "any change"
+    out = copy.folder / "readings"
+    with copy.replaced([rule.change for rule in rules]):
         result = subprocess.run(
             [
-                *(sys.executable, "-m", "benchmarks.suites.ablation.worker", str(folder), preset, str(out)),
+                *(sys.executable, "-m", "benchmarks.suites.ablation.worker"),
+                *(str(copy.folder), preset, str(out)),
                 *(str(picture.path) for picture in pictures),
             ],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))},
+            cwd=copy.folder,
+            env=environment(copy.folder),
             capture_output=True,
             text=True,
             check=False,
         )
-        if result.returncode != 0:
-            raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
-        readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
+    if result.returncode != 0:
+        raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
+    readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
     return [
         score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
     ]

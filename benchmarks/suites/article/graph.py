@@ -1,23 +1,23 @@
 """The article's connection of triangles: corners that meet are merged into a graph of markers (eqs. 4-5).
 
-The extractor numbers the cell mesh instead and is compared with this graph.
+The extractor numbers the cell mesh instead and is compared with this graph. Plain Python, slower than need be.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from extractor.cells.triangle_fit import Triangles
-from extractor.numeric.compilation import compiled
 
 # L of eq. 5 in units of the shortest edge at either corner. Corners of different markers are at least one edge apart.
 MERGE_SHARE = 0.4
 # Two triangles that meet at a corner lie in different directions from it: the cosine between these is below this.
 MAX_SAME_SIDE_COSINE = 0.8
-NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,98 +37,50 @@ class CornerGraph:
     mirrored: bool
 
 
-@compiled
-def _candidate_pairs(corner_px, ink):  # type: ignore[no-untyped-def]
-    """(P, 2) int32 pairs of corners of different inks within L of each other, and (P,) distance / L."""
-    count = corner_px.shape[0]
-    flat = corner_px.reshape(-1, 2)
-    reach = np.empty(3 * count)
-    centre = np.empty((count, 2))
-    for i in range(count):
-        centre[i, 0] = corner_px[i, :, 0].mean()
-        centre[i, 1] = corner_px[i, :, 1].mean()
-        for k in range(3):
-            a, b = corner_px[i, (k + 1) % 3], corner_px[i, (k + 2) % 3]
-            p = corner_px[i, k]
-            reach[3 * i + k] = MERGE_SHARE * min(
-                np.hypot(a[0] - p[0], a[1] - p[1]), np.hypot(b[0] - p[0], b[1] - p[1])
-            )
-    # A grid of buckets as wide as the longest reach: candidates lie in the 3 x 3 buckets around a corner.
-    width = max(reach.max(), 1e-9)
-    low_x, low_y = flat[:, 0].min(), flat[:, 1].min()
-    width = max(width, (flat[:, 0].max() - low_x) / 2000.0, (flat[:, 1].max() - low_y) / 2000.0)
-    columns = int((flat[:, 0].max() - low_x) / width) + 3
-    rows = int((flat[:, 1].max() - low_y) / width) + 3
-    head = np.full(rows * columns, -1, np.int32)
-    following = np.full(3 * count, -1, np.int32)
-    bucket = np.empty(3 * count, np.int32)
-    for i in range(3 * count):
-        b = (int((flat[i, 1] - low_y) / width) + 1) * columns + int((flat[i, 0] - low_x) / width) + 1
-        bucket[i] = b
-        following[i] = head[b]
-        head[b] = i
-    pairs = np.empty((3 * count * NEIGHBOURS, 2), np.int32)
-    ratio = np.empty(3 * count * NEIGHBOURS)
-    found = 0
-    for i in range(3 * count):
-        for dy in range(-1, 2):
-            for dx in range(-1, 2):
-                j = head[bucket[i] + dy * columns + dx]
-                while j >= 0:
-                    if j > i and ink[i // 3] != ink[j // 3] and found < pairs.shape[0]:
-                        limit = min(reach[i], reach[j])
-                        distance = np.hypot(flat[i, 0] - flat[j, 0], flat[i, 1] - flat[j, 1])
-                        if distance <= limit and not _is_same_side(flat, centre, i, j):
-                            pairs[found, 0] = i
-                            pairs[found, 1] = j
-                            ratio[found] = distance / limit
-                            found += 1
-                    j = following[j]
-    return pairs[:found], ratio[:found]
+class CornerPairs(NamedTuple):
+    """Pairs of corners that may be merged.
 
-
-@compiled
-def _is_same_side(flat, centre, i, j):  # type: ignore[no-untyped-def]
-    """Whether the triangles of two corners lie on the same side of the corners' common point."""
-    x, y = 0.5 * (flat[i, 0] + flat[j, 0]), 0.5 * (flat[i, 1] + flat[j, 1])
-    ax, ay = centre[i // 3, 0] - x, centre[i // 3, 1] - y
-    bx, by = centre[j // 3, 0] - x, centre[j // 3, 1] - y
-    return ax * bx + ay * by > MAX_SAME_SIDE_COSINE * np.hypot(ax, ay) * np.hypot(bx, by)
-
-
-@compiled
-def _merge_corners(pairs, order, ink):  # type: ignore[no-untyped-def]
-    """Merge corners, nearest pairs first, so that no node has two corners of one ink.
-
-    Returns:
-        (3 T,) int32, the node of every corner, and the number of nodes.
+    Attributes:
+        corners: (P, 2), as 3 * triangle + corner.
+        ratio: (P,) float64, their distance / L.
     """
-    corners = 3 * ink.shape[0]
-    parent = np.arange(corners).astype(np.int32)
-    inks = np.empty(corners, np.uint8)
-    for i in range(corners):
-        inks[i] = 1 << (ink[i // 3] - 1)
-    for p in order:
-        a, b = pairs[p, 0], pairs[p, 1]
-        while parent[a] != a:
-            a = parent[a]
-        while parent[b] != b:
-            b = parent[b]
+
+    corners: NDArray[np.intp]
+    ratio: NDArray[np.float64]
+
+
+def _candidate_pairs(corner_px: NDArray[np.float64], ink: NDArray[np.uint8]) -> CornerPairs:
+    """The pairs of corners of different inks within L of each other, of triangles on different sides of them."""
+    flat, side = corner_px.reshape(-1, 2), corner_px[:, [1, 2, 0]] - corner_px
+    length = np.hypot(side[..., 0], side[..., 1])
+    reach = MERGE_SHARE * np.minimum(length, length[:, [2, 0, 1]]).reshape(-1)
+    pairs = cKDTree(flat).query_pairs(reach.max(), output_type="ndarray")
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    i, j = pairs.T
+    distance, limit = np.hypot(*(flat[i] - flat[j]).T), np.minimum(reach[i], reach[j])
+    center, common = corner_px.mean(axis=1), 0.5 * (flat[i] + flat[j])
+    to_i, to_j = center[i // 3] - common, center[j // 3] - common
+    same_side = (to_i * to_j).sum(axis=1) > MAX_SAME_SIDE_COSINE * np.hypot(*to_i.T) * np.hypot(*to_j.T)
+    kept = (ink[i // 3] != ink[j // 3]) & (distance <= limit) & ~same_side
+    return CornerPairs(pairs[kept], distance[kept] / limit[kept])
+
+
+def _merge_corners(pairs: CornerPairs, ink: NDArray[np.uint8]) -> NDArray[np.intp]:
+    """(3 T,) the node of every corner. The nearest pairs are merged first, no node with two corners of one ink."""
+    parent = list(range(3 * len(ink)))
+    inks = [1 << (own - 1) for own in ink.tolist() for _ in range(3)]
+
+    def root(corner: int) -> int:
+        while parent[corner] != corner:
+            corner = parent[corner]
+        return corner
+
+    for one, other in pairs.corners[np.argsort(pairs.ratio, kind="stable")].tolist():
+        a, b = root(one), root(other)
         if a != b and inks[a] & inks[b] == 0:
             parent[b] = a
             inks[a] |= inks[b]
-    node = np.full(corners, -1, np.int32)
-    count = 0
-    for i in range(corners):
-        if parent[i] == i:
-            node[i] = count
-            count += 1
-    for i in range(corners):
-        root = i
-        while parent[root] != root:
-            root = parent[root]
-        node[i] = node[root]
-    return node, count
+    return np.unique([root(corner) for corner in range(3 * len(ink))], return_inverse=True)[1]
 
 
 def connect_corners(triangles: Triangles) -> CornerGraph:
@@ -137,15 +89,18 @@ def connect_corners(triangles: Triangles) -> CornerGraph:
     if count == 0:
         empty = np.empty((0, 3), np.int32)
         return CornerGraph(empty, empty, np.empty((0, 2)), False)
-    pairs, ratio = _candidate_pairs(triangles.corner_px, triangles.ink)
-    node, nodes = _merge_corners(pairs, np.argsort(ratio, kind="stable"), triangles.ink)
+    node = _merge_corners(_candidate_pairs(triangles.corner_px, triangles.ink), triangles.ink)
+    nodes = int(node.max()) + 1
     corner_of_node = np.full((nodes, 3), -1, np.int32)
     corner_of_node[node, np.repeat(triangles.ink - 1, 3)] = np.arange(3 * count, dtype=np.int32)
     flat = triangles.corner_px.reshape(-1, 2)
     members = np.bincount(node, minlength=nodes)
     xy = np.stack([np.bincount(node, weights=flat[:, a], minlength=nodes) / members for a in (0, 1)], axis=1)
     return CornerGraph(
-        node.reshape(count, 3), corner_of_node, xy, _is_mirrored(triangles, corner_of_node, xy)
+        node.reshape(count, 3).astype(np.int32),
+        corner_of_node,
+        xy,
+        _is_mirrored(triangles, corner_of_node, xy),
     )
 
 

@@ -1,4 +1,7 @@
-"""The article's spin-search algorithm (SSA): the graph is numbered from the white cell, clockwise, layer by layer."""
+"""The article's spin-search algorithm (SSA): the graph is numbered from the white cell, clockwise, layer by layer.
+
+Plain Python, slower than need be.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from extractor.cells.triangle_fit import Triangles
 from extractor.layout.lattice import axial_coordinates, layer_of, marker_id
 from extractor.layout.reference import BLACK, WHITE, Reference
 from extractor.numeric.bilinear import fill_patch_mean
-from extractor.numeric.compilation import compiled
 
 # Smallest ratio of the white cell's interior to the inks of its neighbours, both as sums over the channels.
 # The ratio of black is below a quarter; white is brighter than any ink even in a dim print.
@@ -40,16 +42,14 @@ class LatticeTables(NamedTuple):
 
 
 class SpinGraph(NamedTuple):
-    """A graph of corners for the compiled search.
+    """A graph of corners for the search.
 
     Attributes:
-        ink: (T,) uint8, the ink of each triangle.
         node_of_corner: (T, 3) int32, the node of each triangle's corners.
         corner_of_node: (N, 3) int32 by ink: 3 * triangle + corner, or -1.
         sense: 1 from the front, -1 mirrored.
     """
 
-    ink: NDArray[np.uint8]
     node_of_corner: NDArray[np.int32]
     corner_of_node: NDArray[np.int32]
     sense: int
@@ -110,57 +110,51 @@ def make_lattice_tables(reference: Reference) -> LatticeTables:
     return LatticeTables(layers=int(reference.layer.max()), cell_of=cell_of)
 
 
-@compiled
-def _measure_gaps(image, corner_px, node_of_corner, corner_of_node, sense):  # type: ignore[no-untyped-def]
-    """(N, 3) brightness of the gap after each ink of each node over the neighbouring inks, and (N, 3, 2) its centre.
+class Gaps(NamedTuple):
+    """The gaps after each ink of each node.
+
+    Attributes:
+        ratio: (N, 3) float64, the gap's brightness over that of the neighbouring inks, 0 where unknown.
+        center_px: (N, 3, 2) float64, NaN where unknown.
+    """
+
+    ratio: NDArray[np.float64]
+    center_px: NDArray[np.float64]
+
+
+def _measure_gaps(
+    image: NDArray[np.uint8], corner_px: NDArray[np.float64], corner_of_node: NDArray[np.int32], sense: int
+) -> Gaps:
+    """Measure the gaps.
 
     Clockwise from the triangle of one ink to the triangle of the next, the gap's corners are the node, the first
     triangle's corner before the node and the second triangle's corner after it.
     """
-    nodes = corner_of_node.shape[0]
-    ratio = np.zeros((nodes, 3))
-    centre = np.full((nodes, 3, 2), np.nan)
-    flat, height, width = image.reshape(-1), image.shape[0], image.shape[1]
-    gap_levels, first_levels, second_levels = np.zeros(3), np.zeros(3), np.zeros(3)
-    for n in range(nodes):
-        for ink in range(3):
-            a, b = corner_of_node[n, ink], corner_of_node[n, (ink + 1) % 3]
-            if a < 0 or b < 0:
-                continue
-            ta, ka, tb, kb = a // 3, a % 3, b // 3, b % 3
-            pa = corner_px[ta, (ka - sense) % 3]
-            pb = corner_px[tb, (kb + sense) % 3]
-            x = (corner_px[ta, ka, 0] + corner_px[tb, kb, 0]) / 6 + (pa[0] + pb[0]) / 3
-            y = (corner_px[ta, ka, 1] + corner_px[tb, kb, 1]) / 6 + (pa[1] + pb[1]) / 3
-            radius = 0.2 * np.hypot(pa[0] - x, pa[1] - y)
-            inside = fill_patch_mean(flat, height, width, x, y, radius, gap_levels)
-            inside &= fill_patch_mean(
-                flat,
-                height,
-                width,
-                corner_px[ta, :, 0].mean(),
-                corner_px[ta, :, 1].mean(),
-                radius,
-                first_levels,
-            )
-            inside &= fill_patch_mean(
-                flat,
-                height,
-                width,
-                corner_px[tb, :, 0].mean(),
-                corner_px[tb, :, 1].mean(),
-                radius,
-                second_levels,
-            )
-            if inside:
-                ratio[n, ink] = 2.0 * gap_levels.sum() / max(first_levels.sum() + second_levels.sum(), 1.0)
-                centre[n, ink, 0] = x
-                centre[n, ink, 1] = y
-    return ratio, centre
+    found = Gaps(np.zeros(corner_of_node.shape), np.full((*corner_of_node.shape, 2), np.nan))
+    middle = corner_px.mean(axis=1)
+    for n, ink in np.argwhere((corner_of_node >= 0) & (np.roll(corner_of_node, -1, axis=1) >= 0)):
+        (ta, ka), (tb, kb) = divmod(corner_of_node[n, ink], 3), divmod(corner_of_node[n, (ink + 1) % 3], 3)
+        before, after = corner_px[ta, (ka - sense) % 3], corner_px[tb, (kb + sense) % 3]
+        center = (corner_px[ta, ka] + corner_px[tb, kb]) / 6 + (before + after) / 3
+        radius = 0.2 * np.hypot(*(before - center))
+        gap, first, second = (
+            _patch_level(image, place, radius) for place in (center, middle[ta], middle[tb])
+        )
+        if np.isfinite(gap + first + second):
+            found.ratio[n, ink] = 2.0 * gap / max(first + second, 1.0)
+            found.center_px[n, ink] = center
+    return found
 
 
-@compiled
-def _spin_search(start, q0, r0, graph, lattice):  # type: ignore[no-untyped-def]
+def _patch_level(image: NDArray[np.uint8], place: NDArray[np.float64], radius: float) -> float:
+    """The sum of the channels around a place; NaN outside the image."""
+    height, width, _ = image.shape
+    color = np.zeros(3)
+    is_inside = fill_patch_mean(image.reshape(-1), height, width, place[0], place[1], radius, color)
+    return float(color.sum()) if is_inside else np.nan
+
+
+def _spin_search(start: int, axial: tuple[int, int], graph: SpinGraph, lattice: LatticeTables) -> SpinResult:
     """Number triangles outward from one node, the smallest id first.
 
     At a marker with the color phase (q - r) mod 3 the ink of a triangle determines which of the three cells around the
@@ -169,72 +163,51 @@ def _spin_search(start, q0, r0, graph, lattice):  # type: ignore[no-untyped-def]
 
     Args:
         start: the first node.
-        q0, r0: the first node's axial coordinates.
-        graph: a ``SpinGraph``.
-        lattice: a ``LatticeTables``.
-
-    Returns:
-        A ``SpinResult``.
+        axial: its coordinates (q, r).
+        graph: the corners.
+        lattice: the layout.
     """
-    ink, sense, cell_of, layers = graph.ink, graph.sense, lattice.cell_of, lattice.layers
-    node_of_corner, corner_of_node = graph.node_of_corner, graph.corner_of_node
-    triangles, nodes = ink.shape[0], corner_of_node.shape[0]
-    unknown = -(1 << 20)
-    node_q = np.full(nodes, unknown, np.int32)
-    node_r = np.full(nodes, unknown, np.int32)
-    marker = np.full((triangles, 3), -1, np.int32)
-    cell = np.full(triangles, -1, np.int32)
-    holder = np.full(cell_of.shape[0], -1, np.int32)  # up-cell -> triangle
-    named = np.full(cell_of.shape[0], -1, np.int32)  # marker -> node
-    bad = np.zeros(nodes, np.bool_)
+    cell_of, node_of_corner = lattice.cell_of.tolist(), graph.node_of_corner.tolist()
+    corner_of_node = graph.corner_of_node.tolist()
+    marker = np.full(graph.node_of_corner.shape, -1, np.int32)
+    cell = np.full(len(node_of_corner), -1, np.int32)
+    bad = np.zeros(len(corner_of_node), np.bool_)
     outside = 0
-    node_q[start], node_r[start] = q0, r0
-    first = marker_id(q0, r0)
-    named[first] = start
-    heap = [first * nodes + start]  # the smallest marker id first
-    while len(heap) > 0:
-        n = heapq.heappop(heap) % nodes
-        q, r = node_q[n], node_r[n]
-        phase = (q - r) % 3
+    triangle_of: dict[int, int] = {}  # by up-cell
+    axial_of = {start: axial}  # by node
+    heap = [(marker_id(*axial), start)]  # the smallest marker id first
+    while heap:
+        _, n = heapq.heappop(heap)
+        q, r = axial_of[n]
         for turn in range(3):
-            hue = (phase + turn) % 3
-            c = corner_of_node[n, hue]
+            c = corner_of_node[n][(q - r + turn) % 3]
             if c < 0:
                 continue
-            t, k = c // 3, c % 3
+            t, k = divmod(c, 3)
             # Roles 0, 1, 2: the node is the cell's corner (0, 0), (1, 0), (0, 1).
-            role = 0 if turn == 0 else 1 if turn == 2 else 2
-            cq = q - 1 if role == 1 else q
-            cr = r - 1 if role == 2 else r
-            known = layer_of(cq, cr) <= layers
-            up = marker_id(cq, cr) if known else -1
-            if not known or cell_of[up] < 0:
+            role = (0, 2, 1)[turn]
+            cq, cr = q - (role == 1), r - (role == 2)
+            up = marker_id(cq, cr) if layer_of(cq, cr) <= lattice.layers else -1
+            if up < 0 or cell_of[up] < 0:
                 outside += 1
                 continue
-            if cell[t] >= 0 or holder[up] >= 0:
-                if cell[t] != cell_of[up] or holder[up] != t:
+            if cell[t] >= 0 or up in triangle_of:
+                if cell[t] != cell_of[up] or triangle_of.get(up) != t:
                     bad[n] = True
                     if cell[t] >= 0:
-                        for j in range(3):
-                            bad[node_of_corner[t, j]] = True
+                        bad[node_of_corner[t]] = True
                 continue
-            cell[t] = cell_of[up]
-            holder[up] = t
+            cell[t], triangle_of[up] = cell_of[up], t
             for j in range(3):
                 # Clockwise the roles are 0, 2, 1.
-                at = (role - sense * j) % 3
-                corner = (k + j) % 3
-                mq = cq + 1 if at == 1 else cq
-                mr = cr + 1 if at == 2 else cr
-                m = marker_id(mq, mr)
-                marker[t, corner] = m
-                other = node_of_corner[t, corner]
-                if node_q[other] == unknown:
-                    node_q[other], node_r[other] = mq, mr
-                    if named[m] < 0:
-                        named[m] = other
-                    heapq.heappush(heap, m * nodes + other)
-                elif node_q[other] != mq or node_r[other] != mr:
+                at = (role - graph.sense * j) % 3
+                place, corner = (cq + (at == 1), cr + (at == 2)), (k + j) % 3
+                marker[t, corner] = marker_id(*place)
+                other = node_of_corner[t][corner]
+                if other not in axial_of:
+                    axial_of[other] = place
+                    heapq.heappush(heap, (int(marker[t, corner]), other))
+                elif axial_of[other] != place:
                     bad[other] = True
     return SpinResult(marker, cell, bad, outside)
 
@@ -261,14 +234,14 @@ def _split_nodes(graph: CornerGraph, bad: NDArray[np.bool_]) -> CornerGraph:
 
 
 def _number_from(
-    graph: CornerGraph, triangles: Triangles, lattice: LatticeTables, node: int, coordinate: NDArray[np.int32]
+    graph: CornerGraph, lattice: LatticeTables, node: int, coordinate: NDArray[np.int32]
 ) -> NumberedTriangles:
     """Number from one node. Nodes with contradictions are split, and the search is repeated."""
     sense = -1 if graph.mirrored else 1
     conflicts = 0
     for _ in range(MAX_ROUNDS):
-        spin_graph = SpinGraph(triangles.ink, graph.node_of_corner, graph.corner_of_node, sense)
-        found = _spin_search(node, int(coordinate[0]), int(coordinate[1]), spin_graph, lattice)
+        spin_graph = SpinGraph(graph.node_of_corner, graph.corner_of_node, sense)
+        found = _spin_search(node, (int(coordinate[0]), int(coordinate[1])), spin_graph, lattice)
         if not found.bad.any():
             return NumberedTriangles(found.marker, found.cell, found.outside, conflicts)
         conflicts += int(found.bad.sum())
@@ -289,9 +262,7 @@ def number_triangles(
     outline and the fewest outside is used. The result is ambiguous if two candidates are equal.
     """
     sense = -1 if graph.mirrored else 1
-    ratio, centre = _measure_gaps(
-        image, triangles.corner_px, graph.node_of_corner, graph.corner_of_node, sense
-    )
+    ratio, centre = _measure_gaps(image, triangles.corner_px, graph.corner_of_node, sense)
     bright = np.argwhere(ratio > MIN_WHITE_RATIO)
     bright = bright[np.argsort(-ratio[bright[:, 0], bright[:, 1]], kind="stable")][: 3 * MAX_WHITES]
     best: tuple[int, Numbering] | None = None
@@ -303,7 +274,7 @@ def number_triangles(
         if any(np.hypot(*(white_px - other)) < reach for other in tried_px):
             continue
         tried_px.append(white_px)
-        numbered = _number_from(graph, triangles, lattice, int(node), GAP_AXIAL[ink])
+        numbered = _number_from(graph, lattice, int(node), GAP_AXIAL[ink])
         score = int((numbered.cell >= 0).sum()) - 3 * numbered.outside - numbered.conflicts
         found = Numbering(numbered.marker, numbered.cell, white_px, numbered.conflicts, False)
         if best is None or score > best[0]:

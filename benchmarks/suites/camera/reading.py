@@ -38,7 +38,7 @@ class PictureResult:
         right: markers that are visible, measured and not wrong.
         measured: markers that are visible and measured, wrong ones included.
         visible: visible markers.
-        ms: processor time of the faster of two readings; the first one may compile.
+        ms: processor time of the faster of two readings; the first one may load modules.
         reason: the extractor's reason, or the text of its exception; empty if there is none.
         raised: the extractor raised an exception.
     """
@@ -143,7 +143,7 @@ def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_
 
 
 def warm_up(preset: Preset) -> None:
-    """Compile before times are measured, and keep OpenCV to one thread."""
+    """Load what the first reading loads before times are measured, and keep OpenCV to one thread."""
     import cv2
 
     cv2.setNumThreads(1)

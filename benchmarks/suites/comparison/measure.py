@@ -81,7 +81,7 @@ def measure_case(case: SceneCase, repetitions: int) -> list[MethodResult]:
     methods = [m for m in METHODS if boards or not m.board or m.name == REFERENCE_METHOD]
     samples = {method.name: _MethodSamples() for method in methods}
     previous: dict[bool, Rendered] = {}
-    for seed in range(-1, repetitions):  # the first repetition loads and compiles
+    for seed in range(-1, repetitions):  # the first repetition loads modules
         rendered = {
             board: render(replace(scene, seed=max(seed, 0)), size=STANDARD_SIZE)
             for board, scene in scenes.items()

@@ -110,7 +110,7 @@ def _update_sums(
     bound_px2 = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE))
     for method in methods:
         sums[method.name].scenes += 1
-    for seed in range(-1, seeds):  # the first reading loads and compiles
+    for seed in range(-1, seeds):  # the first reading loads modules
         rendered = render(replace(scene, seed=max(seed, 0)), size=STANDARD_SIZE)
         for method in methods:
             reading = method.read(case, np.asarray(rendered.image, np.uint8))

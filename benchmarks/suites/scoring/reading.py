@@ -120,7 +120,7 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
 
 
 def warm_up() -> None:
-    """Compile before times are measured."""
+    """Load what the first reading loads before times are measured."""
     import cv2
 
     cv2.setNumThreads(1)

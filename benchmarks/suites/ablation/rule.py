@@ -1,0 +1,46 @@
+"""A rule of the reader, with the text of its source that switches it off.
+
+A rule is a threshold, a branch or a fallback that the reader would work without. The text occurs exactly once in its
+file. A threshold is switched off in the limits of its Python module, which need no compiler. The stages themselves
+(inks, growing, mesh, walk) are no rules.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import Literal, NamedTuple
+
+from benchmarks.support.code_copy import Replacement
+
+Kind = Literal["accuracy", "no wrong id"]
+
+
+class Rule(NamedTuple):
+    """One rule.
+
+    Attributes:
+        name: of the rule.
+        purpose: what the rule is for.
+        kind: by what it is judged: by counts and errors in the five suites, or by the wrong ids that it prevents.
+        file: of the reader's source, relative to the checkout.
+        text: of the file, to be replaced.
+        without: the text that replaces it and switches the rule off.
+    """
+
+    name: str
+    purpose: str
+    kind: Kind
+    file: str
+    text: str
+    without: str
+
+    @property
+    def stage(self) -> str:
+        """The folder of the reader that holds the rule, or ``pipeline``."""
+        parts = PurePosixPath(self.file).with_suffix("").parts[1:]
+        return parts[1] if parts[0] == "native" else parts[0]
+
+    @property
+    def change(self) -> Replacement:
+        """What switches the rule off."""
+        return Replacement(self.file, self.text, self.without)
