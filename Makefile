@@ -42,6 +42,8 @@ $(READY): pyproject.toml $(LOCK)
 	@$(PYTHON) -m venv .venv
 	@$(PIP) $(BUILD_NEEDS) $(ZIG)
 	@$(TOOLCHAIN) PATH=$(CURDIR)/$(BIN):$$PATH $(PIP) --no-build-isolation --editable '.[dev]'
+	@# Only the path: the build backend's finder would take the packages from here also in copies of the checkout.
+	@sed -i.old '/^import /d' .venv/lib/python*/site-packages/_editable_skbc_cmpdesign.pth
 	@touch $@ $(CORE)
 
 # The native modules, where a source is newer.
