@@ -19,15 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.contact.elastic_layer.green import KERNEL_REACH_THICKNESSES
 from cmpdesign.contact.elastic_layer.kernels import interior_compliances, layer_compliances
 from cmpdesign.contact.elastomer import Elastomer
 
 Array = NDArray[np.float64]
 WAVE_REACH = 7.0  # in units of 1 / s, the largest wave number; P is 2e-11 of its largest value there
-NODES_PER_TURN = 8  # quadrature nodes for each period of the Bessel functions at the largest distance
-STEPS_PER_WIDTH = (
-    16  # distances of the tables per width s; between them the tables are interpolated by cubics
-)
+TURN_NODES = 8  # of a Gauss-Legendre rule for each period of the Bessel functions at the largest distance
+STEPS_PER_WIDTH = 16  # distances of the tables per width s, between which cubics interpolate
+PATCH_REACH = 5.0  # in units of s, beyond which a load has no traction
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class PatchResponse:
 
     Attributes:
         distance_mm: (n,) of the tables.
-        tables: (5, n) in the order above.
+        tables: (5, n) in the order above; 0 beyond the largest distance.
     """
 
     distance_mm: Array
@@ -48,7 +48,8 @@ class PatchResponse:
 
         offset = points_mm[:, None] - centres_mm[None]
         distance = np.hypot(offset[..., 0], offset[..., 1])
-        z0, z1, x1, l0, l2 = np.moveaxis(CubicSpline(self.distance_mm, self.tables, axis=1)(distance), 0, 0)
+        values = CubicSpline(self.distance_mm, self.tables, axis=1)(distance)
+        z0, z1, x1, l0, l2 = np.where(distance <= self.distance_mm[-1], values, 0.0)
         unit = offset / np.where(distance > 0, distance, 1.0)[..., None]
         blocks = np.empty((len(points_mm), 3, len(centres_mm), 3))
         for a in range(2):
@@ -62,13 +63,18 @@ class PatchResponse:
 
 
 def patch_response(elastomer: Elastomer, width_mm: float, depth_mm: float, reach_mm: float) -> PatchResponse:
-    """The response to a load exp(-r^2 / 2 width^2) at a depth below the surface, for distances up to ``reach_mm``."""
+    """The response to a load exp(-r^2 / 2 width^2) at a depth below the surface, for distances up to ``reach_mm``.
+
+    Beyond ``KERNEL_REACH_THICKNESSES`` the layer does not respond, and the tables end.
+    """
     from scipy.special import j0, j1, jv
 
+    reach_mm = min(reach_mm, KERNEL_REACH_THICKNESSES * elastomer.thickness_mm + PATCH_REACH * width_mm)
     largest = WAVE_REACH / width_mm
-    count = int(np.ceil(NODES_PER_TURN * (2 + largest * reach_mm / (2 * np.pi))))
-    nodes, weights = np.polynomial.legendre.leggauss(min(count, 4000))
-    k = 0.5 * largest * (nodes + 1)
+    panels = int(np.ceil(2 + largest * reach_mm / (2 * np.pi)))
+    nodes, weights = np.polynomial.legendre.leggauss(TURN_NODES)
+    k = (largest / panels * (np.arange(panels)[:, None] + 0.5 * (nodes + 1))).ravel()
+    weights = np.tile(weights, panels) / panels
     c = layer_compliances(k, elastomer) if depth_mm == 0 else interior_compliances(k, elastomer, depth_mm)
     weight = 0.5 * largest * weights * k * width_mm**2 * np.exp(-0.5 * (k * width_mm) ** 2)
     r = np.linspace(0.0, reach_mm, int(np.ceil(STEPS_PER_WIDTH * reach_mm / width_mm)) + 2)

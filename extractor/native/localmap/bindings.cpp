@@ -22,7 +22,6 @@ void fill(nb::module_& module) {
                                {"center_px", "corner_px", "cell", "mirrored", "layout", "limits"});
   bind<&lattice_bases>(module, "lattice_bases", {"center", "axial", "limits"});
   bind<&predict>(module, "predict_markers", {"xy_px", "wanted", "marker_mm", "table", "limits"});
-  bind<&cubic_variance>(module, "cubic_variance", {"xy_px", "wanted", "marker_mm", "table", "limits"});
   bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
                                     {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});
 }
