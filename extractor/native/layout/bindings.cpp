@@ -6,18 +6,12 @@
 
 namespace cmp::layout {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_layout(nb::module_ module) {
   bind<&layer_of>(module, "layer_of", {"q", "r"});
   bind<&marker_id>(module, "marker_id", {"q", "r"});
   bind<&cells_at>(module, "cells_at", {"axial", "cell_lookup"});
   bind<&corner_ids>(module, "corner_ids", {"axial"});
   bind<&neighbour_ids>(module, "neighbour_ids", {"axial", "steps", "layers"});
 }
-
-const Room room("layout", fill);
-
-}  // namespace
 
 }  // namespace cmp::layout

@@ -22,7 +22,9 @@ Array<std::int32_t, 2> nearest_points(View<const double, 2> xy, View<const doubl
   return index;
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_numeric(nb::module_ module) {
   bind<&delaunay>(module, "delaunay", {"points"});
   bind<&fill_patch_mean>(module, "fill_patch_mean", {"flat", "height", "width", "x", "y", "radius", "out"});
   bind<&nearest_points>(module, "nearest_points", {"xy", "queries", "count"});
@@ -31,9 +33,5 @@ void fill(nb::module_& module) {
   bind<&fill_corner_terms>(module, "fill_corner_terms", {"r", "out"});
   bind<&wedge_correlation>(module, "wedge_correlation", {"squares", "product", "corner"});
 }
-
-const Room room("numeric", fill);
-
-}  // namespace
 
 }  // namespace cmp::numeric

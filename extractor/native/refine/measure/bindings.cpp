@@ -6,9 +6,7 @@
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_measure(nb::module_ module) {
   bind<&measure_roughness>(module, "measure_roughness",
                            {"xy", "maps", "diagonal", "rows", "spokes", "near", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
@@ -17,9 +15,5 @@ void fill(nb::module_& module) {
   bind<&median_edge>(module, "median_edge", {"xy", "edges", "limits"});
   bind<&pattern_box>(module, "pattern_box", {"xy", "margin", "width", "height"});
 }
-
-const Room room("measure", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine
