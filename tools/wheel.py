@@ -34,13 +34,25 @@ def build_wheel(processor: str, folder: Path) -> Path:
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "CMAKE_TOOLCHAIN_FILE": str(ROOT / "cmake" / "zig.cmake"),
         "ZIG_TARGET": f"{processor}-linux-gnu.{'.'.join(map(str, GLIBC))}",
-        "SETUPTOOLS_EXT_SUFFIX": sysconfig.get_config_var("EXT_SUFFIX").replace(platform.machine(), processor),
+        "SETUPTOOLS_EXT_SUFFIX": sysconfig.get_config_var("EXT_SUFFIX").replace(
+            platform.machine(), processor
+        ),
     }
     tag = f"manylinux_{GLIBC[0]}_{GLIBC[1]}_{processor}"
     options = ["--no-deps", "--no-build-isolation", f"--config-settings=build-dir=build/{tag}"]
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as made:
-        pip_wheel = (sys.executable, "-m", "pip", "wheel", "--quiet", *options, "--wheel-dir", made, str(ROOT))
+        pip_wheel = (
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--quiet",
+            *options,
+            "--wheel-dir",
+            made,
+            str(ROOT),
+        )
         _run(*pip_wheel, **environment)
         (native,) = Path(made).glob("*.whl")
         _run(sys.executable, "-m", "wheel", "tags", "--remove", "--platform-tag", tag, str(native))

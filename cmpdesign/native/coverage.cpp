@@ -1,7 +1,7 @@
 // The coverage engine of scenes: exact areas of polygons, blurred by splines, one side after the other.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 

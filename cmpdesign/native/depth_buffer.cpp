@@ -1,7 +1,7 @@
 // A depth buffer for pictures of meshes.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 

@@ -1,7 +1,7 @@
 // The values of a sensor for light.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 

@@ -1,9 +1,9 @@
 // Small triangles of a folded sheet over the samples of a tile.
+#include "base/binding.hpp"
+
 #include <cmath>
 #include <limits>
 #include <optional>
-
-#include "base/binding.hpp"
 
 namespace cmp {
 

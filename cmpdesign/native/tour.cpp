@@ -1,10 +1,10 @@
 // Moves that shorten a tour through cells with several entry points each; see `products/laser/paths/tour.py`.
+#include "base/binding.hpp"
+
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
-
-#include "base/binding.hpp"
 
 namespace cmp {
 

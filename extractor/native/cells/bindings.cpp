@@ -1,5 +1,6 @@
 // Room "cells" as Python sees it.
 #include "base/binding.hpp"
+
 #include "cells/cell_mesh.hpp"
 #include "cells/cells.hpp"
 #include "cells/region_growing.hpp"

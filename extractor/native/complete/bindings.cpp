@@ -1,5 +1,6 @@
 // Room "complete" as Python sees it.
 #include "base/binding.hpp"
+
 #include "complete/consistency_filter.hpp"
 #include "complete/image_quality.hpp"
 #include "complete/layer_arcs.hpp"

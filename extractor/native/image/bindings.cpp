@@ -1,5 +1,6 @@
 // Room "image" as Python sees it.
 #include "base/binding.hpp"
+
 #include "image/color.hpp"
 #include "image/ink_segmentation.hpp"
 #include "image/input.hpp"

@@ -1,5 +1,6 @@
 // Room "layout" as Python sees it.
 #include "base/binding.hpp"
+
 #include "layout/lattice.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"

@@ -1,5 +1,6 @@
 // Room "localmap" as Python sees it.
 #include "base/binding.hpp"
+
 #include "localmap/affine_maps.hpp"
 #include "localmap/cell_prediction.hpp"
 #include "localmap/neighbour_prediction.hpp"

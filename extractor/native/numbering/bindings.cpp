@@ -1,5 +1,6 @@
 // Room "numbering" as Python sees it.
 #include "base/binding.hpp"
+
 #include "numbering/lattice_walk.hpp"
 #include "numbering/marker_places.hpp"
 #include "numbering/mesh_parts.hpp"

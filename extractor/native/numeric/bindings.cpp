@@ -1,5 +1,6 @@
 // Room "numeric" as Python sees it.
 #include "base/binding.hpp"
+
 #include "numeric/bilinear.hpp"
 #include "numeric/delaunay.hpp"
 #include "numeric/gaussian.hpp"

@@ -1,5 +1,6 @@
 // Room "refine" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/drawn_pattern.hpp"
 #include "refine/profile_rounds.hpp"
 #include "refine/refinement_step.hpp"

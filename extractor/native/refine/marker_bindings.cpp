@@ -1,5 +1,6 @@
 // Room "markers" as Python sees it: outliers, recovery, acceptance, and the first look at an image.
 #include "base/binding.hpp"
+
 #include "refine/acceptance.hpp"
 #include "refine/first_look.hpp"
 #include "refine/outliers.hpp"

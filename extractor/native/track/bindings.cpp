@@ -1,5 +1,6 @@
 // Room "track" as Python sees it.
 #include "base/binding.hpp"
+
 #include "track/image_check.hpp"
 #include "track/ink_alignment.hpp"
 #include "track/warm_start.hpp"

@@ -1,5 +1,6 @@
 // Room "gaps" as Python sees it.
 #include "base/binding.hpp"
+
 #include "numbering/gaps/detached_cells.hpp"
 
 namespace cmp::numbering {

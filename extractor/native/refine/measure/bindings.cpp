@@ -1,5 +1,6 @@
 // Room "measure" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"

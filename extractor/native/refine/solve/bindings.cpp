@@ -1,5 +1,6 @@
 // Room "solve" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/solve/convergence.hpp"
 #include "refine/solve/fisher_information.hpp"
 

@@ -1,5 +1,6 @@
 // Room "synthesis" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/synthesis/blur_bleed.hpp"
 #include "refine/synthesis/dot_gain.hpp"
 #include "refine/synthesis/gridlines.hpp"
