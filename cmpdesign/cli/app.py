@@ -17,6 +17,7 @@ from cmpdesign.cli.commands import (
     reconstruct,
     render,
     schema,
+    size,
     templates,
     track,
     verify,
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 for function in (
     templates.templates,
+    size.size,
     build.build,
     check.check,
     render.render,
