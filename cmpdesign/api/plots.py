@@ -41,7 +41,9 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
     axes.add_collection(outline)
     axes.add_collection(PolyCollection(list(pattern.colored_outlines_mm), facecolors=colors))
     for marker in pattern.present.nonzero()[0].tolist() if ids else ():
-        axes.text(*pattern.marker_xy_mm[marker], str(marker), color="white", fontsize=5, ha="center", va="center")
+        axes.text(
+            *pattern.marker_xy_mm[marker], str(marker), color="white", fontsize=5, ha="center", va="center"
+        )
     axes.set(aspect="equal", xlabel="x in mm", ylabel="y in mm")
     axes.autoscale_view()
     return axes

@@ -278,7 +278,12 @@ class TrackJob:
             raise CmpDesignError(f"{self.quiver}: unknown ending of a quiver plot; expected .png")
         how, source = self.reading, self.source
         new_tracker = partial(
-            Tracker, self.layout, warm=not how.cold, response=how.response, side=how.side, channels=how.channels
+            Tracker,
+            self.layout,
+            warm=not how.cold,
+            response=how.response,
+            side=how.side,
+            channels=how.channels,
         )
         at_rest = None
         if self.rest is not None:
@@ -296,7 +301,9 @@ class TrackJob:
         from cmpdesign.tracking.sources import without_password
 
         statistics, source = run.statistics, without_password(self.source)
-        found: dict[str, Any] = statistics.to_json(source, run.source.total, run.ended_early, run.tracker.rest)
+        found: dict[str, Any] = statistics.to_json(
+            source, run.source.total, run.ended_early, run.tracker.rest
+        )
         return found
 
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
@@ -341,7 +348,11 @@ class ReconstructJob:
         views = ViewExtractor(self.layout, rig, "accurate", how.response, how.side, how.channels)
         at_rest = views.extract(self._rest_image())
         reconstructor = Reconstructor(
-            views.layout, views.rig, at_rest, flatness_mm=(0.0, 0.0, shape.flatness_mm), model_px=shape.model_px
+            views.layout,
+            views.rig,
+            at_rest,
+            flatness_mm=(0.0, 0.0, shape.flatness_mm),
+            model_px=shape.model_px,
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
         sink = open_sink(
@@ -350,7 +361,9 @@ class ReconstructJob:
         tracker = ShapeTracker(reconstructor, warm=not how.cold, response=how.response, channels=how.channels)
         source = open_sources(self.source, how.fps, how.max_pixels)
         statistics = ShapeStatistics(reconstructor, depth_mm, shape.surface)
-        return TrackingRun(source, tracker, sink, statistics, limit=how.frames, warnings=reconstructor.warnings)
+        return TrackingRun(
+            source, tracker, sink, statistics, limit=how.frames, warnings=reconstructor.warnings
+        )
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
         """The JSON object of the summary."""

@@ -91,7 +91,11 @@ def calibrate_pattern(
 
     if output is not None and Path(output).suffix.lower() != ".json":
         raise CmpDesignError(f"{output}: unknown ending of a layout file; expected .json")
-    if output is not None and isinstance(layout, str | Path) and Path(output).resolve() == Path(layout).resolve():
+    if (
+        output is not None
+        and isinstance(layout, str | Path)
+        and Path(output).resolve() == Path(layout).resolve()
+    ):
         raise CmpDesignError(f"{output}: is the nominal layout itself; give another name")
     names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
     learnt = learn_layout(reference_from(layout), pictures, names=names, response=response)
@@ -152,9 +156,9 @@ def run_experiment(
         CmpDesignError: a value out of range, or the folder holds a run under other conditions.
         OutputError: a file cannot be written; finished trials are kept.
     """
-    from cmpdesign.evaluate.designs import design_entries
     from cmpdesign.evaluate import experiments
     from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
+    from cmpdesign.evaluate.designs import design_entries
     from cmpdesign.evaluate.runner import RunOptions
     from cmpdesign.evaluate.simulated.sensor import load_sensor
 

@@ -16,7 +16,6 @@ from cmpdesign.cli.commands import (
     kerf,
     reconstruct,
     render,
-    schema,
     size,
     templates,
     track,
@@ -24,6 +23,7 @@ from cmpdesign.cli.commands import (
 )
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.export import group as export
+from cmpdesign.cli.commands.starting import schema
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
 
 app = typer.Typer(

@@ -42,7 +42,9 @@ Preset = Annotated[str, typer.Option(metavar="NAME", help=f"The extractor's pres
 @app.command(cls=Command)
 def precision(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = USUAL_TRIALS["precision"],
+    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = USUAL_TRIALS[
+        "precision"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -79,7 +81,9 @@ def response(
 @app.command(cls=Command)
 def reliability(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = USUAL_TRIALS["reliability"],
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = USUAL_TRIALS[
+        "reliability"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -110,7 +114,9 @@ def angles(output: Output, workers: Workers = None) -> None:
 def designs(
     design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS["designs"],
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS[
+        "designs"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",

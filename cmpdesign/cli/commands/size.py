@@ -19,7 +19,9 @@ def size(
     ],
     error: Annotated[
         str | None,
-        typer.Option(metavar="LENGTH", help="Largest error per marker and axis, as in 0.2um. [default: none]"),
+        typer.Option(
+            metavar="LENGTH", help="Largest error per marker and axis, as in 0.2um. [default: none]"
+        ),
     ] = None,
     blur: Annotated[float, typer.Option(help="Blur of optics and pixel, sigma in pixels.")] = 1.0,
     noise: Annotated[float, typer.Option(help="Noise, standard deviation in 255ths.")] = 2.0,
