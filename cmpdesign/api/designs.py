@@ -160,7 +160,9 @@ def load(
     return Design.of(load_parameters(name_or_path, {**(overrides or {}), **changes}))
 
 
-load_design = load  # the name in version 0.1
+def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Design:
+    """``load`` by its name in version 0.1."""
+    return load(name_or_path, overrides)
 
 
 def schema() -> dict[str, Any]:
