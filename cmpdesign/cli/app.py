@@ -16,13 +16,14 @@ from cmpdesign.cli.commands import (
     kerf,
     reconstruct,
     render,
-    schema,
+    size,
     templates,
     track,
     verify,
 )
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.export import group as export
+from cmpdesign.cli.commands.starting import schema
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
 
 app = typer.Typer(
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 for function in (
     templates.templates,
+    size.size,
     build.build,
     check.check,
     render.render,

@@ -10,7 +10,7 @@ import typer
 from cmpdesign.cli.pixels import parse_pixels
 from cmpdesign.cli.terminal import console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products, make_products, product_folders
+from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
@@ -49,39 +49,25 @@ def build(
     prints are read as the camera sees them before files are written. Exit code 1 when something will not work.
     """
     from cmpdesign.design.design import load_design
-    from cmpdesign.files.atomic import write_folder
-    from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
-    from cmpdesign.files.layout_json import pattern_digest
-    from cmpdesign.files.other_designs import find_other_designs
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.layout.report import design_report
-    from cmpdesign.products.as_made.reading import clip_findings
+    from cmpdesign.products.building import build_files
 
     names = chosen_products(only)
     parameters = load_design(design, parse_overrides(override))
-    layout = build_layout(parameters)
-    camera_px = parse_camera(camera)
-    report = design_report(parameters, layout, camera_px)
-    made = make_products(names, parameters, layout, report, camera_px)
-    pattern = pattern_digest(layout)
-    listed = files_with_lists(made.files, product_folders(), output, pattern)
-    stale = find_stale_files(output, listed, product_folders(), pattern)
-    for path in write_folder(output, listed):
-        if path.name != LIST_NAME:
-            console().print(f"wrote {printable_path(path)}")
-    for path in remove_files(stale):
-        if path.name != LIST_NAME:
-            console().print(f"removed {printable_path(path)}, of an earlier build")
-    print_report(report)
-    for name, reading in made.readings.items():
+    built = build_files(parameters, build_layout(parameters), output, names, parse_camera(camera))
+    for path in built.written:
+        console().print(f"wrote {printable_path(path)}")
+    for path in built.removed:
+        console().print(f"removed {printable_path(path)}, of an earlier build")
+    print_report(built.report)
+    for name, reading in built.readings.items():
         console().print(f"{name} as made: {reading.line()}")
-    for path in find_other_designs(output, product_folders(), layout.digest, pattern):
+    for path in built.of_other_designs:
         print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
-    findings = (*report.findings, *clip_findings(layout, camera_px), *made.findings)
-    for finding in findings:
+    for finding in built.findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
-    if any(finding.severity == "error" for finding in findings):
+    if not built.works:
         raise typer.Exit(EXIT_NOT_PASSED)
 
 

@@ -33,26 +33,17 @@ def check(
     """List what cannot be made or read. Exit code 1 when something will not work."""
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.layout.checks import check_design
-    from cmpdesign.products.as_made.reading import clip_findings
+    from cmpdesign.products.building import check_products
 
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
-    layout = build_layout(parameters)
-    findings = [*check_design(parameters, layout, camera_px), *clip_findings(layout, camera_px)]
-    if read:
-        from cmpdesign.products.as_made.reading import read_pads
-        from cmpdesign.products.registry import pads_as_made
-
-        pads, reasons = pads_as_made(parameters, layout)
-        found = read_pads(pads, camera_px)
-        for name, reading in found.readings.items():
-            console().print(f"{name} as made: {reading.line()}")
-        for name, reason in reasons.items():
-            print_warning(f"{name} is not read: {reason}")
-        findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
-    _print_findings(findings)
-    if any(finding.severity == "error" for finding in findings):
+    checked = check_products(parameters, build_layout(parameters), camera_px, read=read)
+    for name, reading in checked.readings.items():
+        console().print(f"{name} as made: {reading.line()}")
+    for name, reason in checked.unread.items():
+        print_warning(f"{name} is not read: {reason}")
+    _print_findings(checked.findings)
+    if not checked.works:
         raise typer.Exit(EXIT_NOT_PASSED)
 
 

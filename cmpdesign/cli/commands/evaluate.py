@@ -11,13 +11,13 @@ import typer
 from cmpdesign.cli.command import Command
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cmpdesign.evaluate.designs import DesignEntry
 
-PRESETS = ("fast", "balanced", "accurate")
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -42,7 +42,9 @@ Preset = Annotated[str, typer.Option(metavar="NAME", help=f"The extractor's pres
 @app.command(cls=Command)
 def precision(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = 10,
+    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = USUAL_TRIALS[
+        "precision"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -61,7 +63,7 @@ def precision(
 @app.command(cls=Command)
 def response(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = 10,
+    trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = USUAL_TRIALS["response"],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -79,7 +81,9 @@ def response(
 @app.command(cls=Command)
 def reliability(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = 300,
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = USUAL_TRIALS[
+        "reliability"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -95,7 +99,7 @@ def reliability(
 @app.command(cls=Command)
 def angles(output: Output, workers: Workers = None) -> None:
     """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
-    document = _run_experiment("angles", output, 1, 0, workers, "tac3d", "balanced")
+    document = _run_experiment("angles", output, USUAL_TRIALS["angles"], 0, workers, "tac3d", "balanced")
     for name, one in document["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
@@ -110,7 +114,9 @@ def angles(output: Output, workers: Workers = None) -> None:
 def designs(
     design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = 5,
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS[
+        "designs"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",

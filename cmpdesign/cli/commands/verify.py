@@ -6,9 +6,8 @@ An image that shows the code of a print sheet is judged as a print: its layout, 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,10 +26,10 @@ from cmpdesign.cli.terminal import (
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
+    from cmpdesign.api.pictures import Verifier
     from cmpdesign.files.images import Image
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.verify import Verdict
-    from extractor import Extractor
     from extractor.layout.reference import Reference
 
 EXIT_NOT_VERIFIED = 1
@@ -82,12 +81,14 @@ def verify(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
+    from cmpdesign.api.pictures import Verifier
     from cmpdesign.files.image_folders import without_folders
-    from extractor import Extractor, load_layout
+    from extractor import load_layout
 
     reference, known = load_layout(layout), parse_reading_response(response)
-    extractor = cache(lambda: Extractor(reference, response=known, side="either"))
-    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, output, debug, channels, max_pixels)
+    verifier = _ImageVerifier(
+        Verifier(reference, min_share, known, channels, sheet_dpi, max_pixels), output, debug
+    )
     images = without_folders(images)
     names = _unique_names([path.stem for path in images])
     outcomes = [
@@ -106,35 +107,25 @@ def verify(
 
 @dataclass(frozen=True, eq=False)
 class _ImageVerifier:
-    """Verifies images; the extractor is made when the first image needs it."""
+    """Verifies image files and writes their pictures."""
 
-    reference: Reference
-    extractor: Callable[[], Extractor]
-    min_share: float
-    sheet_dpi: float | None
+    verifier: Verifier
     output: Path | None
     debug: Path | None
-    channels: str
-    max_pixels: int
 
     def verify_image(self, path: Path, name: str) -> Outcome:
         """Verify one image and write its pictures; an unreadable image is reported on stderr."""
-        from cmpdesign.files.images import ImageFileError, read_image
-        from cmpdesign.products.sheet.verdict import judge_sheet
-        from cmpdesign.reading.verify import verify as verify_image
+        from cmpdesign.files.images import ImageFileError
+        from cmpdesign.reading.verify import Verdict
 
         try:
-            image = read_image(path, self.max_pixels)
+            image = self.verifier.read(path)
         except ImageFileError as error:
             print_error(error)
             return Outcome(printable_path(path), None, error_on_one_line(error))
-        if self.channels == "rgb":
-            image = image[:, :, ::-1].copy()
-        sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
-        if sheet.is_sheet or self.sheet_dpi is not None:
-            return Outcome(printable_path(path), sheet, None)
-        verdict = verify_image(self.extractor(), self.reference, image, self.min_share)
-        _write_pictures(image, self.reference, verdict, name, self.output, self.debug)
+        verdict = self.verifier.judge(image, path)
+        if isinstance(verdict, Verdict):
+            _write_pictures(image, self.verifier.reference, verdict, name, self.output, self.debug)
         return Outcome(printable_path(path), verdict, None)
 
 

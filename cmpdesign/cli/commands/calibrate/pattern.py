@@ -11,7 +11,6 @@ from cmpdesign.cli.image_options import MaxPixelsOption
 from cmpdesign.cli.paths import require_suffix
 from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.terminal import console, print_warning, printable_path
-from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
@@ -40,21 +39,11 @@ def pattern(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Measure where the markers of one pad were made; read the pad's pictures with the written layout."""
-    from cmpdesign.files.image_folders import without_folders
-    from cmpdesign.files.images import read_image
-    from cmpdesign.files.layout_json import write_layout
-    from cmpdesign.reading.read_layout import layout_from_reference
-    from extractor import learn_layout, load_layout
+    from cmpdesign.api.workshop import calibrate_pattern
 
     require_suffix("--output", output, [".json"])
-    if output.resolve() == layout.resolve():
-        raise CmpDesignError(f"--output {output}: is the nominal layout itself; give another name")
-    reference, known = load_layout(layout), parse_reading_response(response)
-    paths = without_folders(images)
-    pictures = [read_image(path, max_pixels) for path in paths]
-    names = [printable_path(path) for path in paths]
-    learnt = learn_layout(reference, pictures, names=names, response=known)
-    write_layout(layout_from_reference(learnt.layout), output)
+    known = parse_reading_response(response)
+    learnt = calibrate_pattern(layout, images, output, response=known, max_pixels=max_pixels)
     _print_figures(learnt)
     console().print(f"wrote {printable_path(output)}")
 
