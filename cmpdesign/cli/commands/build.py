@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.pixels import parse_pixels
-from cmpdesign.cli.terminal import console, print_warning, printable_path
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.cli.options.designs import (
+    CAMERA_TEXT,
+    CameraOption,
+    DesignArgument,
+    SetOption,
+    parse_camera,
+    parse_overrides,
+)
+from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products, make_products, product_folders
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
 
-DesignArgument = Annotated[str, typer.Argument(metavar="DESIGN", help="A template's name or a TOML file.")]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="NAME=VALUE", help="Override a parameter, as in pitch_mm=60mil; may be repeated."
-    ),
-]
-
-CameraOption = Annotated[
-    str, typer.Option("--camera", metavar="WxH", help="Pixels of the camera whose picture the pattern fills.")
-]
-CAMERA_TEXT = "640x480"
 EXIT_NOT_PASSED = 1
-LARGEST_CAMERA_PX = 99_999
+EXAMPLES = (
+    "cmpdesign build tac3d -o mine --set pitch_mm=60mil",
+    "cmpdesign build mine.toml -o made --only svg,laser",
+)
 
 
 def build(
@@ -41,6 +41,7 @@ def build(
         str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
     ] = USUAL_NAMES,
     camera: CameraOption = CAMERA_TEXT,
+    preset: PresetOption = "balanced",
 ) -> None:
     """Write a design's files: SVG, layout file, preview and report, or what --only names.
 
@@ -48,6 +49,9 @@ def build(
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
     prints are read as the camera sees them before files are written. Exit code 1 when something will not work.
     """
+    from dataclasses import asdict
+
+    from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.files.atomic import write_folder
     from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
@@ -60,53 +64,54 @@ def build(
     names = chosen_products(only)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
+    print_step(
+        f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers, digest {layout.digest[:12]}"
+    )
     camera_px = parse_camera(camera)
     report = design_report(parameters, layout, camera_px)
-    made = make_products(names, parameters, layout, report, camera_px)
+    with working("building") as tell:
+        made = make_products(names, parameters, layout, report, camera_px, preset=preset, watch=_steps(tell))
     pattern = pattern_digest(layout)
     listed = files_with_lists(made.files, product_folders(), output, pattern)
     stale = find_stale_files(output, listed, product_folders(), pattern)
-    for path in write_folder(output, listed):
-        if path.name != LIST_NAME:
-            console().print(f"wrote {printable_path(path)}")
-    for path in remove_files(stale):
-        if path.name != LIST_NAME:
-            console().print(f"removed {printable_path(path)}, of an earlier build")
+    written = [path for path in write_folder(output, listed) if path.name != LIST_NAME]
+    removed = [path for path in remove_files(stale) if path.name != LIST_NAME]
+    for path in written:
+        say(f"wrote {printable_path(path)}")
+    for path in removed:
+        say(f"removed {printable_path(path)}, of an earlier build")
     print_report(report)
     for name, reading in made.readings.items():
-        console().print(f"{name} as made: {reading.line()}")
+        say(f"{name} as made: {reading.line()}")
     for path in find_other_designs(output, product_folders(), layout.digest, pattern):
         print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
     findings = (*report.findings, *clip_findings(layout, camera_px), *made.findings)
     for finding in findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
-    if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(EXIT_NOT_PASSED)
+    failed = any(finding.severity == "error" for finding in findings)
+    finish(
+        lambda: BuildDocument(
+            digest=layout.digest,
+            folder=printable_path(output),
+            written=tuple(map(printable_path, written)),
+            removed=tuple(map(printable_path, removed)),
+            report={name: value for name, value in asdict(report).items() if name != "findings"},
+            as_made=reading_parts(made.readings),
+            findings=finding_parts(findings),
+        ),
+        EXIT_NOT_PASSED if failed else 0,
+    )
 
 
-def parse_camera(text: str) -> tuple[int, int]:
-    """Width and height of ``--camera``, px.
+def _steps(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """What is called with the name of every product before it is made."""
 
-    Raises:
-        CmpDesignError: another text than "640x480".
-    """
-    return parse_pixels("--camera", text, LARGEST_CAMERA_PX)
+    def watch(name: str) -> None:
+        tell(f"building: {name}")
+        print_step(f"{name} begins")
 
-
-def parse_overrides(texts: list[str] | None) -> dict[str, str]:
-    """Parse the values of ``--set`` to name -> text.
-
-    Raises:
-        CmpDesignError: a value has no name or no "=".
-    """
-    overrides: dict[str, str] = {}
-    for text in texts or []:
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip():
-            raise CmpDesignError(f"--set {text}: expected NAME=VALUE, as in pitch_mm=1.5mm")
-        overrides[name.strip()] = value.strip()
-    return overrides
+    return watch
 
 
 def print_report(report: DesignReport) -> None:
@@ -126,4 +131,4 @@ def print_report(report: DesignReport) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

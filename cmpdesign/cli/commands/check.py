@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.commands.build import (
+from cmpdesign.cli.commands.build import EXIT_NOT_PASSED
+from cmpdesign.cli.options.designs import (
     CAMERA_TEXT,
-    EXIT_NOT_PASSED,
     CameraOption,
     DesignArgument,
     SetOption,
     parse_camera,
     parse_overrides,
 )
-from cmpdesign.cli.terminal import console, print_warning
+from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
+    from cmpdesign.products.as_made.reading import PadReading
+
+EXAMPLES = (
+    "cmpdesign check tac3d --set pitch_mm=0.5mm",
+    "cmpdesign check mine.toml --read --camera 1280x960",
+)
 
 
 def check(
@@ -29,8 +37,10 @@ def check(
     read: Annotated[
         bool, typer.Option("--read", help="Draw and read the pads that laser, mold and print would make.")
     ] = False,
+    preset: PresetOption = "balanced",
 ) -> None:
     """List what cannot be made or read. Exit code 1 when something will not work."""
+    from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.checks import check_design
@@ -40,27 +50,40 @@ def check(
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
     findings = [*check_design(parameters, layout, camera_px), *clip_findings(layout, camera_px)]
+    readings: Mapping[str, PadReading] = {}
+    reasons: dict[str, str] = {}
     if read:
         from cmpdesign.products.as_made.reading import read_pads
         from cmpdesign.products.registry import pads_as_made
 
-        pads, reasons = pads_as_made(parameters, layout)
-        found = read_pads(pads, camera_px)
-        for name, reading in found.readings.items():
-            console().print(f"{name} as made: {reading.line()}")
+        with working("drawing and reading pads"):
+            pads, reasons = pads_as_made(parameters, layout)
+            found = read_pads(pads, camera_px, preset)
+        readings = found.readings
+        for name, reading in readings.items():
+            say(f"{name} as made: {reading.line()}")
         for name, reason in reasons.items():
             print_warning(f"{name} is not read: {reason}")
         findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
     _print_findings(findings)
-    if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(EXIT_NOT_PASSED)
+    passed = all(finding.severity != "error" for finding in findings)
+    finish(
+        lambda: CheckDocument(
+            digest=layout.digest,
+            passed=passed,
+            as_made=reading_parts(readings),
+            not_read=reasons,
+            findings=finding_parts(findings),
+        ),
+        0 if passed else EXIT_NOT_PASSED,
+    )
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
 
     if not findings:
-        console().print("nothing to report: it can be made and read")
+        say("nothing to report: it can be made and read")
         return
     table = Table(box=None, pad_edge=False)
     for heading in ("severity", "what", "value", "limit", "unit", "remedy"):
@@ -68,4 +91,4 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     for finding in findings:
         numbers = (f"{finding.value:.3g}", f"{finding.limit:.3g}")
         table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
-    console().print(table, soft_wrap=False)
+    say(table, soft_wrap=False)

@@ -10,20 +10,27 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
-from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
-from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.options.images import (
+    ChannelsOption,
+    FramesOption,
+    MaxPixelsOption,
+    PresetOption,
+    SideOption,
+)
+from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
-    exit_with_status,
+    exit_status,
     print_written,
     recover_and_report,
     require_positive,
     run_with_progress,
     summary_path,
 )
-from cmpdesign.cli.terminal import console, print_warning
+from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.sources import without_password
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
@@ -34,6 +41,12 @@ if TYPE_CHECKING:
     from extractor.image.response import Response
     from extractor.layout.reference import Reference
     from extractor.pipeline import Side
+    from extractor.presets import Preset
+
+EXAMPLES = (
+    "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
+    "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --surface --frames 100",
+)
 
 
 def reconstruct(
@@ -47,7 +60,8 @@ def reconstruct(
         str,
         typer.Argument(
             metavar="SOURCE",
-            help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
+            help='A folder of pictures, a pattern such as "run/*.png", a video, a camera\'s number, or rtsp://...; '
+            "one for each view, with commas.",
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
@@ -73,8 +87,9 @@ def reconstruct(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    frames: FramesOption = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
@@ -86,6 +101,8 @@ def reconstruct(
     ] = False,
 ) -> None:
     """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
+    from cmpdesign.cli.documents.runs import ReconstructDocument
+
     if recover:
         from extractor import load_layout
 
@@ -111,6 +128,7 @@ def reconstruct(
         surface,
         fps,
         cold,
+        preset,
         known,
         side,
         channels,
@@ -123,10 +141,13 @@ def reconstruct(
         run_with_progress(run, "reconstructing")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            print_written(_write_summary(run, source, output))
+            print_written(_write_summary(run, source, output).written)
         raise
-    print_written([output, *_write_summary(run, source, output)])
-    exit_with_status(run)
+    summary = _write_summary(run, source, output)
+    written = [output, *summary.written]
+    print_written(written)
+    code = exit_status(run)
+    finish(lambda: ReconstructDocument(**summary.document, written=tuple(map(printable_path, written))), code)
 
 
 class _Options(NamedTuple):
@@ -143,6 +164,7 @@ class _Options(NamedTuple):
     surface: bool
     fps: float | None
     cold: bool
+    preset: Preset
     response: Response | None
     side: Side
     channels: Channels
@@ -182,7 +204,11 @@ def _prepare_run(options: _Options) -> TrackingRun:
     recording = replace(options.recording, views=rig.views)
     sink = open_sink(options.output, ShapeTable(reconstructor, continuation), recording)
     tracker = ShapeTracker(
-        reconstructor, warm=not options.cold, response=options.response, channels=options.channels
+        reconstructor,
+        warm=not options.cold,
+        preset=options.preset,
+        response=options.response,
+        channels=options.channels,
     )
     source = open_sources(options.source, options.fps, options.max_pixels)
     return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm, options.surface))
@@ -214,18 +240,24 @@ def _read_rest_image(options: _Options) -> Any:
     return images if len(images) > 1 else images[0]
 
 
-def _write_summary(run: TrackingRun, source: str, output: Path) -> list[Path]:
-    """Write the summary next to the table and print it; the written files."""
+class _Summary(NamedTuple):
+    """The summary of a run, and the files that were written with it; empty without frames."""
+
+    document: dict[str, Any]
+    written: list[Path]
+
+
+def _write_summary(run: TrackingRun, source: str, output: Path) -> _Summary:
+    """Write the summary next to the table and print it."""
     if not run.statistics.frames:
-        return []
+        return _Summary({}, [])
     from cmpdesign.files.atomic import write_file
-    from cmpdesign.tracking.sources import without_password
 
     summary = run.statistics.to_json(without_password(source), run.source.total, run.ended_early)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
     write_file(summary_path(output), text)
-    return [summary_path(output)]
+    return _Summary(summary, [summary_path(output)])
 
 
 def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
@@ -270,4 +302,4 @@ def _print_summary(summary: dict[str, Any]) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

@@ -10,21 +10,29 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
-from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.options.images import (
+    ChannelsOption,
+    FramesOption,
+    MaxPixelsOption,
+    PresetOption,
+    SideOption,
+    SourcesArgument,
+)
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
-    exit_with_status,
+    exit_status,
     print_written,
     recover_and_report,
     require_positive,
     run_with_progress,
     summary_path,
 )
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.sources import without_password
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.recording.options import Recording
@@ -33,16 +41,17 @@ if TYPE_CHECKING:
     from extractor.image.response import Response
     from extractor.layout.reference import Reference
     from extractor.pipeline import Side
+    from extractor.presets import Preset
+
+EXAMPLES = (
+    "cmpdesign track layout.json frames -o run.npz",
+    "cmpdesign track layout.json press.mp4 -o run.csv --overlay found.mp4 --frames 100",
+)
 
 
 def track(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="SOURCE", help="A video, a folder of images, a camera's number, or rtsp://..."
-        ),
-    ],
+    source: SourcesArgument,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
     rest: Annotated[
         str | None,
@@ -59,7 +68,7 @@ def track(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    frames: FramesOption = None,
     overlay: Annotated[
         Path | None, typer.Option(metavar="VIDEO", help="Video of what was found: .mp4, .avi or .mkv.")
     ] = None,
@@ -67,6 +76,7 @@ def track(
         Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
@@ -78,6 +88,8 @@ def track(
     ] = False,
 ) -> None:
     """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
+    from cmpdesign.cli.documents.runs import TrackDocument
+
     if recover:
         from extractor import load_layout
 
@@ -92,7 +104,7 @@ def track(
     from extractor import load_layout
 
     reference = load_layout(layout)
-    reading = _Reading(not cold, parse_reading_response(response), side, channels)
+    reading = _Reading(not cold, preset, parse_reading_response(response), side, channels)
     run = _prepare_run(
         reference, _Options(source, output, rest, mm_per_px, fps, overlay, reading, max_pixels, recording)
     )
@@ -101,17 +113,20 @@ def track(
         run_with_progress(run, "tracking")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            print_written(_write_summary(run, reference, source, output, quiver))
+            print_written(_write_summary(run, reference, source, output, quiver).written)
         raise
-    written = _write_summary(run, reference, source, output, quiver)
-    print_written([output, *written, *([overlay] if overlay is not None and written else [])])
-    exit_with_status(run)
+    summary = _write_summary(run, reference, source, output, quiver)
+    written = [output, *summary.written, *([overlay] if overlay is not None and summary.written else [])]
+    print_written(written)
+    code = exit_status(run)
+    finish(lambda: TrackDocument(**summary.document, written=tuple(map(printable_path, written))), code)
 
 
 class _Reading(NamedTuple):
     """Options of the ``Tracker``."""
 
     warm: bool
+    preset: Preset
     response: Response | None
     side: Side
     channels: Channels
@@ -120,7 +135,7 @@ class _Reading(NamedTuple):
 class _Options(NamedTuple):
     """Arguments and options of the command."""
 
-    source: str
+    source: list[str]
     output: Path
     rest: str | None
     mm_per_px: float | None
@@ -146,26 +161,32 @@ def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
     at_rest = None if rest is None else read_rest_markers(rest, source, fps, new_tracker(), most_pixels)
     tracker = new_tracker(rest=at_rest, mm_per_px=options.mm_per_px)
     frames = open_source(source, fps, most_pixels)
+    print_step(f"{frames.name}: {'unknown number of' if frames.total is None else frames.total} frames")
     path = options.overlay
     video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
     sink = open_sink(options.output, TrackTable(tracker), options.recording)
     return TrackingRun(frames, tracker, sink, TrackStatistics(reference), video)
 
 
+class _Summary(NamedTuple):
+    """The summary of a run, and the files that were written with it; empty without frames."""
+
+    document: dict[str, Any]
+    written: list[Path]
+
+
 def _write_summary(
-    run: TrackingRun, reference: Reference, source: str, output: Path, quiver: Path | None
-) -> list[Path]:
-    """Write the summary next to the table and the quiver plot, and print the summary; the written files."""
+    run: TrackingRun, reference: Reference, source: list[str], output: Path, quiver: Path | None
+) -> _Summary:
+    """Write the summary next to the table and the quiver plot, and print the summary."""
     if not run.statistics.frames:
-        return []
+        return _Summary({}, [])
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
     from cmpdesign.tracking.quiver import draw_quiver
-    from cmpdesign.tracking.sources import without_password
 
-    summary = run.statistics.to_json(
-        without_password(source), run.source.total, run.ended_early, run.tracker.rest
-    )
+    names = ", ".join(map(without_password, source))
+    summary = run.statistics.to_json(names, run.source.total, run.ended_early, run.tracker.rest)
     _print_summary(summary)
     text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
     contents: dict[Path, str | bytes] = {summary_path(output): text}
@@ -176,7 +197,7 @@ def _write_summary(
         print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
     for path, content in contents.items():
         write_file(path, content)
-    return list(contents)
+    return _Summary(summary, list(contents))
 
 
 def _print_summary(summary: dict[str, Any]) -> None:
@@ -210,4 +231,4 @@ def _print_summary(summary: dict[str, Any]) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

@@ -60,12 +60,12 @@ class SheetVerdict:
         return f"{head} (print sheet {reading.key.name}, {scale}, skew {reading.skew_deg:+.3f} deg{note})"
 
 
-def judge_sheet(image: Image, path: Path, digest: str, dpi: float | None = None) -> SheetVerdict:
+def judge_sheet(image: Image, path: Path | None, digest: str, dpi: float | None = None) -> SheetVerdict:
     """Judge a picture of a print sheet.
 
     Args:
         image: (H, W, 3) BGR, uint8 or uint16.
-        path: the picture's file, which may state the resolution.
+        path: the picture's file, which may state the resolution; None without a file of its own.
         digest: digest of the layout.
         dpi: resolution in place of the file's; 0: unknown, the file's resolution is ignored.
     """
@@ -78,12 +78,12 @@ def judge_sheet(image: Image, path: Path, digest: str, dpi: float | None = None)
 
 
 def _measure_with_resolution(
-    bars: SheetBars, path: Path, dpi: float | None
+    bars: SheetBars, path: Path | None, dpi: float | None
 ) -> tuple[SheetReading, str | None]:
     """The reading, and the reason for unknown scales (None if the scales are known)."""
     if dpi:
         return measure_sheet(bars, (dpi, dpi)), None
-    resolution = "no resolution is given" if dpi == 0 else resolution_dpi(path)
+    resolution = "no resolution is given" if dpi == 0 or path is None else resolution_dpi(path)
     if not isinstance(resolution, str):
         reading = measure_sheet(bars, resolution)
         assert reading.scale_x is not None and reading.scale_y is not None
