@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
-    "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --surface --frames 100",
+    "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --frames 100",
 )
 
 
