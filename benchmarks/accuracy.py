@@ -183,7 +183,7 @@ def markdown(results: Sequence[AccuracyResult]) -> str:
 
 
 def documentation_blocks(results: Sequence[AccuracyResult]) -> dict[str, str]:
-    """The tables of docs/accuracy.md, by block."""
+    """The tables of docs/explanation/accuracy.md, by block."""
     return {f"accuracy-{group}": markdown([r for r in results if r.group == group]) for group in GROUPS}
 
 

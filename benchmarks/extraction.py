@@ -238,7 +238,7 @@ def run_all(quick: bool) -> tuple[dict[str, Any], list[Table]]:
 
 
 def markdown(results: dict[str, Any]) -> dict[str, str]:
-    """The tables of docs/accuracy.md, by block."""
+    """The tables of docs/explanation/accuracy.md, by block."""
     found = {}
     for name, key, unit in (("pixels", "over_pixels", "megapixels"), ("markers", "over_markers", "markers")):
         rows, grown = results[key], results["growth"][unit]

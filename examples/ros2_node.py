@@ -3,7 +3,7 @@
     python examples/ros2_node.py --ros-args -p layout:=out/layout.json -p frame_id:=tactile -r image_raw:=/camera/image
 
 It reads sensor_msgs/Image (bgr8 or rgb8) from the topic image_raw, and publishes sensor_msgs/PointCloud2 on
-<frame_id>/markers, with the fields of recordings (docs/recordings.md). It needs a ROS 2 installation with rclpy.
+<frame_id>/markers, with the fields of recordings (docs/how-to/recordings.md). It needs a ROS 2 installation with rclpy.
 """
 
 from __future__ import annotations

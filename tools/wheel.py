@@ -14,6 +14,7 @@ import platform
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -29,32 +30,34 @@ def build_wheel(processor: str, folder: Path) -> Path:
     """
     if importlib.util.find_spec("ziglang") is None:
         _run(sys.executable, "-m", "pip", "install", "--quiet", "ziglang")
-    suffix = sysconfig.get_config_var("EXT_SUFFIX").replace(platform.machine(), processor)
     environment = {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "CMAKE_TOOLCHAIN_FILE": str(ROOT / "cmake" / "zig.cmake"),
         "ZIG_TARGET": f"{processor}-linux-gnu.{'.'.join(map(str, GLIBC))}",
-        "SETUPTOOLS_EXT_SUFFIX": suffix,
+        "SETUPTOOLS_EXT_SUFFIX": sysconfig.get_config_var("EXT_SUFFIX").replace(
+            platform.machine(), processor
+        ),
     }
-    before = set(folder.glob("*.whl"))
-    options = ["--no-deps", "--no-build-isolation", f"--config-settings=build-dir=build/{processor}"]
-    _run(
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        *options,
-        "--wheel-dir",
-        str(folder),
-        str(ROOT),
-        **environment,
-    )
-    (made,) = set(folder.glob("*.whl")) - before
     tag = f"manylinux_{GLIBC[0]}_{GLIBC[1]}_{processor}"
-    _run(sys.executable, "-m", "wheel", "tags", "--remove", "--platform-tag", tag, str(made))
-    (tagged,) = set(folder.glob("*.whl")) - before
-    return tagged
+    options = ["--no-deps", "--no-build-isolation", f"--config-settings=build-dir=build/{tag}"]
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as made:
+        pip_wheel = (
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--quiet",
+            *options,
+            "--wheel-dir",
+            made,
+            str(ROOT),
+        )
+        _run(*pip_wheel, **environment)
+        (native,) = Path(made).glob("*.whl")
+        _run(sys.executable, "-m", "wheel", "tags", "--remove", "--platform-tag", tag, str(native))
+        (tagged,) = Path(made).glob("*.whl")
+        return tagged.replace(folder / tagged.name)
 
 
 def _run(*command: str, **environment: str) -> None:

@@ -1,4 +1,4 @@
-"""What fails, as pictures: files with overlays, and the part of docs/hard-cases.md that ``--page`` writes.
+"""What fails, as pictures: files with overlays, and the part of docs/explanation/hard-cases.md that ``--page`` writes.
 
 The page is made from docs/measured/camera.json alone: its pictures are made again from their seed, and what the reader
 found in them is kept in the file. So the page can be drawn again without reading.
@@ -93,7 +93,7 @@ def shown_record(result: PictureResult) -> dict[str, Any]:
 def publish(
     found: Mapping[str, Any], rows: Sequence[EffectRow], results: Sequence[PictureResult]
 ) -> list[Path]:
-    """Write docs/measured/camera.json, the picture, and the part of docs/hard-cases.md. Returns the written files."""
+    """Write docs/measured/camera.json, the picture, and its part of the hard cases. Returns the written files."""
     shown = [shown_record(result) for result in shown_results(results)]
     kept = {name: value for name, value in found.items() if name != "graded"}
     measured = {**kept, "shown": shown, "table": rows_table(rows)}
@@ -104,14 +104,14 @@ def publish(
 
 
 def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
-    """The part of docs/hard-cases.md from the content of docs/measured/camera.json."""
+    """The part of docs/explanation/hard-cases.md from the content of docs/measured/camera.json."""
     command = (
         f"python -m benchmarks.camera --seed {measured['seed']} --pictures {measured['pictures']} "
         f"--preset {measured['preset']} --page"
     )
     text = (
         f"Written by `{command}`.\n\n"
-        f"![Pictures of the camera suite that fail](images/{IMAGE})\n\n"
+        f"![Pictures of the camera suite that fail](../images/{IMAGE})\n\n"
         "A picture fails if a marker has another's id or an error above 0.3 of an edge, if fewer than 95 % of the "
         "visible markers are measured, if their RMS error is above a twentieth of the pitch, or if z is above 5. Of "
         "every effect that fails, the worst picture at the mildest strength that fails is shown; of all effects "

@@ -79,7 +79,9 @@ def parse_options(arguments: list[str] | None) -> argparse.Namespace:
         "--pictures-folder", type=Path, metavar="DIR", help="write what fails: pictures and overlays"
     )
     parser.add_argument(
-        "--page", action="store_true", help="write docs/measured, and the part of docs/hard-cases.md"
+        "--page",
+        action="store_true",
+        help="write docs/measured, and the part of docs/explanation/hard-cases.md",
     )
     parser.add_argument(
         "--processes", "--workers", type=int, default=min(2, os.cpu_count() or 1), metavar="N"

@@ -41,7 +41,7 @@ def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
 def updated_pages(blocks: Mapping[str, str]) -> dict[Path, str]:
     """README and the pages of docs/ with one of the blocks: path -> text with replaced blocks."""
     found = {}
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
         text = path.read_text(encoding="utf-8")
         if any(BLOCK_BEGIN.format(name) in text for name in blocks):
             found[path] = replace_blocks(text, blocks)

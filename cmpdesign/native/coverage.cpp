@@ -1,7 +1,7 @@
 // The coverage engine of scenes: exact areas of polygons, blurred by splines, one side after the other.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 
@@ -170,10 +170,8 @@ Array<float, 3> draw_band(const CoverageTask& task, Index first, Index count) {
   return apply_point_spread(differences, task.spread, count, task.width);
 }
 
-void fill(nb::module_& module) { bind<&draw_band>(module, "draw_band", {"task", "first", "count"}); }
-
-const Room room("coverage", fill);
-
 }  // namespace
+
+void add_coverage(nb::module_ module) { bind<&draw_band>(module, "draw_band", {"task", "first", "count"}); }
 
 }  // namespace cmp

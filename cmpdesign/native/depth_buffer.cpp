@@ -1,7 +1,7 @@
 // A depth buffer for pictures of meshes.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 
@@ -44,12 +44,10 @@ void fill_depth_buffer(View<const double, 3> corners, View<double, 2> depth, Vie
   }
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_depth_buffer(nb::module_ module) {
   bind<&fill_depth_buffer>(module, "fill_depth_buffer", {"corners", "depth", "number"});
 }
-
-const Room room("depth_buffer", fill);
-
-}  // namespace
 
 }  // namespace cmp

@@ -26,15 +26,13 @@ void update_load_spectra(View<T, 4> loads, View<const T, 2> xx, View<const T, 2>
   }
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_elastic_layer(nb::module_ module) {
   bind<&update_load_spectra<double>>(module, "update_load_spectra_float64",
                                      {"loads", "xx", "yy", "zz", "xy", "xz", "yz"});
   bind<&update_load_spectra<float>>(module, "update_load_spectra_float32",
                                     {"loads", "xx", "yy", "zz", "xy", "xz", "yz"});
 }
-
-const Room room("elastic_layer", fill);
-
-}  // namespace
 
 }  // namespace cmp

@@ -1,7 +1,7 @@
 // The values of a sensor for light.
-#include <cmath>
-
 #include "base/binding.hpp"
+
+#include <cmath>
 
 namespace cmp {
 
@@ -29,12 +29,10 @@ void fill_values(View<const float, 1> light, View<const double, 1> light_of_valu
   }
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_encoding(nb::module_ module) {
   bind<&fill_values>(module, "fill_values", {"light", "light_of_value", "first", "values"});
 }
-
-const Room room("encoding", fill);
-
-}  // namespace
 
 }  // namespace cmp

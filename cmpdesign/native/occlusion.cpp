@@ -1,9 +1,9 @@
 // Small triangles of a folded sheet over the samples of a tile.
+#include "base/binding.hpp"
+
 #include <cmath>
 #include <limits>
 #include <optional>
-
-#include "base/binding.hpp"
 
 namespace cmp {
 
@@ -169,14 +169,12 @@ Array<double, 1> nearest_depth(View<const double, 3> xyd, View<const double, 2> 
   return found;
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_occlusion(nb::module_ module) {
   bind<&occlusion_residual>(module, "occlusion_residual",
                             {"xyd", "uv", "facing", "texture", "left", "top", "size", "samples"});
   bind<&nearest_depth>(module, "nearest_depth", {"xyd", "points"});
 }
-
-const Room room("occlusion", fill);
-
-}  // namespace
 
 }  // namespace cmp

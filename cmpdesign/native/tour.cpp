@@ -1,10 +1,10 @@
 // Moves that shorten a tour through cells with several entry points each; see `products/laser/paths/tour.py`.
+#include "base/binding.hpp"
+
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
-
-#include "base/binding.hpp"
 
 namespace cmp {
 
@@ -267,16 +267,14 @@ void update_by_reinsertion(Ints order, Ints entry, Entries entries, Neighbours n
   for (Index i = 0; i < order.size(); ++i) entry[i] = tour.entry(order[i]);
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_tour(nb::module_ module) {
   bind<&nearest_neighbour_order>(module, "nearest_neighbour_order", {"centre"});
   bind<&update_order>(module, "update_order", {"order", "points", "neighbours", "min_gain"});
   bind<&best_entries>(module, "best_entries", {"entries", "order"});
   bind<&update_by_reinsertion>(module, "update_by_reinsertion",
                                {"order", "entry", "entries", "neighbours", "min_gain"});
 }
-
-const Room room("tour", fill);
-
-}  // namespace
 
 }  // namespace cmp

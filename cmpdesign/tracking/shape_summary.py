@@ -75,7 +75,7 @@ class ShapeStatistics:
             )
 
     def to_json(self, source: str, declared: int | None, ended: str) -> dict[str, Any]:
-        """The summary as JSON values, see docs/reconstruction.md.
+        """The summary as JSON values, see docs/how-to/reconstruction.md.
 
         Args:
             source: name of the source.

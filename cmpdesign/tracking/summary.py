@@ -101,7 +101,7 @@ class TrackStatistics:
         return float(np.sqrt(self._squares / self._values / 2))
 
     def to_json(self, source: str, declared: int | None, ended: str, rest: Rest | None) -> dict[str, Any]:
-        """The summary as JSON values, see docs/tracking.md.
+        """The summary as JSON values, see docs/how-to/tracking.md.
 
         Args:
             source: name of the source.

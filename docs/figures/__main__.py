@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cmpdesign.files.atomic import write_file
 
-from .everything import IMAGES, pages, pictures
+from .everything import DOCS, IMAGES, pages, pictures
 
 
 def main() -> None:
@@ -14,7 +14,7 @@ def main() -> None:
         print(f"docs/images/{name}: {len(data) / 1000:.0f} kB")
     for path, text in pages().items():
         write_file(path, text)
-        print(f"docs/{path.name}")
+        print(path.relative_to(DOCS.parent))
 
 
 if __name__ == "__main__":

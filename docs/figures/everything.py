@@ -22,10 +22,10 @@ def pictures() -> dict[str, bytes]:
 
 
 def pages() -> dict[Path, str]:
-    """Path -> text of generated pages. Of docs/design-files.md only the tables are generated."""
-    design_files = DOCS / "design-files.md"
+    """Path -> text of generated pages. Of docs/reference/design-files.md only the tables are generated."""
+    design_files = DOCS / "reference" / "design-files.md"
     return {
-        DOCS / "gallery.md": gallery.page(),
+        DOCS / "reference" / "gallery.md": gallery.page(),
         design_files: fields.filled(design_files.read_text(encoding="utf-8")),
         **measured.pages(),
     }

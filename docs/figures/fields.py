@@ -1,4 +1,4 @@
-"""The tables of docs/design-files.md, from the model that reads the files."""
+"""The tables of docs/reference/design-files.md, from the model that reads the files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def filled(text: str) -> str:
         before, _, rest = text.partition(begin)
         _, found, after = rest.partition(end)
         if not found:
-            raise ValueError(f"docs/design-files.md has no place for the table of {name}")
+            raise ValueError(f"docs/reference/design-files.md has no place for the table of {name}")
         text = f"{before}{begin}\n\n{lines}\n{end}{after}"
     return text
 

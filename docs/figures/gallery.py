@@ -1,4 +1,4 @@
-"""docs/gallery.md: every registered pattern and every template, with previews."""
+"""docs/reference/gallery.md: every registered pattern and every template, with previews."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ def figures() -> dict[str, bytes]:
 
 
 def page() -> str:
-    """docs/gallery.md."""
+    """docs/reference/gallery.md."""
     parts = [HEAD, "\n## Patterns\n"]
     for name, pattern in registered_patterns().items():
         options = ", ".join(f"`{option}`" for option in sorted(pattern.options))
         note = f"Options of its own: {options}." if options else "No options of its own."
         parts.append(
             f"\n### {name}\n\n{pattern.summary}\n{note}\n\n"
-            f"![The pattern {name} with {PATTERN_LAYERS} layers](images/pattern-{name}.png)\n"
+            f"![The pattern {name} with {PATTERN_LAYERS} layers](../images/pattern-{name}.png)\n"
         )
     parts.append("\n## Templates\n")
     parts += [_template(name) for name in templates()]
@@ -69,7 +69,7 @@ def _template(name: str) -> str:
         f"- {report.present_markers} markers, {report.virtual_markers} virtual ones on {report.edges} edges\n"
         f"- {width:.2f} x {height:.2f} mm with its border; seen from the {'back' if design.mirrored else 'front'}\n"
         f"- source: {design.source}\n\n"
-        f"![The template {name}](images/template-{name}.png)\n"
+        f"![The template {name}](../images/template-{name}.png)\n"
     )
 
 

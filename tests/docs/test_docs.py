@@ -43,7 +43,7 @@ from cmpdesign.patterns import registered_patterns
 from docs.figures import everything, fields
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 IMAGES = ROOT / "docs" / "images"
 FENCE = re.compile(r"^```(\w+)(?: ([\w.]+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 DECIMAL = re.compile(r"-?\d+\.\d+")
@@ -155,7 +155,7 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
     )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", COLUMNS)
@@ -188,7 +188,7 @@ def test_every_path_of_the_map_exists() -> None:
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
-@pytest.mark.parametrize("name", ["reliability.md", "hard-cases.md"])
+@pytest.mark.parametrize("name", ["reference/reliability.md", "explanation/hard-cases.md"])
 def test_every_named_test_exists(name: str) -> None:
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     named = re.findall(r"`((?:\w+/)+test_\w+)(?:\.py)?(?:::(test_\w+))?`", page)
@@ -199,7 +199,7 @@ def test_every_named_test_exists(name: str) -> None:
 
 
 def test_stated_limits_hold() -> None:
-    page = (ROOT / "docs" / "reliability.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "reliability.md").read_text(encoding="utf-8")
     for text, limit in (
         ("16 MiB", inputs.MOST_TEXT_BYTES == 16 << 20),
         ("250 megapixels", inputs.MOST_PIXELS == 250_000_000),
@@ -261,24 +261,24 @@ def test_generated_pages_are_up_to_date() -> None:
 
 
 def test_everything_registered_is_in_the_gallery(drawn: dict[str, bytes]) -> None:
-    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "gallery.md").read_text(encoding="utf-8")
     for kind, names in (("pattern", registered_patterns()), ("template", templates())):
         for name in names:
             assert f"\n### {name}\n" in page
-            assert f"(images/{kind}-{name}.png)" in page and f"{kind}-{name}.png" in drawn
+            assert f"(../images/{kind}-{name}.png)" in page and f"{kind}-{name}.png" in drawn
 
 
 def test_every_field_of_a_design_is_documented() -> None:
     named = re.findall(r"^\| `(\w+)` \|", fields.fields(), flags=re.MULTILINE)
     assert named == list(Design.model_fields)
-    page = (ROOT / "docs" / "design-files.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "design-files.md").read_text(encoding="utf-8")
     for name, model in fields.tables().items():
         named = re.findall(r"^\| `(\w+)` \|", fields.table(model), flags=re.MULTILINE)
         assert named == list(model.model_fields) and f"\n### {name}\n" in page
 
 
 @pytest.mark.parametrize(
-    "page", [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=lambda p: p.name
+    "page", [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=lambda p: p.stem
 )
 def test_links_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")

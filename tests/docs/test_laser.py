@@ -16,7 +16,7 @@ from cmpdesign.products.laser.coupon.design import load_coupon
 from cmpdesign.products.laser.library import machines, materials
 from tests.support.laser_tools import coupon_photo
 
-PAGE = Path(__file__).parents[2] / "docs" / "laser.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "laser.md"
 
 
 def test_the_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,6 @@
 """Hard cases: each gives right places, or lost markers with a reason; never a NaN that spreads, nor a wrong id.
 
-``docs/hard-cases.md`` lists them. Warnings are errors in every test here, as everywhere.
+``docs/explanation/hard-cases.md`` lists them. Warnings are errors in every test here, as everywhere.
 """
 
 from __future__ import annotations
@@ -297,7 +297,7 @@ def test_a_marker_put_back_beside_dirt_spreads_no_nan(seed: int, preset: str) ->
 
 
 def test_every_hard_case_of_the_table_names_a_test() -> None:
-    page = (ROOT / "docs" / "hard-cases.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "explanation" / "hard-cases.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("|")][2:]
     assert len(rows) >= 15
     for row in rows:

@@ -1,4 +1,4 @@
-"""The picture of docs/contact.md: a ball pressed and sheared; pressure, section, stick and slip."""
+"""The picture of docs/explanation/contact.md: a ball pressed and sheared; pressure, section, stick and slip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drawings of docs/conventions.md. Ids, colors and positions come from real layouts."""
+"""The drawings of docs/reference/conventions.md. Ids, colors and positions come from real layouts."""
 
 from __future__ import annotations
 

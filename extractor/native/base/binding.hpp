@@ -17,6 +17,10 @@
 #include <utility>
 #include <vector>
 
+#ifdef CMP_NEEDS_V3
+#include <cpuid.h>
+#endif
+
 #include "array.hpp"
 
 namespace cmp {
@@ -237,35 +241,30 @@ nb::object to_python(std::tuple<T...>&& values) {
                     std::move(values));
 }
 
+#ifdef CMP_NEEDS_V3
+// Whether processor and system have AVX2, FMA and BMI2. Asked of the processor itself: __builtin_cpu_supports
+// of zig's library answers no on every processor.
+inline bool has_v3() {
+  constexpr unsigned FMA = 1U << 12, SAVED_BY_SYSTEM = 1U << 27, AVX2 = 1U << 5, BMI2 = 1U << 8,
+                     YMM_STATE = 6;
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & FMA) || !(c & SAVED_BY_SYSTEM)) return false;
+  unsigned low = 0, high = 0;
+  asm("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+  return (low & YMM_STATE) == YMM_STATE && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & AVX2) &&
+         (b & BMI2);
+}
+#endif
+
 // Refuses to go on where the processor lacks the instructions that the loops were compiled for.
 inline void require_processor() {
-#if defined(CMP_NEEDS_V3) && (defined(__x86_64__) || defined(_M_X64))
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || !__builtin_cpu_supports("bmi2"))
+#ifdef CMP_NEEDS_V3
+  if (!has_v3())
     throw nb::import_error(
         "this build needs a processor with AVX2, FMA and BMI2 (x86-64-v3); for older ones build with "
         "pip install . -C cmake.define.CMP_CPU=x86-64");
 #endif
 }
-
-// A room of the core: a submodule of its own. Each room makes one constant of this type.
-class Room {
- public:
-  using Fill = void (*)(nb::module_&);
-  Room(const char* name, Fill fill) { all().push_back({name, fill}); }
-
-  static void add_all(nb::module_& module) {
-    for (const auto& [name, fill] : all()) {
-      nb::module_ room = module.def_submodule(name);
-      fill(room);
-    }
-  }
-
- private:
-  static std::vector<std::pair<const char*, Fill>>& all() {
-    static std::vector<std::pair<const char*, Fill>> rooms;
-    return rooms;
-  }
-};
 
 template <auto F, class Signature>
 struct Bound;

@@ -1,5 +1,6 @@
 // Room "cells" as Python sees it.
 #include "base/binding.hpp"
+
 #include "cells/cell_mesh.hpp"
 #include "cells/cells.hpp"
 #include "cells/region_growing.hpp"
@@ -9,9 +10,7 @@
 
 namespace cmp::cells {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_cells(nb::module_ module) {
   bind<&find_runs>(module, "find_runs", {"label"});
   bind<&find_domains>(module, "find_domains", {"runs", "parent", "max_domains", "limits"});
   bind<&seed_points>(module, "seed_points", {"runs", "domain", "area"});
@@ -32,9 +31,5 @@ void fill(nb::module_& module) {
   bind<&classify_faces>(module, "classify_faces",
                         {"points", "ink", "area", "corner", "faces", "neighbours", "limits"});
 }
-
-const Room room("cells", fill);
-
-}  // namespace
 
 }  // namespace cmp::cells

@@ -1,5 +1,6 @@
 // Room "complete" as Python sees it.
 #include "base/binding.hpp"
+
 #include "complete/consistency_filter.hpp"
 #include "complete/image_quality.hpp"
 #include "complete/layer_arcs.hpp"
@@ -9,9 +10,7 @@
 
 namespace cmp::complete {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_complete(nb::module_ module) {
   bind<&update_rejecting_inconsistent>(module, "update_rejecting_inconsistent",
                                        {"xy", "cov", "evidence", "tables", "size", "limits"});
   bind<&find_uncertain_markers>(module, "find_uncertain_markers", {"cov", "edge_px", "limits"});
@@ -21,9 +20,5 @@ void fill(nb::module_& module) {
   bind<&centers>(module, "centers", {"xy", "corners"});
   bind<&measure>(module, "measure", {"view", "center", "color", "radius", "limits"});
 }
-
-const Room room("complete", fill);
-
-}  // namespace
 
 }  // namespace cmp::complete

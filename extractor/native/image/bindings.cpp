@@ -1,5 +1,6 @@
 // Room "image" as Python sees it.
 #include "base/binding.hpp"
+
 #include "image/color.hpp"
 #include "image/ink_segmentation.hpp"
 #include "image/input.hpp"
@@ -8,9 +9,7 @@
 
 namespace cmp::image {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_image(nb::module_ module) {
   bind<&hsv_and_chroma>(module, "hsv_and_chroma", {"image"});
   bind<&hue_weights>(module, "hue_weights", {"hue", "chroma", "limits"});
   bind<&hue_shifts>(module, "hue_shifts", {"weight", "nominal_deg", "limits"});
@@ -26,9 +25,5 @@ void fill(nb::module_& module) {
   bind<&tile_chroma>(module, "tile_chroma", {"chroma", "tile_px"});
   bind<&target_mask>(module, "target_mask", {"chroma", "limits"});
 }
-
-const Room room("image", fill);
-
-}  // namespace
 
 }  // namespace cmp::image

@@ -1,23 +1,18 @@
 // Room "layout" as Python sees it.
 #include "base/binding.hpp"
+
 #include "layout/lattice.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"
 
 namespace cmp::layout {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_layout(nb::module_ module) {
   bind<&layer_of>(module, "layer_of", {"q", "r"});
   bind<&marker_id>(module, "marker_id", {"q", "r"});
   bind<&cells_at>(module, "cells_at", {"axial", "cell_lookup"});
   bind<&corner_ids>(module, "corner_ids", {"axial"});
   bind<&neighbour_ids>(module, "neighbour_ids", {"axial", "steps", "layers"});
 }
-
-const Room room("layout", fill);
-
-}  // namespace
 
 }  // namespace cmp::layout

@@ -1,5 +1,6 @@
 // Room "localmap" as Python sees it.
 #include "base/binding.hpp"
+
 #include "localmap/affine_maps.hpp"
 #include "localmap/cell_prediction.hpp"
 #include "localmap/neighbour_prediction.hpp"
@@ -17,7 +18,9 @@ std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<std::int3
           std::move(found.neighbour_count)};
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_localmap(nb::module_ module) {
   bind<&completed_linear_maps>(module, "completed_linear_maps",
                                {"center_px", "corner_px", "cell", "mirrored", "layout", "limits"});
   bind<&lattice_bases>(module, "lattice_bases", {"center", "axial", "limits"});
@@ -25,9 +28,5 @@ void fill(nb::module_& module) {
   bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
                                     {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});
 }
-
-const Room room("localmap", fill);
-
-}  // namespace
 
 }  // namespace cmp::localmap

@@ -1,5 +1,6 @@
 // Room "numbering" as Python sees it.
 #include "base/binding.hpp"
+
 #include "numbering/lattice_walk.hpp"
 #include "numbering/marker_places.hpp"
 #include "numbering/mesh_parts.hpp"
@@ -10,9 +11,7 @@
 
 namespace cmp::numbering {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_numbering(nb::module_ module) {
   bind<&faces_by_component>(module, "faces_by_component", {"neighbours", "orientation"});
   bind<&marker_turn_by_brightness>(module, "marker_turn_by_brightness",
                                    {"image", "center", "faces", "orientation", "limits"});
@@ -32,9 +31,5 @@ void fill(nb::module_& module) {
       module, "update_unmatched_markers",
       {"xy_px", "edge_px", "agreed", "unmatched", "corners", "marker_mm", "table", "limits"});
 }
-
-const Room room("numbering", fill);
-
-}  // namespace
 
 }  // namespace cmp::numbering

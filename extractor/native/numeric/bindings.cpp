@@ -1,5 +1,6 @@
 // Room "numeric" as Python sees it.
 #include "base/binding.hpp"
+
 #include "numeric/bilinear.hpp"
 #include "numeric/delaunay.hpp"
 #include "numeric/gaussian.hpp"
@@ -22,7 +23,9 @@ Array<std::int32_t, 2> nearest_points(View<const double, 2> xy, View<const doubl
   return index;
 }
 
-void fill(nb::module_& module) {
+}  // namespace
+
+void add_numeric(nb::module_ module) {
   bind<&delaunay>(module, "delaunay", {"points"});
   bind<&fill_patch_mean>(module, "fill_patch_mean", {"flat", "height", "width", "x", "y", "radius", "out"});
   bind<&nearest_points>(module, "nearest_points", {"xy", "queries", "count"});
@@ -31,9 +34,5 @@ void fill(nb::module_& module) {
   bind<&fill_corner_terms>(module, "fill_corner_terms", {"r", "out"});
   bind<&wedge_correlation>(module, "wedge_correlation", {"squares", "product", "corner"});
 }
-
-const Room room("numeric", fill);
-
-}  // namespace
 
 }  // namespace cmp::numeric

@@ -1,5 +1,6 @@
 // Room "refine" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/drawn_pattern.hpp"
 #include "refine/profile_rounds.hpp"
 #include "refine/refinement_step.hpp"
@@ -8,9 +9,7 @@
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_refine(nb::module_ module) {
   bind<&extrapolate_pattern>(module, "extrapolate_pattern", {"xy", "topology", "limits"});
   bind<&profile_step>(module, "profile_step",
                       {"view", "lines", "across", "state", "topology", "stations", "judged", "limits"});
@@ -19,9 +18,5 @@ void fill(nb::module_& module) {
   bind<&update_and_solve>(module, "update_and_solve", {"drawing", "state", "topology", "is_last", "limits"});
   bind<&at_full_scale>(module, "at_full_scale", {"xy", "cov", "places", "scale", "limits"});
 }
-
-const Room room("refine", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine

@@ -1,5 +1,6 @@
 // Room "markers" as Python sees it: outliers, recovery, acceptance, and the first look at an image.
 #include "base/binding.hpp"
+
 #include "refine/acceptance.hpp"
 #include "refine/first_look.hpp"
 #include "refine/outliers.hpp"
@@ -7,9 +8,7 @@
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_markers(nb::module_ module) {
   bind<&suspect_markers<double>>(module, "suspect_markers", {"profile_weight", "weight", "spokes", "limits"});
   bind<&outlier_markers>(module, "outlier_markers", {"xy", "maps", "suspect", "edge", "topology", "limits"});
   bind<&correct_outliers>(module, "correct_outliers",
@@ -32,9 +31,5 @@ void fill(nb::module_& module) {
   bind<&blur_and_bleed>(module, "blur_and_bleed",
                         {"view", "lines", "across", "xy", "cells", "assumed", "limits"});
 }
-
-const Room room("markers", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine

@@ -1,5 +1,6 @@
 // Room "track" as Python sees it.
 #include "base/binding.hpp"
+
 #include "track/image_check.hpp"
 #include "track/ink_alignment.hpp"
 #include "track/warm_start.hpp"
@@ -7,9 +8,7 @@
 
 namespace cmp::track {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_track(nb::module_ module) {
   bind<&predict_missing>(module, "predict_missing", {"completion", "weights", "xy"});
   bind<&check_cells>(module, "check_cells", {"image", "xy", "tables", "before", "compare", "limits"});
   bind<&measure_shifts>(module, "measure_shifts", {"image", "xy", "tables", "levels", "limits"});
@@ -21,9 +20,5 @@ void fill(nb::module_& module) {
                          {"verdict", "first", "known", "corners", "cells_of_marker", "limits"});
   bind<&verified_markers>(module, "verified_markers", {"xy", "proved", "corners"});
 }
-
-const Room room("track", fill);
-
-}  // namespace
 
 }  // namespace cmp::track

@@ -1,14 +1,13 @@
 // Room "measure" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_measure(nb::module_ module) {
   bind<&measure_roughness>(module, "measure_roughness",
                            {"xy", "maps", "diagonal", "rows", "spokes", "near", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
@@ -17,9 +16,5 @@ void fill(nb::module_& module) {
   bind<&median_edge>(module, "median_edge", {"xy", "edges", "limits"});
   bind<&pattern_box>(module, "pattern_box", {"xy", "margin", "width", "height"});
 }
-
-const Room room("measure", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine

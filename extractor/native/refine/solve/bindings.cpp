@@ -1,13 +1,12 @@
 // Room "solve" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/solve/convergence.hpp"
 #include "refine/solve/fisher_information.hpp"
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_solve(nb::module_ module) {
   bind<&convergence_covariance>(module, "convergence_covariance",
                                 {"shift", "sigma", "remaining_share", "limits"});
   bind<&solve_shifts>(module, "solve_shifts", {"diagonal", "off_diagonal", "edges", "right", "limits"});
@@ -15,9 +14,5 @@ void fill(nb::module_& module) {
       module, "covariances",
       {"diagonal", "off_diagonal", "edges", "spokes", "min_information", "selected", "limits"});
 }
-
-const Room room("solve", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine

@@ -1,5 +1,6 @@
 // Room "synthesis" as Python sees it.
 #include "base/binding.hpp"
+
 #include "refine/synthesis/blur_bleed.hpp"
 #include "refine/synthesis/dot_gain.hpp"
 #include "refine/synthesis/gridlines.hpp"
@@ -7,9 +8,7 @@
 
 namespace cmp::refine {
 
-namespace {
-
-void fill(nb::module_& module) {
+void add_synthesis(nb::module_ module) {
   bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "limits"});
   bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil", "limits"});
   bind<&level_change>(module, "level_change", {"before", "now"});
@@ -18,9 +17,5 @@ void fill(nb::module_& module) {
                         {"levels", "xy", "cells", "color", "drawn_sigma", "sigma", "limits"});
   bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain", "limits"});
 }
-
-const Room room("synthesis", fill);
-
-}  // namespace
 
 }  // namespace cmp::refine

@@ -334,10 +334,10 @@ def test_as_many_pads_as_fit() -> None:
 
 
 def test_the_page_about_molds_says_what_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every command in docs/molds.md, in its order; a scan is made where one is read."""
+    """Every command in docs/how-to/molds.md, in its order; a scan is made where one is read."""
     import resvg_py
 
-    page = (Path(__file__).parents[4] / "docs" / "molds.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[4] / "docs" / "how-to" / "molds.md").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     commands = re.findall(r"^(?:\$ |    )cmpdesign (.*)$", page, flags=re.MULTILINE)
     assert [command.split()[0] for command in commands] == ["build", "check", "verify"]
