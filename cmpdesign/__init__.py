@@ -1,13 +1,24 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
+Whatever a command does is one call by the same name:
+
+    design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
+    cmpdesign.size((1280, 960), (24, 18))           which design suits a camera and its field of view
+    cmpdesign.render(design.layout, noise=2)        a picture with its exact truth
+    cmpdesign.verify("layout.json", "photo.png")    a picture judged; extractor.Extractor reads without judging
+    cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
+    cmpdesign.kerf, calibrate_pattern, run_experiment, export_lerobot, export_zarr
+
+The rooms of the package, each of which imports only rooms above it, left column first:
+
     patterns  graphs, numbering and positions      contact   objects pressed into the elastic layer
     design    validated parameters of a pattern    scene     rendered images with exact ground truth
-    layout    markers, cells, edges; checks        tracking  markers of videos and cameras as tables
-    files     layout.json, images, videos          evaluate  the article's experiments, simulated
-    products  drawings, lasers, molds, prints      cli       the command line
-    reading   layouts and pictures verified
+    layout    markers, cells, edges; checks        proposal  a design for a camera
+    files     layout.json, images, videos          tracking  markers of videos and cameras as tables
+    products  drawings, lasers, molds, prints      evaluate  the article's experiments, simulated
+    reading   layouts and pictures verified        api, cli  the calls, and the command line
 
-Each room imports only rooms above it, left column first. Public names are loaded at their first use.
+Public names are loaded at their first use, so that ``import cmpdesign`` takes milliseconds.
 """
 
 from __future__ import annotations
@@ -16,30 +27,81 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmpdesign.design.design import Design as Design
-    from cmpdesign.design.design import load_design as load_design
+    from cmpdesign.api.designs import Design as Design
+    from cmpdesign.api.designs import load as load
+    from cmpdesign.api.designs import load as load_design
+    from cmpdesign.api.designs import templates as templates
+    from cmpdesign.api.layouts import Layout as Layout
+    from cmpdesign.api.layouts import build_layout as build_layout
+    from cmpdesign.api.layouts import read_layout as read_layout
+    from cmpdesign.api.pictures import Verifier as Verifier
+    from cmpdesign.api.pictures import load_scene as load_scene
+    from cmpdesign.api.pictures import render as render
+    from cmpdesign.api.pictures import render_sequence as render_sequence
+    from cmpdesign.api.pictures import verify as verify
+    from cmpdesign.api.plots import plot_displacement as plot_displacement
+    from cmpdesign.api.plots import plot_history as plot_history
+    from cmpdesign.api.plots import plot_layout as plot_layout
+    from cmpdesign.api.plots import plot_markers as plot_markers
+    from cmpdesign.api.sequences import ShapeOptions as ShapeOptions
+    from cmpdesign.api.sequences import load_run as load_run
+    from cmpdesign.api.sequences import open_source as open_source
+    from cmpdesign.api.sequences import reconstruct as reconstruct
+    from cmpdesign.api.sequences import track as track
+    from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
+    from cmpdesign.api.workshop import export_lerobot as export_lerobot
+    from cmpdesign.api.workshop import export_zarr as export_zarr
+    from cmpdesign.api.workshop import kerf as kerf
+    from cmpdesign.api.workshop import run_experiment as run_experiment
+    from cmpdesign.design.design import design_schema as schema
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
+    from cmpdesign.errors import InputError as InputError
     from cmpdesign.errors import OutputError as OutputError
     from cmpdesign.files.layout_json import layout_to_json as layout_to_json
     from cmpdesign.files.layout_json import write_layout as write_layout
-    from cmpdesign.layout.build import build_layout as build_layout
     from cmpdesign.layout.checks import check_design as check_design
-    from cmpdesign.layout.layout import Layout as Layout
     from cmpdesign.products.drawing.svg import write_svg as write_svg
+    from cmpdesign.proposal.camera_design import size as size
 
 __version__ = "0.1.0"
 
+# Public name -> its module, and its name there where that differs.
 _HOMES = {
     "CmpDesignError": "cmpdesign.errors",
-    "Design": "cmpdesign.design.design",
+    "Design": "cmpdesign.api.designs",
     "DesignError": "cmpdesign.errors",
-    "Layout": "cmpdesign.layout.layout",
+    "InputError": "cmpdesign.errors",
+    "Layout": "cmpdesign.api.layouts",
     "OutputError": "cmpdesign.errors",
-    "build_layout": "cmpdesign.layout.build",
+    "ShapeOptions": "cmpdesign.api.sequences",
+    "Verifier": "cmpdesign.api.pictures",
+    "build_layout": "cmpdesign.api.layouts",
+    "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
+    "export_lerobot": "cmpdesign.api.workshop",
+    "export_zarr": "cmpdesign.api.workshop",
+    "kerf": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
-    "load_design": "cmpdesign.design.design",
+    "load": "cmpdesign.api.designs",
+    "load_design": "cmpdesign.api.designs:load",
+    "load_run": "cmpdesign.api.sequences",
+    "load_scene": "cmpdesign.api.pictures",
+    "open_source": "cmpdesign.api.sequences",
+    "plot_displacement": "cmpdesign.api.plots",
+    "plot_history": "cmpdesign.api.plots",
+    "plot_layout": "cmpdesign.api.plots",
+    "plot_markers": "cmpdesign.api.plots",
+    "read_layout": "cmpdesign.api.layouts",
+    "reconstruct": "cmpdesign.api.sequences",
+    "render": "cmpdesign.api.pictures",
+    "render_sequence": "cmpdesign.api.pictures",
+    "run_experiment": "cmpdesign.api.workshop",
+    "schema": "cmpdesign.design.design:design_schema",
+    "size": "cmpdesign.proposal.camera_design",
+    "templates": "cmpdesign.api.designs",
+    "track": "cmpdesign.api.sequences",
+    "verify": "cmpdesign.api.pictures",
     "write_layout": "cmpdesign.files.layout_json",
     "write_svg": "cmpdesign.products.drawing.svg",
 }
@@ -50,7 +112,8 @@ __all__ = sorted([*_HOMES, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'cmpdesign' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    module, _, other = _HOMES[name].partition(":")
+    return getattr(import_module(module), other or name)
 
 
 def __dir__() -> list[str]:

@@ -1,7 +1,7 @@
 """extractor: reads continuous marker patterns from images. It needs numpy and OpenCV, and no CAD.
 
->>> from extractor import Extractor, load_layout
->>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
+>>> from extractor import Extractor
+>>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
 
 The rooms (folders and modules) in their order; a room imports only rooms before it, and the small modules ``errors``,
 ``quality``, ``result`` and ``presets``:
@@ -28,7 +28,7 @@ from extractor.quality import Quality
 from extractor.result import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
-    from extractor.layout.layout_file import load_layout, parse_layout
+    from extractor.layout.layout_file import LayoutLike, layout_of, load_layout, parse_layout
     from extractor.layout.reference import Reference
     from extractor.made.learning import LearntLayout, learn_layout
     from extractor.pipeline import Extractor
@@ -49,6 +49,7 @@ __all__ = [
     "FrameStatus",
     "ImageError",
     "LayoutError",
+    "LayoutLike",
     "LearntLayout",
     "Markers",
     "Medium",
@@ -74,6 +75,7 @@ __all__ = [
     "ViewExtractor",
     "VirtualStatus",
     "WindowPlane",
+    "layout_of",
     "learn_layout",
     "load_layout",
     "load_rig",
@@ -86,6 +88,7 @@ _HOMES = {
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "FrameStatus": "extractor.track.tracker",
+    "LayoutLike": "extractor.layout.layout_file",
     "LearntLayout": "extractor.made.learning",
     "Medium": "extractor.space.medium",
     "PointReason": "extractor.space.triangulation",
@@ -102,6 +105,7 @@ _HOMES = {
     "View": "extractor.space.camera",
     "ViewExtractor": "extractor.space.views",
     "WindowPlane": "extractor.space.medium",
+    "layout_of": "extractor.layout.layout_file",
     "learn_layout": "extractor.made.learning",
     "load_layout": "extractor.layout.layout_file",
     "load_rig": "extractor.space.rig",
@@ -118,3 +122,7 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -33,6 +33,7 @@ from extractor.image.pyramid import Pyramid
 from extractor.image.response import Response, light_of_values, response_tables
 from extractor.image.target_area import find_target
 from extractor.layout.lattice_tables import lattice_of
+from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import topology_of
 from extractor.numbering.gaps.detached_cells import number_detached_cells
@@ -117,11 +118,12 @@ class Stages:
 class Extractor:
     """Finds and numbers the markers of one layout in images. Can be pickled and copied.
 
-    >>> from extractor import Extractor, load_layout
-    >>> markers = Extractor(load_layout("layout.json")).extract(image)  # doctest: +SKIP
+    >>> from extractor import Extractor
+    >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
 
     Args:
-        layout: a triangular pattern.
+        layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
+            a layout of cmpdesign.
         preset: "fast", "balanced" or "accurate".
         response: how light became values: "srgb", "linear", an exponent (light is value ** exponent), or a table of the
             light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
@@ -130,18 +132,20 @@ class Extractor:
         channels: the order of an image's colors: "bgr", as OpenCV has them, or "rgb".
 
     Raises:
-        LayoutError: the layout is not a triangular pattern.
+        LayoutError: the layout is not a triangular pattern, or its file cannot be read.
+        TypeError: ``layout`` is none of these.
         ValueError: no such preset, response, side or order of channels.
     """
 
     def __init__(
         self,
-        layout: Reference,
+        layout: LayoutLike,
         preset: Preset = "balanced",
         response: Response | None = None,
         side: Side = "designed",
         channels: Channels = "bgr",
     ) -> None:
+        layout = layout_of(layout)
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"

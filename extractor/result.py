@@ -121,6 +121,31 @@ class Markers(FrozenRecord):
     def __post_init__(self) -> None:
         self._freeze_mappings("timings_ms", "stages")
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {name}" for name, count in self.counts.items())
+        reason = "" if self.reason is None else f"; {self.reason}"
+        return f"<Markers: {counts}{reason}>"
+
+    def _repr_html_(self) -> str:
+        """A table of the statuses, for notebooks."""
+        from html import escape
+
+        rows = {name: str(count) for name, count in self.counts.items()}
+        if self.mirrored is not None:
+            rows["seen from"] = "the back" if self.mirrored else "the front"
+        if self.reason is not None:
+            rows["reason"] = self.reason.text
+        if self.quality is not None and self.quality.hints:
+            rows["what to do"] = "; ".join(self.quality.hints)
+        cells = "".join(f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items())
+        return f"<table>{cells}</table>"
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of markers by status: measured, repaired, fitted, lost; lost includes markers that no cell shows."""
+        order = (Status.MEASURED, Status.REPAIRED, Status.FITTED, Status.LOST)
+        return {status.name.lower(): int(np.count_nonzero(self.status == status)) for status in order}
+
     @property
     def found(self) -> bool:
         """Whether any marker has a position."""

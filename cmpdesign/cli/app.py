@@ -8,7 +8,7 @@ import typer
 
 from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
-from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, track, verify
+from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.starting import init, schema, templates
@@ -26,6 +26,7 @@ app = typer.Typer(
 for module, function in (
     (templates, templates.templates),
     (init, init.init),
+    (size, size.size),
     (build, build.build),
     (check, check.check),
     (render, render.render),

@@ -77,11 +77,6 @@ def recover_and_report(output: Path, rows_per_frame: int) -> None:
     )
 
 
-def summary_path(table: Path) -> Path:
-    """The place of a table's summary; tables of several formats in one folder have one each."""
-    return table.with_name(table.name + ".summary.json")
-
-
 def print_written(paths: Iterable[Path]) -> None:
     """Print one line for every written file."""
     for path in paths:

@@ -193,19 +193,19 @@ class Design(_StrictModel):
         return ""
 
 
-def load_design(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> Design:
+def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Design:
     """Load a design from a template's name or a TOML file, with all that the file extends, and values overridden.
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> text, as after ``--set``. "palette.red" names a field of a table. The text "none"
-            removes the field.
+        overrides: field -> value, or a text as after ``--set``. "palette.red" names a field of a table. None and the
+            text "none" remove the field.
 
     Raises:
         DesignError: no such template or file, not TOML, a circle of files that extend each other, or a parameter
             that ``Design`` refuses.
 
-    >>> design = load_design("honeycomb", {"pitch_mm": "60mil", "layers": "3"})
+    >>> design = load_design("honeycomb", {"pitch_mm": "60mil", "layers": 3})
     >>> design.pitch_mm, design.layers
     (1.524, 3)
     """
@@ -243,9 +243,9 @@ def design_schema_text() -> str:
     return json.dumps(design_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> None:
+def _update_overrides(data: dict[str, Any], overrides: Mapping[str, object]) -> None:
     """Write the overrides into the document."""
-    for dotted, text in overrides.items():
+    for dotted, value in overrides.items():
         *tables, field = dotted.split(".")
         target = data
         for table in tables:
@@ -254,10 +254,12 @@ def _update_overrides(data: dict[str, Any], overrides: Mapping[str, str]) -> Non
                 raise DesignError(
                     f"{dotted}: {table} is not a table{nearest_name(dotted, Design.model_fields)}"
                 )
-        if text == "none":
+        if value is None or value == "none":
             target.pop(field, None)
+        elif isinstance(value, Mapping):
+            _update_overrides(data, {f"{dotted}.{name}": inner for name, inner in value.items()})
         else:
-            target[field] = _parse_toml_value(text)
+            target[field] = _parse_toml_value(value) if isinstance(value, str) else value
 
 
 def _parse_toml_value(text: str) -> object:

@@ -110,6 +110,26 @@ def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
     return np.ascontiguousarray(pixels[:, :, :3])
 
 
+def require_color_picture(pixels: object) -> Image:
+    """An array as a color picture.
+
+    Raises:
+        ImageFileError: not (H, W, 3) uint8 or uint16, or a side below 16 px.
+    """
+    if not isinstance(pixels, np.ndarray):
+        raise ImageFileError(
+            f"the picture is a value of the type {type(pixels).__name__}; give a file or an array"
+        )
+    shape = "x".join(map(str, pixels.shape))
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or min(pixels.shape[:2]) < SMALLEST_PX:
+        raise ImageFileError(
+            f"the picture's shape is {shape}; expected (H, W, 3), {SMALLEST_PX} px a side or more"
+        )
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise ImageFileError(f"the picture's values are {pixels.dtype}; expected uint8 or uint16")
+    return np.ascontiguousarray(pixels)
+
+
 def to_png(pixels: Image) -> bytes:
     """Encode a (H, W, 3) BGR image as PNG."""
     import cv2

@@ -101,6 +101,14 @@ class Layout:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "palette", MappingProxyType(dict(self.palette)))
 
+    def __repr__(self) -> str:
+        made = "" if self.as_made is None else f", as made ({self.as_made.product})"
+        width, height = self.size_mm
+        return (
+            f"<Layout {self.pattern}: {self.parameters['layers']} layers, {len(self.marker_xy_mm)} markers, "
+            f"{width:.4g} x {height:.4g} mm{made}>"
+        )
+
     @property
     def mirrored(self) -> bool:
         """True when the camera looks at the pattern's back."""

@@ -40,6 +40,7 @@ class TrackingRun:
         limit: largest number of frames, if any.
         ended_early: reason for an early end; "" if all frames were tracked.
         stop: request to stop.
+        warnings: what makes the results doubtful.
     """
 
     source: FrameSource
@@ -50,6 +51,7 @@ class TrackingRun:
     limit: int | None = None
     ended_early: str = ""
     stop: StopRequest = field(default_factory=StopRequest)
+    warnings: tuple[str, ...] = ()
 
     def go(self, watch: Callable[[Any], None]) -> None:
         """Track to the end; ``watch`` is called with every tracked frame.

@@ -6,10 +6,12 @@ digest of the geometry. ``layout.schema.json`` describes the format.
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,49 @@ FIELDS = (
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
 OPTIONAL_FIELDS = ("fiducials", "as_made")
+
+
+class HasReference(Protocol):
+    """A value that gives its ``Reference``, as the layouts of cmpdesign do."""
+
+    def reference(self) -> Reference: ...
+
+
+# What describes a layout: its file, the value of its file, the file's JSON object, or a value that gives one.
+LayoutLike = str | PathLike[str] | Reference | Mapping[str, Any] | HasReference
+
+
+def layout_of(given: LayoutLike) -> Reference:
+    """The layout that a caller gives in one of several forms.
+
+    Args:
+        given: the path of a layout file, a ``Reference``, the JSON object of a layout file as a mapping, or a value
+            with a method ``reference``.
+
+    Raises:
+        LayoutError: see ``load_layout``.
+        TypeError: another value.
+    """
+    if isinstance(given, Reference):
+        return given
+    if isinstance(given, str | PathLike):
+        return load_layout(given)
+    if isinstance(given, Mapping):
+        return parse_layout(_json_text(given))
+    reference = given.reference() if hasattr(given, "reference") else None
+    if not isinstance(reference, Reference):
+        raise TypeError(
+            f"layout is a value of the type {type(given).__name__}; give the path of a layout.json, a Reference "
+            "(load_layout), the JSON object of a layout file, or a layout of cmpdesign"
+        )
+    return reference
+
+
+def _json_text(document: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(dict(document))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise LayoutError(f"layout: is no JSON object ({error}); expected that of a layout.json") from None
 
 
 def load_layout(path: str | PathLike[str]) -> Reference:

@@ -90,6 +90,10 @@ class Reference(FrozenRecord):
     fiducial_diameter_mm: float = 0.0
     as_made: AsMade | None = None
 
+    def __repr__(self) -> str:
+        made = "" if self.as_made is None else f", as made ({self.as_made.product})"
+        return f"<Reference {self.pattern}: {self.layers} layers, {len(self.layer)} markers{made}>"
+
     def __post_init__(self) -> None:
         for name in ARRAY_FIELDS:
             getattr(self, name).setflags(write=False)

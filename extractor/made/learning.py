@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import ImageError, RestError
 from extractor.layout.consistency import check_consistency
+from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import AsMade, Reference
 from extractor.made.adjustment import Adjustment, Readings, adjust_places
 from extractor.pipeline import Extractor
@@ -58,7 +59,7 @@ class LearntLayout:
 
 
 def learn_layout(
-    layout: Reference,
+    layout: LayoutLike,
     images: Sequence[NDArray[Any]],
     *,
     names: Sequence[str] | None = None,
@@ -71,7 +72,7 @@ def learn_layout(
     move over its pad, goes into the places; for displacements from these places this is harmless.
 
     Args:
-        layout: the nominal layout of a triangular pattern.
+        layout: the nominal layout of a triangular pattern, as for ``Extractor``.
         images: 10 pictures or more, as for ``Extractor.extract``.
         names: of the pictures, for messages; by default "picture 1" and so on.
         options: of ``Extractor``, such as ``response``. The preset is "accurate" unless another is given: what
@@ -83,6 +84,7 @@ def learn_layout(
         LayoutError: the layout is as made already, is not triangular, or the learnt cells overlap.
         ImageError: an image of another type or shape.
     """
+    layout = layout_of(layout)
     if layout.as_made is not None:
         raise RestError(f"the layout is of a pad as made ({layout.as_made.product}); give the nominal layout")
     if len(images) < MIN_PICTURES:

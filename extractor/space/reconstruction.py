@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import PoseError
-from extractor.layout.reference import Reference
+from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.result import SIDE_REASONS, Markers, Status, VirtualStatus
 from extractor.space.camera import Array, View, is_finite
 from extractor.space.field import Field, hermite_along_edge
@@ -107,7 +107,7 @@ class Reconstructor:
 
     def __init__(
         self,
-        layout: Reference,
+        layout: LayoutLike,
         rig: Rig,
         rest: Sequence[Markers] | None,
         *,
@@ -118,7 +118,8 @@ class Reconstructor:
     ) -> None:
         if len(rig.views) < 2:
             raise PoseError(f"the rig has {len(rig.views)} view; depth needs two or more")
-        self.layout, self.rig = layout, rig
+        self.layout = layout = layout_of(layout)
+        self.rig = rig
         self.field = Field(layout)
         edge_mm = np.linalg.norm(np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0], axis=1)
         self._max_sigma_mm = (

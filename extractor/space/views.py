@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from extractor.errors import ImageError
 from extractor.image.input import Channels
 from extractor.image.response import Response
+from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
 from extractor.pipeline import Extractor, Side, is_mirrored
 from extractor.presets import Preset
@@ -73,7 +74,7 @@ class ViewExtractor:
     """Finds the markers of every view. Can be pickled and copied.
 
     Args:
-        layout: a triangular pattern.
+        layout: a triangular pattern, as for ``Extractor``.
         rig: the views.
         preset, response, channels: see ``Extractor``.
         side: the side of the pattern at which the views look, directly or through mirrors; see ``Extractor``. A view's
@@ -86,13 +87,14 @@ class ViewExtractor:
 
     def __init__(
         self,
-        layout: Reference,
+        layout: LayoutLike,
         rig: Rig,
         preset: Preset = "balanced",
         response: Response | None = None,
         side: Side = "designed",
         channels: Channels = "bgr",
     ) -> None:
+        layout = layout_of(layout)
         self.layout, self.rig = layout, rig
         self._sides = [_side_shown(layout, view, side) for view in rig.views]
         self._extractors = {

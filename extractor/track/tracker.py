@@ -14,7 +14,7 @@ from extractor.errors import ImageError
 from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
-from extractor.layout.reference import Reference
+from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.pipeline import Extractor, NumberedMarkers, Side, Stages, no_markers
 from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
@@ -111,12 +111,12 @@ class _TrackState:
 class Tracker:
     """Follows one pattern through a sequence of images of one size. A copy goes on as the original does.
 
-    >>> from extractor import Tracker, load_layout
-    >>> tracker = Tracker(load_layout("layout.json"))  # doctest: +SKIP
+    >>> from extractor import Tracker
+    >>> tracker = Tracker("layout.json")  # doctest: +SKIP
     >>> frame = tracker.track(image, time_s=0.04)  # doctest: +SKIP
 
     Args:
-        layout: a triangular pattern.
+        layout: a triangular pattern, as for ``Extractor``.
         rest: markers at rest; None: the first tracked frame.
         mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
             homography fitted at rest.
@@ -130,7 +130,7 @@ class Tracker:
 
     def __init__(
         self,
-        layout: Reference,
+        layout: LayoutLike,
         *,
         rest: Markers | None = None,
         mm_per_px: float | None = None,
@@ -140,7 +140,7 @@ class Tracker:
         side: Side = "designed",
         channels: Channels = "bgr",
     ) -> None:
-        self.layout = layout
+        self.layout = layout = layout_of(layout)
         self.rest: Rest | None = None
         self._extractor = Extractor(layout, preset, response, side, channels)
         self._mm_per_px = mm_per_px

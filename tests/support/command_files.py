@@ -27,6 +27,8 @@ FRAMES = 3
 def prepare_files(folder: Path, command: str) -> Path:
     """Write what the examples of a command name; each command has its own pattern under "layout.json"."""
     folder.mkdir()
+    if command == "init":
+        return folder
     (folder / "mine.toml").write_text('pattern = "honeycomb"\nlayers = 3\npitch_mm = 2.5\n', encoding="utf-8")
     match command:
         case "reconstruct":

@@ -19,7 +19,7 @@ from cmpdesign.cli.options.designs import (
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
-from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products, make_products, product_folders
+from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
@@ -53,54 +53,40 @@ def build(
 
     from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
-    from cmpdesign.files.atomic import write_folder
-    from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files, remove_files
-    from cmpdesign.files.layout_json import pattern_digest
-    from cmpdesign.files.other_designs import find_other_designs
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.layout.report import design_report
-    from cmpdesign.products.as_made.reading import clip_findings
+    from cmpdesign.products.building import build_files
 
-    names = chosen_products(only)
+    names, camera_px = chosen_products(only), parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
     print_step(
         f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers, digest {layout.digest[:12]}"
     )
-    camera_px = parse_camera(camera)
-    report = design_report(parameters, layout, camera_px)
     with working("building") as tell:
-        made = make_products(names, parameters, layout, report, camera_px, preset=preset, watch=_steps(tell))
-    pattern = pattern_digest(layout)
-    listed = files_with_lists(made.files, product_folders(), output, pattern)
-    stale = find_stale_files(output, listed, product_folders(), pattern)
-    written = [path for path in write_folder(output, listed) if path.name != LIST_NAME]
-    removed = [path for path in remove_files(stale) if path.name != LIST_NAME]
-    for path in written:
+        built = build_files(parameters, layout, output, names, camera_px, preset=preset, watch=_steps(tell))
+    for path in built.written:
         say(f"wrote {printable_path(path)}")
-    for path in removed:
+    for path in built.removed:
         say(f"removed {printable_path(path)}, of an earlier build")
-    print_report(report)
-    for name, reading in made.readings.items():
+    print_report(built.report)
+    for name, reading in built.readings.items():
         say(f"{name} as made: {reading.line()}")
-    for path in find_other_designs(output, product_folders(), layout.digest, pattern):
+    for path in built.of_other_designs:
         print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
-    findings = (*report.findings, *clip_findings(layout, camera_px), *made.findings)
-    for finding in findings:
+    for finding in built.findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
-    failed = any(finding.severity == "error" for finding in findings)
     finish(
         lambda: BuildDocument(
             digest=layout.digest,
             folder=printable_path(output),
-            written=tuple(map(printable_path, written)),
-            removed=tuple(map(printable_path, removed)),
-            report={name: value for name, value in asdict(report).items() if name != "findings"},
-            as_made=reading_parts(made.readings),
-            findings=finding_parts(findings),
+            written=tuple(map(printable_path, built.written)),
+            removed=tuple(map(printable_path, built.removed)),
+            report={name: value for name, value in asdict(built.report).items() if name != "findings"},
+            as_made=reading_parts(built.readings),
+            findings=finding_parts(built.findings),
         ),
-        EXIT_NOT_PASSED if failed else 0,
+        0 if built.works else EXIT_NOT_PASSED,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -22,7 +22,6 @@ from cmpdesign.cli.terminal import finish, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
-    from cmpdesign.products.as_made.reading import PadReading
 
 EXAMPLES = (
     "cmpdesign check tac3d --set pitch_mm=0.5mm",
@@ -43,39 +42,27 @@ def check(
     from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
-    from cmpdesign.layout.checks import check_design
-    from cmpdesign.products.as_made.reading import clip_findings
+    from cmpdesign.products.building import check_products
 
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
-    findings = [*check_design(parameters, layout, camera_px), *clip_findings(layout, camera_px)]
-    readings: Mapping[str, PadReading] = {}
-    reasons: dict[str, str] = {}
-    if read:
-        from cmpdesign.products.as_made.reading import read_pads
-        from cmpdesign.products.registry import pads_as_made
-
-        with working("drawing and reading pads"):
-            pads, reasons = pads_as_made(parameters, layout)
-            found = read_pads(pads, camera_px, preset)
-        readings = found.readings
-        for name, reading in readings.items():
-            say(f"{name} as made: {reading.line()}")
-        for name, reason in reasons.items():
-            print_warning(f"{name} is not read: {reason}")
-        findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
-    _print_findings(findings)
-    passed = all(finding.severity != "error" for finding in findings)
+    with working("drawing and reading pads" if read else "checking"):
+        checked = check_products(parameters, layout, camera_px, read=read, preset=preset)
+    for name, reading in checked.readings.items():
+        say(f"{name} as made: {reading.line()}")
+    for name, reason in checked.unread.items():
+        print_warning(f"{name} is not read: {reason}")
+    _print_findings(checked.findings)
     finish(
         lambda: CheckDocument(
             digest=layout.digest,
-            passed=passed,
-            as_made=reading_parts(readings),
-            not_read=reasons,
-            findings=finding_parts(findings),
+            passed=checked.works,
+            as_made=reading_parts(checked.readings),
+            not_read=dict(checked.unread),
+            findings=finding_parts(checked.findings),
         ),
-        0 if passed else EXIT_NOT_PASSED,
+        0 if checked.works else EXIT_NOT_PASSED,
     )
 
 

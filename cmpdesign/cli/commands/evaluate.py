@@ -14,6 +14,7 @@ from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import progress_bar
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.evaluate.defaults import USUAL_TRIALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +49,9 @@ SensorOption = Annotated[
 )
 def precision(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = 10,
+    trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = USUAL_TRIALS[
+        "precision"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -74,7 +77,7 @@ def precision(
 )
 def response(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = 10,
+    trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = USUAL_TRIALS["response"],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -99,7 +102,9 @@ def response(
 )
 def reliability(
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = 300,
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = USUAL_TRIALS[
+        "reliability"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
@@ -122,7 +127,7 @@ def reliability(
 )
 def angles(output: Output, workers: Workers = None) -> None:
     """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
-    run = _run_experiment("angles", output, 1, 0, workers, "tac3d", "balanced")
+    run = _run_experiment("angles", output, USUAL_TRIALS["angles"], 0, workers, "tac3d", "balanced")
     for name, one in run.document["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
@@ -144,7 +149,9 @@ def angles(output: Output, workers: Workers = None) -> None:
 def designs(
     design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
     output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = 5,
+    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS[
+        "designs"
+    ],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",

@@ -45,27 +45,18 @@ def kerf(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Measure the kerf on a coupon, ready for the material's file."""
+    from cmpdesign.api import workshop
     from cmpdesign.cli.documents.reading import KerfDocument
-    from cmpdesign.errors import CmpDesignError
-    from cmpdesign.files.images import read_image
     from cmpdesign.products.laser.coupon.design import load_coupon
-    from cmpdesign.products.laser.coupon.photo import read_coupon
-    from cmpdesign.products.laser.coupon.picture import PhotoError
-    from cmpdesign.products.laser.coupon.stated_response import stated_response
 
-    known = parse_reading_response(response)
     cut_coupon = load_coupon(coupon)
-    image = read_image(photo, max_pixels, gray=True)
-    try:
-        reading = read_coupon(
-            cut_coupon,
-            image,
-            response=known,
-            stated=stated_response(photo),
-            face=None if face is None else face.value,
-        )
-    except PhotoError as error:
-        raise CmpDesignError(f"{photo}: {error}") from None
+    reading = workshop.kerf(
+        coupon,
+        photo,
+        face=None if face is None else face.value,
+        response=parse_reading_response(response),
+        max_pixels=max_pixels,
+    )
     _print_kerf_table(cut_coupon, reading)
     say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:

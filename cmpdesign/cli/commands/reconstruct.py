@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -25,23 +24,14 @@ from cmpdesign.cli.run_progress import (
     recover_and_report,
     require_positive,
     run_with_progress,
-    summary_path,
 )
-from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.inputs.sources import without_password
 
 if TYPE_CHECKING:
-    from cmpdesign.contact.continuation import SurfaceContinuation
-    from cmpdesign.contact.elastomer import Elastomer
-    from cmpdesign.tracking.recording.options import Recording
-    from cmpdesign.tracking.run import TrackingRun
-    from extractor.image.input import Channels
-    from extractor.image.response import Response
+    from cmpdesign.api.sequences import Followed
     from extractor.layout.reference import Reference
-    from extractor.pipeline import Side
-    from extractor.presets import Preset
 
 EXAMPLES = (
     "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
@@ -108,68 +98,32 @@ def reconstruct(
 
         recover_and_report(output, _points_in(load_layout(layout)))
         return
-    from cmpdesign.tracking.recording.options import Recording
-
-    recording = Recording(frame_id, with_images)
     require_positive("--fps", fps)
     for option, value in (("--flatness-mm", flatness_mm), ("--model-px", model_px)):
         if value is not None and not 0 <= value < float("inf"):
             raise CmpDesignError(f"{option} is {value:g}; expected a number from 0")
+    from cmpdesign.api.sequences import Reading, ReconstructJob, ShapeOptions, write_summary
+    from extractor import load_layout
+
     known = parse_reading_response(response)
-    options = _Options(
-        layout,
-        rig,
-        rest,
-        source,
-        output,
-        from_rest,
-        flatness_mm,
-        model_px,
-        surface,
-        fps,
-        cold,
-        preset,
-        known,
-        side,
-        channels,
-        max_pixels,
-        recording,
-    )
-    run = _prepare_run(options)
-    run.limit = frames
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
+    shape = ShapeOptions(from_rest, flatness_mm, model_px, surface)
+    job = ReconstructJob(load_layout(layout), rig, rest, source, output, reading, shape)
+    run = job.prepare()
+    print_step(f"{run.source.name} is open, the views are placed")
+    for warning in run.warnings:
+        print_warning(warning)
     try:
         run_with_progress(run, "reconstructing")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            print_written(_write_summary(run, source, output).written)
+            print_written(_print_followed(write_summary(run, job))[1:])
         raise
-    summary = _write_summary(run, source, output)
-    written = [output, *summary.written]
-    print_written(written)
+    followed = write_summary(run, job)
+    print_written(_print_followed(followed))
     code = exit_status(run)
-    finish(lambda: ReconstructDocument(**summary.document, written=tuple(map(printable_path, written))), code)
-
-
-class _Options(NamedTuple):
-    """Arguments and options of the command."""
-
-    layout: Path
-    rig: Path
-    rest: str
-    source: str
-    output: Path
-    from_rest: bool
-    flatness_mm: float
-    model_px: float | None
-    surface: bool
-    fps: float | None
-    cold: bool
-    preset: Preset
-    response: Response | None
-    side: Side
-    channels: Channels
-    max_pixels: int
-    recording: Recording
+    written = tuple(map(printable_path, followed.written))
+    finish(lambda: ReconstructDocument(**followed.summary, written=written), code)
 
 
 def _points_in(layout: Reference) -> int:
@@ -177,87 +131,11 @@ def _points_in(layout: Reference) -> int:
     return len(layout.layer) + len(layout.edges) * layout.virtual_per_edge
 
 
-def _prepare_run(options: _Options) -> TrackingRun:
-    """Prepare the run; all checks of the input are made here, before a file is written."""
-    from cmpdesign.tracking.marker_depth import read_elastomer, read_marker_depth_mm
-    from cmpdesign.tracking.run import TrackingRun
-    from cmpdesign.tracking.shape_summary import ShapeStatistics
-    from cmpdesign.tracking.shape_table import ShapeTable
-    from cmpdesign.tracking.sinks.tables import open_sink
-    from cmpdesign.tracking.sources import open_sources
-    from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_layout, load_rig
-
-    rig, depth_mm = load_rig(options.rig), read_marker_depth_mm(options.rig)
-    elastomer = read_elastomer(options.rig) if options.surface else None
-    if options.from_rest:
-        rig = rig.without_poses()
-    how = options.response, options.side, options.channels
-    views = ViewExtractor(load_layout(options.layout), rig, "accurate", *how)
-    at_rest = views.extract(_read_rest_image(options))
-    flatness_mm = (0.0, 0.0, options.flatness_mm)
-    reconstructor = Reconstructor(
-        views.layout, views.rig, at_rest, flatness_mm=flatness_mm, model_px=options.model_px
-    )
-    for warning in reconstructor.warnings:
-        print_warning(warning)
-    continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-    recording = replace(options.recording, views=rig.views)
-    sink = open_sink(options.output, ShapeTable(reconstructor, continuation), recording)
-    tracker = ShapeTracker(
-        reconstructor,
-        warm=not options.cold,
-        preset=options.preset,
-        response=options.response,
-        channels=options.channels,
-    )
-    source = open_sources(options.source, options.fps, options.max_pixels)
-    return TrackingRun(source, tracker, sink, ShapeStatistics(reconstructor, depth_mm, options.surface))
-
-
-def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuation:
-    import numpy as np
-
-    from cmpdesign.contact.continuation import SurfaceContinuation
-
-    edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
-    return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
-
-
-def _read_rest_image(options: _Options) -> Any:
-    """The image at rest; of several sources a list with one image for each view."""
-    from cmpdesign.tracking.run import read_rest_image
-    from cmpdesign.tracking.sources import split_list
-
-    sources, rests = split_list(options.source), split_list(options.rest)
-    if len(rests) == 1:
-        rests = rests * len(sources)
-    if len(rests) != len(sources):
-        raise CmpDesignError(f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both")
-    images = [
-        read_rest_image(rest, name, options.fps, options.max_pixels)
-        for rest, name in zip(rests, sources, strict=True)
-    ]
-    return images if len(images) > 1 else images[0]
-
-
-class _Summary(NamedTuple):
-    """The summary of a run, and the files that were written with it; empty without frames."""
-
-    document: dict[str, Any]
-    written: list[Path]
-
-
-def _write_summary(run: TrackingRun, source: str, output: Path) -> _Summary:
-    """Write the summary next to the table and print it."""
-    if not run.statistics.frames:
-        return _Summary({}, [])
-    from cmpdesign.files.atomic import write_file
-
-    summary = run.statistics.to_json(without_password(source), run.source.total, run.ended_early)
-    _print_summary(summary)
-    text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
-    write_file(summary_path(output), text)
-    return _Summary(summary, [summary_path(output)])
+def _print_followed(followed: Followed) -> tuple[Path, ...]:
+    """Print the summary; the written files."""
+    if followed.summary:
+        _print_summary(followed.summary)
+    return followed.written
 
 
 def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
@@ -271,7 +149,7 @@ def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
     return f"of the pattern, {depth_mm:g} mm below the touched surface; not of that surface"
 
 
-def _print_summary(summary: dict[str, Any]) -> None:
+def _print_summary(summary: Mapping[str, Any]) -> None:
     from rich.table import Table
 
     frames, sigma, largest = summary["frames"], summary["sigma_um"], summary["largest_displacement"]

@@ -125,23 +125,26 @@ def render(
         pixels = parse_pixels("--size", size, LARGEST_SIDE_PX) if "size" in given else None
         render_scene_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
         return
+    from cmpdesign.api.pictures import plain_scene
     from cmpdesign.files.images import require_image_kind
-    from cmpdesign.reading.read_layout import read_layout
-    from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
     pixels = parse_pixels("--size", size, LARGEST_SIDE_PX)
     require_image_kind(output, 8)
     require_suffix("--truth", truth, [".npz"])
-    pattern = read_layout(layout)
-    radius = min(pattern.size_mm) / 4 if press_radius is None else press_radius
     with _option_names_in_errors():
-        pattern_scene = Scene(
-            layout=pattern,
-            camera=Camera(pitch, rotation, tilt, tilt_axis, mirrored=mirrored),
-            surface=composed(Press(radius, press)) if press else None,
-            optics=Optics(blur),
-            sensor=Sensor(noise=noise, response=parse_response(response)),
-            seed=seed,
+        pattern_scene = plain_scene(
+            layout,
+            seed,
+            pitch_px=pitch,
+            rotation_deg=rotation,
+            tilt_deg=tilt,
+            tilt_axis_deg=tilt_axis,
+            mirrored=mirrored,
+            press_mm=press,
+            press_radius_mm=press_radius,
+            blur_px=blur,
+            noise=noise,
+            response=parse_response(response),
         )
     _write_rendered(pattern_scene, pixels, output, truth)
 

@@ -92,27 +92,10 @@ def _finish(
 
 
 def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
-    from cmpdesign.scene import render, save_truths
-    from cmpdesign.scene.files.frame_writer import open_frame_writer
+    from cmpdesign.scene.files.sequence import write_sequence
 
-    writer = open_frame_writer(output, file.fps or 1.0, file.size_px, file.bits)
-    truths: list[Truth] = []
-    warnings: dict[str, int] = {}
-    try:
-        with progress_bar("rendering", file.frames, unit="frames") as advance:
-            for scene in file.scenes():
-                rendered = render(scene, size=file.size_px)
-                writer.add(rendered.image)
-                truths.append(rendered.truth)
-                for warning in rendered.warnings:
-                    warnings.setdefault(warning, scene.frame)
-                advance("")
-        if truth is not None:
-            save_truths(truths, [file.time_s(frame) for frame in range(file.frames)], truth)
-        writer.close()
-    except BaseException:
-        writer.discard()
-        raise
+    with progress_bar("rendering", file.frames, unit="frames") as advance:
+        warnings = write_sequence(file, output, truth, lambda: advance(""))
     _print_scene_warnings(warnings, file)
     _finish(file, output, truth, f"{file.frames} frames of {_format_size(file)} at {file.fps:g} fps", None)
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,21 +26,13 @@ from cmpdesign.cli.run_progress import (
     recover_and_report,
     require_positive,
     run_with_progress,
-    summary_path,
 )
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.inputs.sources import without_password
 
 if TYPE_CHECKING:
-    from cmpdesign.tracking.recording.options import Recording
-    from cmpdesign.tracking.run import TrackingRun
-    from extractor.image.input import Channels
-    from extractor.image.response import Response
-    from extractor.layout.reference import Reference
-    from extractor.pipeline import Side
-    from extractor.presets import Preset
+    from cmpdesign.api.sequences import Followed
 
 EXAMPLES = (
     "cmpdesign track layout.json frames -o run.npz",
@@ -95,112 +86,41 @@ def track(
 
         recover_and_report(output, len(load_layout(layout).layer))
         return
-    from cmpdesign.tracking.recording.options import Recording
-
-    recording = Recording(frame_id, with_images)
     require_positive("--mm-per-px", mm_per_px)
     require_positive("--fps", fps)
     require_suffix("--quiver", quiver, [".png"])
+    from cmpdesign.api.sequences import Reading, TrackJob, write_summary
     from extractor import load_layout
 
-    reference = load_layout(layout)
-    reading = _Reading(not cold, preset, parse_reading_response(response), side, channels)
-    run = _prepare_run(
-        reference, _Options(source, output, rest, mm_per_px, fps, overlay, reading, max_pixels, recording)
-    )
-    run.limit = frames
+    known = parse_reading_response(response)
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
+    job = TrackJob(load_layout(layout), tuple(source), output, reading, rest, mm_per_px, overlay, quiver)
+    run = job.prepare()
+    print_step(f"{run.source.name} is open")
     try:
         run_with_progress(run, "tracking")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
-            print_written(_write_summary(run, reference, source, output, quiver).written)
+            print_written(_print_followed(write_summary(run, job), quiver)[1:])
         raise
-    summary = _write_summary(run, reference, source, output, quiver)
-    written = [output, *summary.written, *([overlay] if overlay is not None and summary.written else [])]
-    print_written(written)
+    followed = write_summary(run, job)
+    print_written(_print_followed(followed, quiver))
     code = exit_status(run)
-    finish(lambda: TrackDocument(**summary.document, written=tuple(map(printable_path, written))), code)
+    finish(
+        lambda: TrackDocument(**followed.summary, written=tuple(map(printable_path, followed.written))), code
+    )
 
 
-class _Reading(NamedTuple):
-    """Options of the ``Tracker``."""
-
-    warm: bool
-    preset: Preset
-    response: Response | None
-    side: Side
-    channels: Channels
-
-
-class _Options(NamedTuple):
-    """Arguments and options of the command."""
-
-    source: list[str]
-    output: Path
-    rest: str | None
-    mm_per_px: float | None
-    fps: float | None
-    overlay: Path | None
-    reading: _Reading
-    max_pixels: int
-    recording: Recording
+def _print_followed(followed: Followed, quiver: Path | None) -> tuple[Path, ...]:
+    """Print the summary; the written files."""
+    if followed.summary:
+        _print_summary(followed.summary)
+        if quiver is not None and quiver not in followed.written:
+            print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
+    return followed.written
 
 
-def _prepare_run(reference: Reference, options: _Options) -> TrackingRun:
-    """Prepare the run; all checks of the input are made here, before a file is written."""
-    from cmpdesign.tracking.overlay import OverlayWriter
-    from cmpdesign.tracking.run import TrackingRun, read_rest_markers
-    from cmpdesign.tracking.sinks.tables import open_sink
-    from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
-    from cmpdesign.tracking.summary import TrackStatistics
-    from cmpdesign.tracking.table import TrackTable
-    from extractor.track.tracker import Tracker
-
-    rest, source, fps, most_pixels = options.rest, options.source, options.fps, options.max_pixels
-    new_tracker = partial(Tracker, reference, **options.reading._asdict())
-    at_rest = None if rest is None else read_rest_markers(rest, source, fps, new_tracker(), most_pixels)
-    tracker = new_tracker(rest=at_rest, mm_per_px=options.mm_per_px)
-    frames = open_source(source, fps, most_pixels)
-    print_step(f"{frames.name}: {'unknown number of' if frames.total is None else frames.total} frames")
-    path = options.overlay
-    video = None if path is None else OverlayWriter(path, reference, frames.fps or DEFAULT_FPS)
-    sink = open_sink(options.output, TrackTable(tracker), options.recording)
-    return TrackingRun(frames, tracker, sink, TrackStatistics(reference), video)
-
-
-class _Summary(NamedTuple):
-    """The summary of a run, and the files that were written with it; empty without frames."""
-
-    document: dict[str, Any]
-    written: list[Path]
-
-
-def _write_summary(
-    run: TrackingRun, reference: Reference, source: list[str], output: Path, quiver: Path | None
-) -> _Summary:
-    """Write the summary next to the table and the quiver plot, and print the summary."""
-    if not run.statistics.frames:
-        return _Summary({}, [])
-    from cmpdesign.files.atomic import write_file
-    from cmpdesign.files.images import to_png
-    from cmpdesign.tracking.quiver import draw_quiver
-
-    names = ", ".join(map(without_password, source))
-    summary = run.statistics.to_json(names, run.source.total, run.ended_early, run.tracker.rest)
-    _print_summary(summary)
-    text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
-    contents: dict[Path, str | bytes] = {summary_path(output): text}
-    farthest, rest = run.statistics.farthest, run.tracker.rest
-    if quiver is not None and farthest is not None and rest is not None:
-        contents[quiver] = to_png(draw_quiver(reference, rest, farthest))
-    elif quiver is not None:
-        print_warning(f"{printable_path(quiver)} is not drawn: no frame has a displacement")
-    for path, content in contents.items():
-        write_file(path, content)
-    return _Summary(summary, list(contents))
-
-
-def _print_summary(summary: dict[str, Any]) -> None:
+def _print_summary(summary: Mapping[str, Any]) -> None:
     from rich.table import Table
 
     from cmpdesign.reading.quality import quality_text, reasons_text

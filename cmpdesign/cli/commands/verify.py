@@ -5,10 +5,9 @@ An image that shows the code of a print sheet is judged as a print: its layout, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -35,13 +34,13 @@ from cmpdesign.cli.terminal import (
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
+    from cmpdesign.api.pictures import Verifier
     from cmpdesign.cli.documents.reading import VerifyDocument
     from cmpdesign.files.images import Image
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
     from cmpdesign.tracking.source_images import SourceImage
-    from extractor import Extractor
     from extractor.layout.reference import Reference
 
 EXAMPLES = (
@@ -88,18 +87,18 @@ def verify(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
+    from cmpdesign.api.pictures import Verifier
     from cmpdesign.inputs.sources import name_sources
     from cmpdesign.tracking.source_images import count_images, source_images
-    from extractor import Extractor, load_layout
+    from extractor import load_layout
 
     require_suffix("--report", report, [".zip"])
     reference, known = load_layout(layout), parse_reading_response(response)
-    extractor = cache(lambda: Extractor(reference, preset, known, "either"))
+    judge = Verifier(reference, min_share, known, channels, sheet_dpi, max_pixels, preset)
     bundle = None
     if report is not None:
         bundle = _new_report(layout, _Settings(preset, response, channels, min_share))
-    folders = _Folders(output, debug)
-    verifier = _ImageVerifier(reference, extractor, min_share, sheet_dpi, folders, channels, bundle)
+    verifier = _ImageVerifier(judge, _Folders(output, debug), bundle)
     sources = name_sources(images)
     outcomes = []
     with progress_bar("verifying", count_images(sources, frames), unit="pictures") as advance:
@@ -160,14 +159,10 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class _ImageVerifier:
-    """Verifies images; the extractor is made when the first image needs it."""
+    """Verifies images, and writes their pictures and the report of a problem."""
 
-    reference: Reference
-    extractor: Callable[[], Extractor]
-    min_share: float
-    sheet_dpi: float | None
+    judge: Verifier
     folders: _Folders
-    channels: str
     bundle: ProblemReport | None
 
     def verify_image(self, source: SourceImage) -> Outcome:
@@ -178,8 +173,9 @@ class _ImageVerifier:
             problem = error_on_one_line(source.problem)
             self._report_unread(source, problem)
             return Outcome({"image": name, "verified": False, "error": problem}, "", EXIT_BAD_INPUT)
-        image = source.image if self.channels == "bgr" else source.image[:, :, ::-1].copy()
-        verdict = self._judge(image, source)
+        image = self.judge.read(source.image)
+        verdict = self.judge.judge(image, source.path)
+        self._keep(image, source, verdict)
         print_step(f"{name} judged")
         return Outcome(
             {"image": name, **verdict.to_json()},
@@ -195,23 +191,20 @@ class _ImageVerifier:
             with suppress(InputError):
                 self.bundle.add(*source.picture(), {"verified": False, "error": problem}, {})
 
-    def _judge(self, image: Image, source: SourceImage) -> Verdict | SheetVerdict:
-        from cmpdesign.products.sheet.verdict import judge_sheet
-        from cmpdesign.reading.verify import verify as verify_image
+    def _keep(self, image: Image, source: SourceImage, verdict: Verdict | SheetVerdict) -> None:
+        """Write the pictures of a pattern, and add the image to the report."""
+        from cmpdesign.reading.verify import Verdict
 
-        sheet = judge_sheet(image, source.path, self.reference.digest, self.sheet_dpi)
-        if sheet.is_sheet or self.sheet_dpi is not None:
+        stages: Mapping[str, Image] = {}
+        if isinstance(verdict, Verdict):
+            reference = self.judge.reference
+            _write_pictures(image, reference, verdict, source.stem, self.folders)
             if self.bundle is not None:
-                self.bundle.add(*source.picture(), sheet.to_json(), {})
-            return sheet
-        verdict = verify_image(self.extractor(), self.reference, image, self.min_share)
-        _write_pictures(image, self.reference, verdict, source.stem, self.folders)
-        if self.bundle is not None:
-            from extractor.draw import draw_stages
+                from extractor.draw import draw_stages
 
-            stages = draw_stages(image, self.reference, verdict.markers)
+                stages = draw_stages(image, reference, verdict.markers)
+        if self.bundle is not None:
             self.bundle.add(*source.picture(), verdict.to_json(), stages)
-        return verdict
 
 
 def _write_pictures(

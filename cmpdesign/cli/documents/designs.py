@@ -66,6 +66,24 @@ class CheckDocument(Document):
     findings: tuple[FindingPart, ...]
 
 
+class SizeDocument(Document):
+    """The design that ``size`` proposes, and the error that is predicted for it."""
+
+    format: Literal["cmp-size"] = "cmp-size"
+    version: Literal[1] = 1
+    camera_px: tuple[int, int] = Field(description="Width and height.")
+    view_mm: tuple[float, float] = Field(description="What the camera sees, width and height.")
+    scale_px_per_mm: float
+    design: dict[str, Any] = Field(description="The fields of a design file.")
+    markers: int
+    pitch_px: float
+    error_px: float = Field(description="Predicted per marker and axis, of inner markers.")
+    error_um: float
+    rim_error_um: float
+    told_apart_mm: float = Field(description="Distance of two touches that can be told apart.")
+    limit: str = Field(description="What keeps the pattern from being finer.")
+
+
 class TemplatePart(Part):
     """One template that is shipped."""
 

@@ -18,6 +18,7 @@ EXPERIMENTS = ("precision", "response", "reliability", "angles", "designs")
 DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "templates": (designs.TemplatesDocument, designs.TemplateDocument),
     "init": (designs.InitDocument,),
+    "size": (designs.SizeDocument,),
     "build": (designs.BuildDocument,),
     "check": (designs.CheckDocument,),
     "render": (runs.RenderDocument,),

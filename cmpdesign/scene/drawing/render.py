@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.files.atomic import write_file
+from cmpdesign.files.images import encode_image
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.plain import pitch_mm
 from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
@@ -21,7 +24,7 @@ from cmpdesign.scene.parts.light import light_gain
 from cmpdesign.scene.parts.optics import make_point_spread
 from cmpdesign.scene.parts.sensor import Sensor, expose_sensor
 from cmpdesign.scene.scene import Scene
-from cmpdesign.scene.truth import Truth
+from cmpdesign.scene.truth import Truth, save_truth
 from extractor.image.response import decode_values
 
 Points = NDArray[np.float64]
@@ -38,6 +41,18 @@ class Rendered:
     image: NDArray[np.uint8] | NDArray[np.uint16]
     truth: Truth
     warnings: tuple[str, ...] = ()
+
+    def save(self, path: str | Path, truth: str | Path | None = None) -> None:
+        """Write the image in the format of the file's ending, and the truth as .npz where a file is given.
+
+        Raises:
+            CmpDesignError: an ending of no image format, or of one with fewer bits; nothing is written.
+            OutputError: a file cannot be written.
+        """
+        content = encode_image(self.image, Path(path))
+        if truth is not None:
+            save_truth(self.truth, truth)
+        write_file(path, content)
 
 
 def render(scene: Scene, *, size: tuple[int, int] = (640, 480), engine: Engine = "compiled") -> Rendered:

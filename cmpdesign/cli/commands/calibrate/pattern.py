@@ -12,7 +12,6 @@ from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
-from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
@@ -47,23 +46,15 @@ def pattern(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Measure where the markers of one pad were made; read the pad's pictures with the written layout."""
+    from cmpdesign.api.workshop import calibrate_pattern
     from cmpdesign.cli.documents.reading import CalibratePatternDocument
-    from cmpdesign.files.images import read_image
-    from cmpdesign.files.layout_json import write_layout
-    from cmpdesign.inputs.sources import picture_paths
-    from cmpdesign.reading.read_layout import layout_from_reference
-    from extractor import learn_layout, load_layout
 
     require_suffix("--output", output, [".json"])
-    if output.resolve() == layout.resolve():
-        raise CmpDesignError(f"--output {output}: is the nominal layout itself; give another name")
-    reference, known = load_layout(layout), parse_reading_response(response)
-    paths = picture_paths(images)
-    pictures = [read_image(path, max_pixels) for path in paths]
-    names = [printable_path(path) for path in paths]
-    with working(f"reading {len(paths)} pictures"):
-        learnt = learn_layout(reference, pictures, names=names, preset=preset, response=known)
-    write_layout(layout_from_reference(learnt.layout), output)
+    known = parse_reading_response(response)
+    with working("reading pictures"):
+        learnt = calibrate_pattern(
+            layout, images, output, preset=preset, response=known, max_pixels=max_pixels
+        )
     _print_figures(learnt)
     say(f"wrote {printable_path(output)}")
     finish(lambda: CalibratePatternDocument(written=printable_path(output), **_figures(learnt)))

@@ -1,0 +1,300 @@
+"""Pictures drawn of a pattern, and pictures judged: ``render`` and ``verify`` of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+
+from cmpdesign.api.layouts import layout_from, reference_from
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.files import MOST_PIXELS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.products.sheet.verdict import SheetVerdict
+    from cmpdesign.reading.verify import Verdict
+    from cmpdesign.scene import Rendered, Scene
+    from cmpdesign.scene.files.scene_file import SceneFile
+    from extractor import Extractor, LayoutLike, Reference
+    from extractor.presets import Preset
+
+SIZE_PX = (640, 480)
+
+
+class View(TypedDict, total=False):
+    """What a plain picture shows; the names are those of scene files.
+
+    Keys:
+        pitch_px: pixels from marker to marker; 20.
+        rotation_deg: counter-clockwise turn in the image; 0.
+        tilt_deg, tilt_axis_deg: tilt out of the image plane, and the direction of its axis; 0.
+        mirrored: the camera sees the back; None: as designed.
+        press_mm: how far a press at the centre moves the markers; 0.
+        press_radius_mm: radius of the press; None: a quarter of the pattern.
+        blur_px: Gaussian blur, sigma; 1.
+        noise: standard deviation in 255ths; 0.
+        response: how light becomes values: "srgb", "linear", or the exponent of light = value ** exponent; "srgb".
+    """
+
+    pitch_px: float
+    rotation_deg: float
+    tilt_deg: float
+    tilt_axis_deg: float
+    mirrored: bool | None
+    press_mm: float
+    press_radius_mm: float | None
+    blur_px: float
+    noise: float
+    response: Literal["srgb", "linear"] | float
+
+
+_USUAL = View(
+    pitch_px=20.0,
+    rotation_deg=0.0,
+    tilt_deg=0.0,
+    tilt_axis_deg=0.0,
+    mirrored=None,
+    press_mm=0.0,
+    press_radius_mm=None,
+    blur_px=1.0,
+    noise=0.0,
+    response="srgb",
+)
+
+
+def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[View]) -> Scene:
+    """A scene of a pattern under one camera, without a scene file.
+
+    Args:
+        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
+        seed: seed of the noise.
+        view: see ``View``.
+
+    Raises:
+        SceneError: a value out of range; the message names it.
+        TypeError: a name that ``View`` does not have.
+    """
+    from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
+
+    unknown = sorted(view.keys() - _USUAL.keys())
+    if unknown:
+        raise TypeError(f"{unknown[0]} is no name of a view; there are {', '.join(_USUAL)}")
+    pattern, chosen = layout_from(layout), View(**{**_USUAL, **view})  # type: ignore[typeddict-item]
+    radius_mm = chosen["press_radius_mm"]
+    if radius_mm is None:
+        radius_mm = min(pattern.size_mm) / 4
+    camera = Camera(
+        chosen["pitch_px"],
+        chosen["rotation_deg"],
+        chosen["tilt_deg"],
+        chosen["tilt_axis_deg"],
+        mirrored=chosen["mirrored"],
+    )
+    return Scene(
+        layout=pattern,
+        camera=camera,
+        surface=composed(Press(radius_mm, chosen["press_mm"])) if chosen["press_mm"] else None,
+        optics=Optics(chosen["blur_px"]),
+        sensor=Sensor(noise=chosen["noise"], response=chosen["response"]),
+        seed=seed,
+    )
+
+
+def load_scene(
+    name_or_path: str | Path,
+    layout: LayoutLike | AnyLayout,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+) -> SceneFile:
+    """Load a scene: a scene template's name or a TOML file.
+
+    Args:
+        name_or_path: name ("pressed-ball") or path.
+        layout: see ``plain_scene``.
+        size, seed: (width, height) in px and seed, in place of the file's.
+
+    Raises:
+        CmpDesignError: no such scene, or a value that cannot be rendered.
+    """
+    from cmpdesign.design.templates import find_scene
+    from cmpdesign.scene.files import scene_file
+
+    return scene_file.load_scene(find_scene(name_or_path), layout_from(layout), size_px=size, seed=seed)
+
+
+def render(
+    layout: LayoutLike | AnyLayout,
+    scene: str | Path | None = None,
+    *,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+    **view: Unpack[View],
+) -> Rendered:
+    """Draw a pattern as a camera sees it, with the exact truth, as the command ``render`` does.
+
+    >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
+    >>> rendered.image, rendered.truth.marker_xy_px       # (H, W, 3) uint8 BGR; (M, 2) px
+    >>> cmpdesign.render(layout, "pressed-ball").save("pressed.png", truth="pressed.npz")
+
+    Args:
+        layout: see ``plain_scene``.
+        scene: a scene template's name or a TOML file; None: the plain picture that ``view`` describes.
+        size: (width, height) in px; None: the scene's, or 640 x 480.
+        seed: seed of all random parts; None: the scene's, or 0.
+        view: see ``View``; only without ``scene``, whose file has these values.
+
+    Raises:
+        CmpDesignError: no such scene, or a value that cannot be rendered; a scene that is a sequence, which
+            ``render_sequence`` draws; ``view`` beside ``scene``.
+    """
+    from cmpdesign.scene import render as draw
+
+    if scene is None:
+        return draw(plain_scene(layout, seed or 0, **view), size=size or SIZE_PX)
+    if view:
+        raise CmpDesignError(
+            f"{next(iter(view))} has no place beside a scene; write it into the scene's file, or give no scene"
+        )
+    file = load_scene(scene, layout, size, seed)
+    if file.fps is not None:
+        raise CmpDesignError(f"{scene} is a sequence of {file.frames} frames; draw it with render_sequence")
+    return draw(file.scene(), size=file.size_px)
+
+
+def render_sequence(
+    layout: LayoutLike | AnyLayout,
+    scene: str | Path,
+    output: str | Path,
+    truth: str | Path | None = None,
+    *,
+    size: tuple[int, int] | None = None,
+    seed: int | None = None,
+    watch: Callable[[], None] = lambda: None,
+) -> dict[str, int]:
+    """Draw a scene that is a sequence into a video or a folder of images.
+
+    Args:
+        layout: see ``plain_scene``.
+        scene: a scene template's name or a TOML file with [sequence].
+        output: video (.mp4, .avi, .mkv) or folder to write.
+        truth: .npz file for the truth of all frames; None: none.
+        size, seed: see ``render``.
+        watch: called after every frame.
+
+    Returns:
+        Warnings of doubtful parts, each with the number of its first frame.
+
+    Raises:
+        CmpDesignError: see ``render``; or a scene that is no sequence.
+        OutputError: a file cannot be written.
+    """
+    from cmpdesign.scene.files.sequence import write_sequence
+
+    file = load_scene(scene, layout, size, seed)
+    if file.fps is None:
+        raise CmpDesignError(f"{scene} is one picture, no sequence; draw it with render")
+    return write_sequence(file, Path(output), None if truth is None else Path(truth), watch)
+
+
+@dataclass(frozen=True, eq=False)
+class Verifier:
+    """Judges pictures of one pattern; the reader is made once.
+
+    Attributes:
+        reference: the layout.
+        min_share: share of the visible markers that must be measured, 0 to 1.
+        response: how light became values, see ``extractor.Extractor``.
+        channels: "bgr" or "rgb", the order of a picture's colors.
+        sheet_dpi: the pictures are print sheets of this resolution, whatever files say; 0: unknown; None: pictures
+            that show the code of a print sheet are judged as such.
+        max_pixels: largest picture that is read from a file, width x height.
+        preset: see ``extractor.Extractor``.
+    """
+
+    reference: Reference
+    min_share: float = 0.9
+    response: Literal["srgb", "linear"] | float | None = None
+    channels: Literal["bgr", "rgb"] = "bgr"
+    sheet_dpi: float | None = None
+    max_pixels: int = MOST_PIXELS
+    preset: Preset = "balanced"
+
+    @cached_property
+    def extractor(self) -> Extractor:
+        """The reader; it is made when the first picture needs it."""
+        from extractor import Extractor
+
+        return Extractor(self.reference, self.preset, self.response, "either")
+
+    def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
+        """The picture as (H, W, 3) BGR.
+
+        Raises:
+            ImageFileError: a file or an array that is no color picture.
+        """
+        from cmpdesign.files.images import read_image, require_color_picture
+
+        if isinstance(image, str | Path):
+            pixels: NDArray[Any] = read_image(image, self.max_pixels)
+        else:
+            pixels = require_color_picture(image)
+        return pixels[:, :, ::-1].copy() if self.channels == "rgb" else pixels
+
+    def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
+        """The verdict on a picture that ``read`` returns; ``path``: its file, which may state the resolution."""
+        from cmpdesign.products.sheet.verdict import judge_sheet
+        from cmpdesign.reading.verify import verify as judge_pattern
+
+        sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
+        if sheet.is_sheet or self.sheet_dpi is not None:
+            return sheet
+        return judge_pattern(self.extractor, self.reference, image, self.min_share)
+
+    def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
+        """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
+
+        Raises:
+            ImageFileError: a file or an array that is no color picture.
+        """
+        return self.judge(self.read(image), Path(image) if isinstance(image, str | Path) else None)
+
+
+class VerifyOptions(TypedDict, total=False):
+    """Options of ``verify``: the attributes of ``Verifier``."""
+
+    min_share: float
+    response: Literal["srgb", "linear"] | float | None
+    channels: Literal["bgr", "rgb"]
+    sheet_dpi: float | None
+    max_pixels: int
+    preset: Preset
+
+
+def verify(
+    layout: LayoutLike | AnyLayout, image: str | Path | NDArray[Any], **options: Unpack[VerifyOptions]
+) -> Verdict | SheetVerdict:
+    """Extract a picture and judge it, as the command ``verify`` does: numbering, colors, share, side.
+
+    >>> verdict = cmpdesign.verify("out/layout.json", "out/sample.png")
+    >>> verdict.verified, verdict.reason, verdict.markers.xy_px[217]
+
+    For many pictures, ``Verifier(layout.reference()).verify(image)`` makes the reader once.
+
+    Args:
+        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
+        image: a file, or (H, W, 3) uint8 or uint16.
+        options: see ``Verifier``.
+
+    Returns:
+        The verdict; of a picture of a print sheet a ``SheetVerdict`` with the scales and the skew of the print.
+
+    Raises:
+        ImageFileError: a file or an array that is no color picture.
+        CmpDesignError: ``min_share`` is not from 0 to 1.
+    """
+    return Verifier(reference_from(layout), **options).verify(image)

@@ -1,0 +1,250 @@
+"""What is measured of one machine, one pad, one sensor: ``kerf``, ``calibrate``, ``evaluate`` of the command line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from cmpdesign.api.layouts import reference_from
+from cmpdesign.design.design import Design as Parameters
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.files import MOST_PIXELS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.products.laser.coupon.photo import CouponReading
+    from extractor import LayoutLike, LearntLayout
+    from extractor.presets import Preset
+
+Response = Literal["srgb", "linear"] | float
+
+
+def kerf(
+    coupon: str | Path,
+    photo: str | Path,
+    *,
+    face: Literal["front", "back"] | None = None,
+    response: Response | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> CouponReading:
+    """Measure the kerf in a photo or scan of a cut coupon, as the command ``kerf`` does.
+
+    >>> reading = cmpdesign.kerf("made/laser/coupon.json", "scan.png")
+    >>> [(one.patch.name, one.x.value_mm, one.y.value_mm) for one in reading.patches]
+
+    Args:
+        coupon: the coupon.json that a build wrote.
+        photo: photo or scan of the cut piece.
+        face: face of the sheet whose openings are seen; None: the narrower one by the taper.
+        response: how light became values; None: as the file states, else sRGB, corrected by the edges.
+        max_pixels: largest image that is read, width x height.
+
+    Raises:
+        CmpDesignError: a file that cannot be read, or a picture that does not show the coupon.
+    """
+    from cmpdesign.files.images import read_image
+    from cmpdesign.products.laser.coupon.design import load_coupon
+    from cmpdesign.products.laser.coupon.photo import read_coupon
+    from cmpdesign.products.laser.coupon.picture import PhotoError
+    from cmpdesign.products.laser.coupon.stated_response import stated_response
+
+    cut_coupon = load_coupon(Path(coupon))
+    image = read_image(photo, max_pixels, gray=True)
+    try:
+        return read_coupon(
+            cut_coupon, image, response=response, stated=stated_response(Path(photo)), face=face
+        )
+    except PhotoError as error:
+        raise CmpDesignError(f"{photo}: {error}") from None
+
+
+def calibrate_pattern(
+    layout: LayoutLike | AnyLayout,
+    images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
+    output: str | Path | None = None,
+    *,
+    preset: Preset = "accurate",
+    response: Response | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> LearntLayout:
+    """Measure where the markers of one pad were made, as the command ``calibrate pattern`` does.
+
+    >>> made = cmpdesign.calibrate_pattern("layout.json", "at_rest/", "made.json")
+    >>> extractor.Extractor("made.json")                  # reads this pad with its own places
+
+    Args:
+        layout: the nominal layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
+        images: 10 or more color pictures of one pad at rest: files, folders of files, patterns such as "rest/*.png",
+            or arrays (H, W, 3) BGR.
+        output: layout file to write, with the places as made; None: none.
+        preset, response: see ``extractor.Extractor``.
+        max_pixels: largest image that is read, width x height.
+
+    Raises:
+        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures from which no places follow.
+        OutputError: the layout file cannot be written.
+    """
+    from cmpdesign.files.layout_json import write_layout
+    from cmpdesign.reading.read_layout import layout_from_reference
+    from extractor import learn_layout
+
+    if output is not None and Path(output).suffix.lower() != ".json":
+        raise CmpDesignError(f"{output}: unknown ending of a layout file; expected .json")
+    if (
+        output is not None
+        and isinstance(layout, str | Path)
+        and Path(output).resolve() == Path(layout).resolve()
+    ):
+        raise CmpDesignError(f"{output}: is the nominal layout itself; give another name")
+    names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
+    learnt = learn_layout(reference_from(layout), pictures, names=names, preset=preset, response=response)
+    if output is not None:
+        write_layout(layout_from_reference(learnt.layout), Path(output))
+    return learnt
+
+
+def _read_pictures(
+    images: Sequence[str | Path] | Sequence[NDArray[Any]], max_pixels: int
+) -> tuple[list[str], list[NDArray[Any]]]:
+    """The names and the pixels of pictures; a folder or a pattern stands for its pictures."""
+    from cmpdesign.files.images import read_image
+    from cmpdesign.inputs.sources import picture_paths
+
+    names: list[str] = []
+    pictures: list[NDArray[Any]] = []
+    for image in images:
+        if not isinstance(image, str | Path):
+            names.append(f"picture {len(names) + 1}")
+            pictures.append(image)
+            continue
+        for path in picture_paths([str(image)]):
+            names.append(str(path))
+            pictures.append(read_image(path, max_pixels))
+    return names, pictures
+
+
+def run_experiment(
+    experiment: Literal["precision", "response", "reliability", "angles", "designs"],
+    output: str | Path,
+    designs: Mapping[str, Parameters] | None = None,
+    *,
+    trials: int | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    sensor: str | Path = "tac3d",
+    preset: str = "balanced",
+) -> dict[str, Any]:
+    """Run an experiment on a simulated sensor, as the commands ``evaluate NAME`` do.
+
+    >>> cmpdesign.run_experiment("designs", "compared", {"ten": load("tac3d"), "eight": load("tac3d", layers=8)})
+
+    Args:
+        experiment: the command's name.
+        output: folder for report.html, report.json and the journal; an interrupted run goes on where it stopped.
+        designs: name -> design; for "designs" only.
+        trials: places for every contact, object or mode; None: as the command has it.
+        seed: of everything random.
+        workers: processes; None: one for each core.
+        sensor: name of a shipped sensor, or a TOML file.
+        preset: the reader's preset: "fast", "balanced" or "accurate".
+
+    Returns:
+        The JSON object of report.json.
+
+    Raises:
+        CmpDesignError: a value out of range, or the folder holds a run under other conditions.
+        OutputError: a file cannot be written; finished trials are kept.
+    """
+    from cmpdesign.evaluate import experiments
+    from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
+    from cmpdesign.evaluate.designs import design_entries
+    from cmpdesign.evaluate.runner import RunOptions
+    from cmpdesign.evaluate.simulated.sensor import load_sensor
+
+    if preset not in PRESETS:
+        raise CmpDesignError(f"preset {preset}: unknown; there are {', '.join(PRESETS)}")
+    compared = design_entries(designs or {}) if experiment == "designs" else ()
+    found = experiments.find_experiment(experiment, compared)
+    count = USUAL_TRIALS[experiment] if trials is None else trials
+    options = RunOptions(count, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
+    document, _ = experiments.run_experiment(found, options, Path(output))
+    return document
+
+
+def export_lerobot(
+    runs: Sequence[str | Path],
+    output: str | Path,
+    *,
+    task: str = "contact",
+    fps: float | None = None,
+    robot: str | None = None,
+    images: Sequence[str | Path] = (),
+    max_pixels: int = MOST_PIXELS,
+) -> int:
+    """Write runs as a LeRobotDataset v3.0, as the command ``export lerobot`` does.
+
+    Args:
+        runs: .npz files of ``track`` or ``reconstruct``; each is an episode.
+        output: data set to write; a new folder.
+        task: what the runs show, in words.
+        fps: frames per second; None: as the runs' times say.
+        robot: type of the robot; None: none.
+        images: video or folder of images of each run, in order; empty: no images.
+        max_pixels: largest image that is read, width x height.
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        CmpDesignError: a library is missing, or the runs or their images cannot be used together.
+        OutputError: the data set cannot be written, or the folder exists.
+    """
+    from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
+    from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
+
+    paths = _paths(runs)
+    require_one_kind(paths)
+    rate = frames_per_second(paths) if fps is None else tidy_fps(fps)
+    about = DataSet(rate, task, robot, tuple(map(str, images)), max_pixels)
+    return write_lerobot(paths, Path(output), about)
+
+
+def export_zarr(
+    runs: Sequence[str | Path],
+    output: str | Path,
+    *,
+    images: Sequence[str | Path] = (),
+    max_pixels: int = MOST_PIXELS,
+) -> int:
+    """Write runs as a replay buffer in the form of Diffusion Policy, as the command ``export zarr`` does.
+
+    Args:
+        runs, images, max_pixels: see ``export_lerobot``.
+        output: buffer to write; a new .zarr folder.
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        CmpDesignError, OutputError: see ``export_lerobot``.
+    """
+    from cmpdesign.tracking.export.zarr_buffer import write_zarr
+
+    if Path(output).suffix != ".zarr":
+        raise CmpDesignError(f"{output}: unknown ending of a replay buffer; expected .zarr")
+    return write_zarr(_paths(runs), Path(output), tuple(map(str, images)), max_pixels)
+
+
+def _paths(runs: Sequence[str | Path]) -> list[Path]:
+    """The files; one name alone would be taken apart into letters.
+
+    Raises:
+        CmpDesignError: one name instead of a list.
+    """
+    if isinstance(runs, str | Path):
+        raise CmpDesignError(f"runs is {str(runs)!r}; give a list of files, as [{str(runs)!r}]")
+    return [Path(run) for run in runs]

@@ -1,0 +1,56 @@
+"""``cmpdesign size``: a design for a camera and its field of view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.terminal import finish, printable_path, say, say_text
+
+EXAMPLES = (
+    "cmpdesign size --camera 1280x960 --view 24x18mm",
+    "cmpdesign size --camera 640x480 --view 20x15mm --error 1um -o sized.toml",
+)
+
+
+def size(
+    camera: Annotated[str, typer.Option(metavar="WxH", help="Pixels of the camera, as in 1280x960.")],
+    view: Annotated[
+        str, typer.Option(metavar="WxH", help="What it sees of the pattern's plane, as in 24x18mm.")
+    ],
+    error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="Largest error per marker and axis, as in 0.2um. [default: none]"
+        ),
+    ] = None,
+    blur: Annotated[float, typer.Option(help="Blur of optics and pixel, sigma in pixels.")] = 1.0,
+    noise: Annotated[float, typer.Option(help="Noise, standard deviation in 255ths.")] = 2.0,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="TOML file to write, which build takes."),
+    ] = None,
+) -> None:
+    """Which pitch and how many layers for a camera and its field of view, with the error that markers then have."""
+    from cmpdesign.cli.documents.designs import SizeDocument
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.proposal import camera_design
+
+    require_suffix("--output", output, [".toml"])
+    proposal = camera_design.size(camera, view, error, blur_px=blur, noise=noise)
+    if output is not None:
+        write_file(output, proposal.to_toml())
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in proposal.figures().items():
+        table.add_row(name, value)
+    say(table)
+    if output is not None:
+        say(f"wrote {printable_path(output)}")
+    else:
+        say_text("\n" + proposal.to_toml())
+    finish(lambda: SizeDocument.model_validate(proposal.to_json()))

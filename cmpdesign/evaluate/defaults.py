@@ -1,0 +1,12 @@
+"""What the experiments take where nothing is given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+# Trials of each kind by the experiment's name.
+USUAL_TRIALS: Mapping[str, int] = MappingProxyType(
+    {"precision": 10, "response": 10, "reliability": 300, "angles": 1, "designs": 5}
+)
+PRESETS = ("fast", "balanced", "accurate")
