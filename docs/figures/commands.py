@@ -79,7 +79,10 @@ def _section(words: tuple[str, ...], command: Any) -> str:
     for model in DOCUMENTS.get(name, ()):
         schema = model.model_json_schema()
         kind, version = (schema["properties"][field]["const"] for field in ("format", "version"))
-        lines += [f"JSON: `{kind}`, version {version}. {' '.join(_escaped(schema['description']).split())}", ""]
+        lines += [
+            f"JSON: `{kind}`, version {version}. {' '.join(_escaped(schema['description']).split())}",
+            "",
+        ]
         lines += [_fields(schema), ""]
     return "\n".join(lines)
 
@@ -97,7 +100,9 @@ def _option_row(parameter: Any) -> tuple[str, str]:
 
 
 def _table(heading: str, rows: list[tuple[str, str]]) -> str:
-    return "\n".join([f"| {heading} | meaning |", "|---|---|", *(f"| {name} | {words} |" for name, words in rows)])
+    return "\n".join(
+        [f"| {heading} | meaning |", "|---|---|", *(f"| {name} | {words} |" for name, words in rows)]
+    )
 
 
 def _fields(schema: dict[str, Any]) -> str:
@@ -120,7 +125,12 @@ def _field_rows(schema: dict[str, Any], parts: dict[str, Any], above: str) -> It
 
 def _part_of(field: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any] | None:
     """The part that a field, its items or its values are."""
-    for each in (field, *field.get("anyOf", ()), field.get("items", {}), field.get("additionalProperties", {})):
+    for each in (
+        field,
+        *field.get("anyOf", ()),
+        field.get("items", {}),
+        field.get("additionalProperties", {}),
+    ):
         if isinstance(each, dict) and "$ref" in each:
             found: dict[str, Any] = parts[each["$ref"].rpartition("/")[2]]
             return found

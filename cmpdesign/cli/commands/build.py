@@ -43,8 +43,9 @@ def build(
     camera: CameraOption = CAMERA_TEXT,
     preset: PresetOption = "balanced",
 ) -> None:
-    """Write a design's files: SVG, layout file, preview and report, or what --only names.
+    """Write a design's files.
 
+    These are the SVG, the layout file, a preview and a report, or what --only names.
     Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
     prints are read as the camera sees them before files are written. Exit code 1 when something will not work.

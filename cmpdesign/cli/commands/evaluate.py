@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Repeat the article's experiments on a simulated sensor, and compare designs. Writes report.html and "
+    help="Repeat the article's experiments. On a simulated sensor; also compares designs. Writes report.html and "
     "report.json; an interrupted run goes on where it stopped.",
 )
 

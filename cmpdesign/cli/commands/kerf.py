@@ -44,7 +44,7 @@ def kerf(
     ] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure the kerf on a coupon, ready for the material's file."""
+    """Measure the kerf on a cut coupon. The lines are ready for the material's file."""
     from cmpdesign.api import workshop
     from cmpdesign.cli.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon

@@ -90,7 +90,10 @@ def reconstruct(
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
-    """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
+    """Reconstruct a surface from several views.
+
+    Positions, displacements and normals in mm. Exit code: 0 done, 1 ended early or nothing found, 2 bad input.
+    """
     from cmpdesign.cli.documents.runs import ReconstructDocument
 
     if recover:

@@ -117,7 +117,7 @@ def render(
     ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
-    """Render the pattern as a camera sees it: seeded, exact to a thousandth of a pixel."""
+    """Render a pattern as a camera sees it. Seeded, exact to a thousandth of a pixel."""
     if scene is not None:
         from cmpdesign.cli.commands.render_scene import render_scene_file
 

@@ -15,7 +15,7 @@ import jsonschema
 import pytest
 
 from tests.support.command import commands, run
-from tests.support.command_files import prepare_files
+from tests.support.made.example_files import prepare_files
 
 GROUPS = {"evaluate", "calibrate", "export"}
 SLOW = {"evaluate"}

@@ -30,7 +30,10 @@ def init(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file of this name.")] = False,
 ) -> None:
-    """Write a commented design file: every field with its meaning, unit, range and default. build takes it."""
+    """Write a commented design file.
+
+    Every field stands in it with its meaning, unit, range and default; build takes the file.
+    """
     from cmpdesign.cli.documents.designs import InitDocument
     from cmpdesign.design.commented_toml import commented_toml
     from cmpdesign.design.extends import require_extended

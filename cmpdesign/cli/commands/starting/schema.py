@@ -20,7 +20,10 @@ def schema(
         ),
     ] = None,
 ) -> None:
-    """Print the JSON Schema of a design's TOML file, for editors, or of what COMMAND prints with --json."""
+    """Print a JSON Schema.
+
+    That of a design's TOML file, for editors, or that of what COMMAND prints with --json.
+    """
     if not command:
         from cmpdesign.design.design import design_schema_text
 

@@ -45,7 +45,10 @@ def templates(
         ),
     ] = None,
 ) -> None:
-    """List the designs, scenes, machines, materials, silicones and sensors that are shipped, or show one of them."""
+    """List or show what is shipped.
+
+    Templates are designs, scenes, machines, materials, silicones and sensors.
+    """
     if show is None:
         _list_templates(kind)
     else:
