@@ -32,18 +32,19 @@ Every command has these options:
 | 2 | bad input, or a file that cannot be written: one line on standard error, and nothing half-written |
 | 130 | stopped by Ctrl-C; every file that was written is complete |
 
-Results go to standard output; errors, warnings, steps and progress go to standard error. Progress is shown on a terminal only.
+Results go to standard output; errors, warnings, steps and progress go to standard error. Progress is shown on a
+terminal only.
 
 ## JSON
 
-With `--json`, standard output is one document, or empty after an error that ends the command. Every document has a `format` and a `version`: the
-version is raised when a field goes or changes its meaning or type; fields may be added without that. Read what you need and
-ignore the rest. Standard error has one JSON object a line:
+With `--json`, standard output is one document, or empty after an error that ends the command. Every document has a
+`format` and a `version`: the version is raised when a field goes or changes its meaning or type; fields may be added
+without that. Read what you need and ignore the rest. Standard error has one JSON object a line:
 
 {message}
 
-`cmpdesign schema COMMAND` prints the JSON Schema of a command's document, `cmpdesign schema message` that of these lines,
-and `cmpdesign schema` alone that of a design's TOML file.
+`cmpdesign schema COMMAND` prints the JSON Schema of a command's document, `cmpdesign schema message` that of these
+lines, and `cmpdesign schema` alone that of a design's TOML file.
 
 """
 

@@ -78,7 +78,10 @@ def track(
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
-    """Follow a pattern through a sequence. Exit code: 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
+    """Follow a pattern through a sequence.
+
+    Exit code: 0 done, 1 ended early or nothing tracked, 2 bad input or full disk.
+    """
     from cmpdesign.cli.documents.runs import TrackDocument
 
     if recover:
