@@ -29,7 +29,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cmpdesign.api.designs import Design as Design
     from cmpdesign.api.designs import load as load
-    from cmpdesign.api.designs import load as load_design
+    from cmpdesign.api.designs import load_design as load_design
+    from cmpdesign.api.designs import schema as schema
     from cmpdesign.api.designs import templates as templates
     from cmpdesign.api.layouts import Layout as Layout
     from cmpdesign.api.layouts import build_layout as build_layout
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.workshop import export_zarr as export_zarr
     from cmpdesign.api.workshop import kerf as kerf
     from cmpdesign.api.workshop import run_experiment as run_experiment
-    from cmpdesign.design.design import design_schema as schema
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import InputError as InputError
@@ -66,7 +66,6 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Public name -> its module, and its name there where that differs.
 _HOMES = {
     "CmpDesignError": "cmpdesign.errors",
     "Design": "cmpdesign.api.designs",
@@ -84,7 +83,7 @@ _HOMES = {
     "kerf": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
-    "load_design": "cmpdesign.api.designs:load",
+    "load_design": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",
     "load_scene": "cmpdesign.api.pictures",
     "open_source": "cmpdesign.api.sequences",
@@ -97,7 +96,7 @@ _HOMES = {
     "render": "cmpdesign.api.pictures",
     "render_sequence": "cmpdesign.api.pictures",
     "run_experiment": "cmpdesign.api.workshop",
-    "schema": "cmpdesign.design.design:design_schema",
+    "schema": "cmpdesign.api.designs",
     "size": "cmpdesign.proposal.camera_design",
     "templates": "cmpdesign.api.designs",
     "track": "cmpdesign.api.sequences",
@@ -112,8 +111,7 @@ __all__ = sorted([*_HOMES, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'cmpdesign' has no attribute {name!r}")
-    module, _, other = _HOMES[name].partition(":")
-    return getattr(import_module(module), other or name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""Designs as programs use them: loaded, checked, written. ``templates``, ``check`` and ``build`` of the command line."""
+"""Designs loaded, checked and written: ``templates``, ``check``, ``build`` and ``schema`` of the command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
-from cmpdesign.design.design import load_design
+from cmpdesign.design.design import design_schema
+from cmpdesign.design.design import load_design as load_parameters
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
@@ -40,6 +41,9 @@ class Design(Parameters):
     Raises:
         DesignError: an unknown, missing, impossible or contradictory parameter.
     """
+
+    def __init__(self, /, **parameters: Any) -> None:
+        super().__init__(**parameters)
 
     @classmethod
     def of(cls, parameters: Parameters) -> Design:
@@ -153,7 +157,15 @@ def load(
     >>> load("honeycomb", pitch_mm="60mil", layers=3)
     <Design 'honeycomb': honeycomb, pitch_mm=1.524, layers=3>
     """
-    return Design.of(load_design(name_or_path, {**(overrides or {}), **changes}))
+    return Design.of(load_parameters(name_or_path, {**(overrides or {}), **changes}))
+
+
+load_design = load  # the name in version 0.1
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema of a design's TOML file, for editors, as the command ``schema`` prints it."""
+    return design_schema()
 
 
 def templates() -> dict[str, Design]:

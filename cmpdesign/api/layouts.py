@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import fields
 from functools import cached_property
-from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.design.design import Design as Parameters
-from cmpdesign.files.layout_json import layout_to_json, write_layout
+from cmpdesign.files.layout_json import layout_document, layout_to_json, write_layout
 from cmpdesign.layout import layout as layouts
 from cmpdesign.layout.build import build_layout as build
 
@@ -53,10 +52,9 @@ class Layout(layouts.Layout):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object of ``layout.json``; ``Extractor`` takes it, too."""
-        document: dict[str, Any] = json.loads(self.to_json())
-        return document
+        return layout_document(self)
 
-    def write(self, path: str | PathLike[str]) -> None:
+    def write(self, path: str | Path) -> None:
         """Write ``layout.json``.
 
         Raises:
@@ -88,7 +86,7 @@ def build_layout(design: Parameters) -> Layout:
     return Layout.of(build(design))
 
 
-def read_layout(path: str | PathLike[str]) -> Layout:
+def read_layout(path: str | Path) -> Layout:
     """Read a ``layout.json``.
 
     Raises:

@@ -84,7 +84,7 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
     unknown = sorted(view.keys() - _USUAL.keys())
     if unknown:
         raise TypeError(f"{unknown[0]} is no name of a view; there are {', '.join(_USUAL)}")
-    pattern, chosen = layout_from(layout), View(**{**_USUAL, **view})  # type: ignore[typeddict-item]
+    pattern, chosen = layout_from(layout), View(**{**_USUAL, **view})
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
         radius_mm = min(pattern.size_mm) / 4

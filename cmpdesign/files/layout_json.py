@@ -28,6 +28,11 @@ def write_layout(layout: Layout, path: str | Path) -> None:
 
 def layout_to_json(layout: Layout) -> str:
     """Format the layout file, one column per line; numbers are the shortest that read back exactly."""
+    return _format_object(layout_document(layout), "") + "\n"
+
+
+def layout_document(layout: Layout) -> dict[str, Any]:
+    """The JSON object of the layout file."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -61,7 +66,7 @@ def layout_to_json(layout: Layout) -> str:
         }
     if layout.as_made is not None:
         document["as_made"] = _as_made_object(layout.as_made)
-    return _format_object(document, "") + "\n"
+    return document
 
 
 def pattern_digest(layout: Layout) -> str:

@@ -28,6 +28,9 @@ _PITCH_DECIMALS = 4
 _TWO_NUMBERS = r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*"
 
 
+Limit = Literal["pixels", "cells", "layers", "error"]
+
+
 class Sides(NamedTuple):
     """Width and height, in px or mm."""
 
@@ -58,7 +61,7 @@ class Proposal:
     scale_px_per_mm: float
     pitch_px: float
     error: PredictedError
-    limit: Literal["pixels", "cells", "layers", "error"]
+    limit: Limit
 
     @property
     def error_um(self) -> float:
@@ -91,7 +94,8 @@ class Proposal:
         }
         return {
             "camera": f"{self.camera} px on {self.view} mm: {self.scale_px_per_mm:.4g} px a mm",
-            "pattern": f"{design.pattern}, {design.layers} layers, pitch {design.pitch_mm:g} mm = {self.pitch_px:.3g} px",
+            "pattern": f"{design.pattern}, {design.layers} layers",
+            "pitch": f"{design.pitch_mm:g} mm = {self.pitch_px:.3g} px",
             "markers": f"{report.present_markers}",
             "overall size": "{:.2f} x {:.2f} mm, border included".format(*report.size_mm),
             "error per marker": f"{self.error_um:.3g} um per axis ({self.error.inner_px:.4f} px), "
@@ -220,9 +224,7 @@ def _fitting(layers: int, view_mm: Sides) -> _Fit:
     return _Fit(pitch_mm, 0.0 if lying >= standing else 90.0)
 
 
-def _finest_layers(
-    pixels: Sides, view_mm: Sides, scale: float
-) -> tuple[int, Literal["pixels", "cells", "layers"]]:
+def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, Limit]:
     """The most layers that are read and made well, and what limits them.
 
     Raises:
@@ -254,7 +256,7 @@ def _finest_layers(
 
 
 def _coarser(wanted_px: float, finest: int, predicted: Any) -> int:
-    """The most layers, fewer than the finest, whose predicted error is not above the wanted one; 1 if there are none."""
+    """The most layers below the finest whose predicted error is not above the wanted one; 1 if there are none."""
     low, high = FEWEST_LAYERS - 1, finest
     while high - low > 1:
         middle = (low + high) // 2
@@ -265,7 +267,7 @@ def _coarser(wanted_px: float, finest: int, predicted: Any) -> int:
 def _unreachable(error: str | float, pixels: Sides, view_mm: Sides, best_mm: float) -> str:
     return (
         f"error {_shown_um(_wanted_mm(error))}: {pixels} px on {view_mm} mm allow no less than {_shown_um(best_mm)} "
-        f"({FEWEST_LAYERS} layers); allow a larger error, use a camera with more pixels or less noise, or a smaller view"
+        f"({FEWEST_LAYERS} layers); allow a larger error, or use more pixels, less noise or a smaller view"
     )
 
 

@@ -21,10 +21,10 @@ from cmpdesign.scene.parts.optics import Optics
 from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
 
-# The exact bound needs some hundred renderings, so it is taken of a small pattern, and at most at this pitch. What it
-# adds to the bound of isolated gridlines is a factor that falls with the pitch: 1.1 at 40 px, so that the prediction at
-# larger pitches is too high by less than a tenth.
-EXACT_LAYERS, EXACT_PITCH_PX = 4, 30.0
+# The exact bound needs a hundred renderings, so it is taken of a small pattern, at a whole pitch that is not above this
+# one, as a factor on the bound of isolated gridlines. The factor falls with the pitch, to 1.05 at 30 px: the prediction
+# at larger pitches is too high by less than a tenth.
+EXACT_LAYERS, EXACT_PITCH_PX = 3, 20
 # The inner markers of so many layers have the gridline bound of those of any larger pattern.
 GRIDLINE_LAYERS = 8
 Points = NDArray[np.float64]
@@ -60,12 +60,16 @@ def predict_error(pitch_px: float, imaging: Imaging) -> PredictedError:
         pitch_px: pixels from marker to marker.
         imaging: blur and noise.
     """
-    exact = _errors(EXACT_LAYERS, min(pitch_px, EXACT_PITCH_PX), imaging, exact_bound)
-    isolated = _errors(EXACT_LAYERS, min(pitch_px, EXACT_PITCH_PX), imaging, cramer_rao)
+    factor = _exact_over_gridline(min(int(pitch_px), EXACT_PITCH_PX), imaging)
     large = _errors(GRIDLINE_LAYERS, pitch_px, imaging, cramer_rao)
-    return PredictedError(
-        large.inner_px * exact.inner_px / isolated.inner_px, large.rim_px * exact.rim_px / isolated.rim_px
-    )
+    return PredictedError(large.inner_px * factor.inner_px, large.rim_px * factor.rim_px)
+
+
+@cache
+def _exact_over_gridline(pitch_px: int, imaging: Imaging) -> PredictedError:
+    """The deviations by the exact bound over those by the bound of isolated gridlines."""
+    exact, isolated = (_errors(EXACT_LAYERS, pitch_px, imaging, bound) for bound in (exact_bound, cramer_rao))
+    return PredictedError(exact.inner_px / isolated.inner_px, exact.rim_px / isolated.rim_px)
 
 
 def _errors(layers: int, pitch_px: float, imaging: Imaging, bound: Callable[..., Points]) -> PredictedError:

@@ -20,7 +20,7 @@ PUBLIC = {f"extractor.{name}" for name in (*extractor.__all__, "draw", "__file__
 REASON = "Inside:"
 RECORD_MAKERS = {"lattice_of", "topology_of"}  # the layout's tables, which kernels of other rooms take
 OF_NAMED_TUPLES = {"_replace", "_asdict", "_fields", "_make"}
-PRIVATE = re.compile(r"_[A-Za-z]\w*")
+PRIVATE = re.compile(r"_[A-Za-z]\w*(?<!_)")  # _repr_html_ and the like belong to notebooks
 DOTTED = re.compile(rf"({'|'.join(PACKAGES)})(\.\w+)+")
 
 
@@ -142,6 +142,7 @@ CASES = (
         BEGIN + "from extractor.layout.c import Lattice, lattice_of\nimport extractor.solve.b\n",
         "",
     ),
+    ("a", "from cmpdesign import scene\nscene.part._repr_svg_()\n", ""),
     ("a", "from cmpdesign.scene import _hidden\n", "cmpdesign.scene._hidden"),
     ("a", "from cmpdesign._inside import shown\n", "cmpdesign._inside.shown"),
     ("a", "from cmpdesign import scene\nscene.part._hidden()\n", ": _hidden"),
