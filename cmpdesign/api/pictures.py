@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cmpdesign.scene import Rendered, Scene
     from cmpdesign.scene.files.scene_file import SceneFile
     from extractor import Extractor, LayoutLike, Reference
+    from extractor.presets import Preset
 
 SIZE_PX = (640, 480)
 
@@ -212,6 +213,7 @@ class Verifier:
         sheet_dpi: the pictures are print sheets of this resolution, whatever files say; 0: unknown; None: pictures
             that show the code of a print sheet are judged as such.
         max_pixels: largest picture that is read from a file, width x height.
+        preset: see ``extractor.Extractor``.
     """
 
     reference: Reference
@@ -220,13 +222,14 @@ class Verifier:
     channels: Literal["bgr", "rgb"] = "bgr"
     sheet_dpi: float | None = None
     max_pixels: int = MOST_PIXELS
+    preset: Preset = "balanced"
 
     @cached_property
     def extractor(self) -> Extractor:
         """The reader; it is made when the first picture needs it."""
         from extractor import Extractor
 
-        return Extractor(self.reference, response=self.response, side="either")
+        return Extractor(self.reference, self.preset, self.response, "either")
 
     def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
         """The picture as (H, W, 3) BGR.
@@ -269,6 +272,7 @@ class VerifyOptions(TypedDict, total=False):
     channels: Literal["bgr", "rgb"]
     sheet_dpi: float | None
     max_pixels: int
+    preset: Preset
 
 
 def verify(

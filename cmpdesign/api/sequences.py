@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.pipeline import Side
+    from extractor.presets import Preset
 
 Watch = Callable[[Any], None]
+AnySource = str | Path | int | Sequence[str | Path]
 
 
 class ReadingOptions(TypedDict, total=False):
@@ -37,7 +39,7 @@ class ReadingOptions(TypedDict, total=False):
         fps: frames per second; None: a video's own, 30 for a folder.
         frames: stop after this many frames; None: at the source's end.
         cold: never start from the frame before; False.
-        response, side, channels: see ``extractor.Extractor``.
+        preset, response, side, channels: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
         frame_id: coordinate frame and first part of the topics of a recording; "tactile".
         with_images: also record the frames' images; False.
@@ -46,6 +48,7 @@ class ReadingOptions(TypedDict, total=False):
     fps: float | None
     frames: int | None
     cold: bool
+    preset: Preset
     response: Response | None
     side: Side
     channels: Channels
@@ -65,6 +68,7 @@ class Reading:
     fps: float | None = None
     frames: int | None = None
     cold: bool = False
+    preset: Preset = "balanced"
     response: Response | None = None
     side: Side = "designed"
     channels: Channels = "bgr"
@@ -103,7 +107,7 @@ class Followed:
 
 def track(
     layout: LayoutLike | AnyLayout,
-    source: str | Path | int,
+    source: AnySource,
     output: str | Path,
     *,
     rest: str | Path | int | None = None,
@@ -138,7 +142,7 @@ def track(
     """
     job = TrackJob(
         reference_from(layout),
-        str(source),
+        _texts(source),
         Path(output),
         Reading(**reading),
         None if rest is None else str(rest),
@@ -191,9 +195,7 @@ def reconstruct(
     return follow(job, watch)
 
 
-def open_source(
-    source: str | Path | int, fps: float | None = None, max_pixels: int = MOST_PIXELS
-) -> FrameSource:
+def open_source(source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS) -> FrameSource:
     """Open a source of frames.
 
     >>> tracker = extractor.Tracker("layout.json")
@@ -201,7 +203,8 @@ def open_source(
     ...     tracked = tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
 
     Args:
-        source: path of a video or of a folder of images, a camera's number, or a stream ("rtsp://...").
+        source: path of a picture, of a folder of pictures or of a video, a pattern such as "run*/*.png", a camera's
+            number, a stream ("rtsp://..."), or a sequence of pictures, folders and patterns.
         fps: frames per second of a folder (default 30), or in place of a video's own rate.
         max_pixels: largest frame that is read, width x height.
 
@@ -210,7 +213,7 @@ def open_source(
     """
     from cmpdesign.tracking import sources
 
-    return sources.open_source(str(source), fps, max_pixels)
+    return sources.open_source(_texts(source), fps, max_pixels)
 
 
 def load_run(path: str | Path) -> Run:
@@ -255,7 +258,7 @@ class TrackJob:
     """What ``track`` needs; ``overlay`` and ``quiver`` are files to draw, the others as for ``track``."""
 
     layout: Reference
-    source: str
+    source: tuple[str, ...]
     output: Path
     reading: Reading
     rest: str | None = None
@@ -281,6 +284,7 @@ class TrackJob:
             Tracker,
             self.layout,
             warm=not how.cold,
+            preset=how.preset,
             response=how.response,
             side=how.side,
             channels=how.channels,
@@ -298,9 +302,9 @@ class TrackJob:
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
         """The JSON object of the summary."""
-        from cmpdesign.tracking.sources import without_password
+        from cmpdesign.inputs.sources import without_password
 
-        statistics, source = run.statistics, without_password(self.source)
+        statistics, source = run.statistics, ", ".join(map(without_password, self.source))
         found: dict[str, Any] = statistics.to_json(
             source, run.source.total, run.ended_early, run.tracker.rest
         )
@@ -358,7 +362,13 @@ class ReconstructJob:
         sink = open_sink(
             self.output, ShapeTable(reconstructor, continuation), replace(how.recording, views=rig.views)
         )
-        tracker = ShapeTracker(reconstructor, warm=not how.cold, response=how.response, channels=how.channels)
+        tracker = ShapeTracker(
+            reconstructor,
+            warm=not how.cold,
+            preset=how.preset,
+            response=how.response,
+            channels=how.channels,
+        )
         source = open_sources(self.source, how.fps, how.max_pixels)
         statistics = ShapeStatistics(reconstructor, depth_mm, shape.surface)
         return TrackingRun(
@@ -367,7 +377,7 @@ class ReconstructJob:
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
         """The JSON object of the summary."""
-        from cmpdesign.tracking.sources import without_password
+        from cmpdesign.inputs.sources import without_password
 
         source = without_password(self.source)
         found: dict[str, Any] = run.statistics.to_json(source, run.source.total, run.ended_early)
@@ -449,6 +459,11 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 def _require_positive(name: str, value: float | None) -> None:
     if value is not None and not 0 < value < float("inf"):
         raise CmpDesignError(f"{name} is {value:g}; expected a number above 0")
+
+
+def _texts(source: AnySource) -> tuple[str, ...]:
+    """The texts of one source or of several, as the sources' functions take them."""
+    return (str(source),) if isinstance(source, str | Path | int) else tuple(map(str, source))
 
 
 def _list_text(value: str | Path | int | Sequence[str | Path | int]) -> str:

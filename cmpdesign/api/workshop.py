@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.products.laser.coupon.photo import CouponReading
     from extractor import LayoutLike, LearntLayout
+    from extractor.presets import Preset
 
 Response = Literal["srgb", "linear"] | float
 
@@ -66,6 +67,7 @@ def calibrate_pattern(
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
     output: str | Path | None = None,
     *,
+    preset: Preset = "accurate",
     response: Response | None = None,
     max_pixels: int = MOST_PIXELS,
 ) -> LearntLayout:
@@ -76,9 +78,10 @@ def calibrate_pattern(
 
     Args:
         layout: the nominal layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
-        images: 10 or more color pictures of one pad at rest: files, folders of files, or arrays (H, W, 3) BGR.
+        images: 10 or more color pictures of one pad at rest: files, folders of files, patterns such as "rest/*.png",
+            or arrays (H, W, 3) BGR.
         output: layout file to write, with the places as made; None: none.
-        response: how light became values, see ``extractor.Extractor``.
+        preset, response: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
 
     Raises:
@@ -98,7 +101,7 @@ def calibrate_pattern(
     ):
         raise CmpDesignError(f"{output}: is the nominal layout itself; give another name")
     names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
-    learnt = learn_layout(reference_from(layout), pictures, names=names, response=response)
+    learnt = learn_layout(reference_from(layout), pictures, names=names, preset=preset, response=response)
     if output is not None:
         write_layout(layout_from_reference(learnt.layout), Path(output))
     return learnt
@@ -107,9 +110,9 @@ def calibrate_pattern(
 def _read_pictures(
     images: Sequence[str | Path] | Sequence[NDArray[Any]], max_pixels: int
 ) -> tuple[list[str], list[NDArray[Any]]]:
-    """The names and the pixels of pictures; a folder stands for its pictures."""
-    from cmpdesign.files.image_folders import without_folders
+    """The names and the pixels of pictures; a folder or a pattern stands for its pictures."""
     from cmpdesign.files.images import read_image
+    from cmpdesign.inputs.sources import picture_paths
 
     names: list[str] = []
     pictures: list[NDArray[Any]] = []
@@ -118,7 +121,7 @@ def _read_pictures(
             names.append(f"picture {len(names) + 1}")
             pictures.append(image)
             continue
-        for path in without_folders([Path(image)]):
+        for path in picture_paths([str(image)]):
             names.append(str(path))
             pictures.append(read_image(path, max_pixels))
     return names, pictures
@@ -168,7 +171,7 @@ def run_experiment(
     found = experiments.find_experiment(experiment, compared)
     count = USUAL_TRIALS[experiment] if trials is None else trials
     options = RunOptions(count, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
-    document, _ = experiments.run_experiment(found, options, Path(output), show=False)
+    document, _ = experiments.run_experiment(found, options, Path(output))
     return document
 
 

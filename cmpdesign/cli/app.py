@@ -2,51 +2,41 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
 
 from cmpdesign import __version__
-from cmpdesign.cli.command import INTERRUPTED, Command, OneLineErrors
-from cmpdesign.cli.commands import (
-    build,
-    check,
-    evaluate,
-    kerf,
-    reconstruct,
-    render,
-    size,
-    templates,
-    track,
-    verify,
-)
+from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
+from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.export import group as export
-from cmpdesign.cli.commands.starting import schema
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_document, print_error
+from cmpdesign.cli.commands.starting import init, schema, templates
+from cmpdesign.cli.terminal import print_document
 
 app = typer.Typer(
     cls=OneLineErrors,
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
     help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.",
+    epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
 )
-for function in (
-    templates.templates,
-    size.size,
-    build.build,
-    check.check,
-    render.render,
-    verify.verify,
-    track.track,
-    reconstruct.reconstruct,
-    kerf.kerf,
-    schema.schema,
+for module, function in (
+    (templates, templates.templates),
+    (init, init.init),
+    (size, size.size),
+    (build, build.build),
+    (check, check.check),
+    (render, render.render),
+    (verify, verify.verify),
+    (track, track.track),
+    (reconstruct, reconstruct.reconstruct),
+    (kerf, kerf.kerf),
+    (schema, schema.schema),
 ):
-    app.command(function.__name__, cls=Command)(function)
+    app.command(function.__name__, cls=Command, epilog=examples(*module.EXAMPLES))(function)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(export.app, name="export")
@@ -72,5 +62,4 @@ def main() -> None:
     try:
         app()
     except KeyboardInterrupt:  # before or after a command
-        print_error(INTERRUPTED)
-        sys.exit(EXIT_INTERRUPTED)
+        exit_interrupted()

@@ -1,8 +1,9 @@
-"""What all commands share: refused paths, and errors, missing libraries and Ctrl-C as one line and an exit code."""
+"""What all commands share: options of output, examples, refused paths, and errors and Ctrl-C as one line."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +11,53 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from cmpdesign.cli.missing_library import missing_library_text
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, EXIT_INTERRUPTED, is_expected, print_error, shortened
+from cmpdesign.cli.mode import Mode, current_mode, use_mode
+from cmpdesign.cli.options.output import NAMES, output_parameters
+from cmpdesign.cli.terminal import (
+    EXIT_BAD_INPUT,
+    EXIT_INTERRUPTED,
+    is_expected,
+    print_error,
+    print_origin,
+    shortened,
+)
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.texts import visible
 
 INTERRUPTED = "interrupted; every file that was written is complete"
+_OUTPUT_PARAMETERS = output_parameters()
+
+
+def examples(*lines: str) -> str:
+    """The end of a command's help text: its examples, one line each, without the prompt."""
+    return "\n".join(lines)
+
+
+def _write_examples(epilog: str | None, formatter: Any) -> None:
+    """One line an example, unwrapped, so that it can be copied."""
+    if epilog:
+        with formatter.section("Examples"):
+            for line in epilog.splitlines():
+                formatter.write(f"{'':{formatter.current_indent}}$ {line}\n")
 
 
 class Command(TyperCommand):
-    """A command that refuses "-" for a file or folder: no command reads standard input or writes files to output."""
+    """A command with ``--json``, ``--quiet`` and ``--verbose``, which its function does not receive.
+
+    It refuses "-" for a file or folder: no command reads standard input or writes files to output.
+    """
+
+    def __init__(self, name: str | None, *, params: list[Any] | None = None, **options: Any) -> None:
+        super().__init__(name, params=[*(params or []), *_OUTPUT_PARAMETERS], **options)
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        _write_examples(self.epilog, formatter)
 
     def invoke(self, ctx: Any) -> Any:
+        mode = Mode(*(ctx.params.pop(name) for name in NAMES))
+        use_mode(mode)
+        if mode.quiet and mode.verbose:
+            raise CmpDesignError("--quiet and --verbose exclude each other; give one of them")
         for parameter in self.params:
             given = ctx.params.get(parameter.name)
             values: Iterable[Any] = given if isinstance(given, list | tuple) else (given,)
@@ -34,34 +71,55 @@ class Command(TyperCommand):
 class OneLineErrors(TyperGroup):
     """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
 
-    def make_context(self, *arguments: Any, **options: Any) -> Any:
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        _write_examples(self.epilog, formatter)
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        use_mode(Mode(as_json=_asks_for_json(args)))  # for errors in the words, before options are known
         try:
-            return super().make_context(*arguments, **options)
+            return super().make_context(info_name, args, parent, **extra)
         except Exception as error:
-            _make_visible(error)
+            _finish_usage_error(error)
             raise
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            print_error(INTERRUPTED)
+            print_error(INTERRUPTED, EXIT_INTERRUPTED)
             raise typer.Exit(EXIT_INTERRUPTED) from None
         except ModuleNotFoundError as error:
             text = missing_library_text(error)
             if text is None:
                 raise
+            print_origin(error)
             print_error(text)
         except Exception as error:
             if not is_expected(error):
-                _make_visible(error)
+                _finish_usage_error(error)
                 raise
+            print_origin(error)
             print_error(error)
         raise typer.Exit(EXIT_BAD_INPUT)
 
 
-def _make_visible(error: Exception) -> None:
-    """Replace the message of a usage error, which quotes the command line, by its printable form."""
-    if hasattr(error, "format_message"):
-        text = shortened(visible(error.format_message(), keep="\n"))
-        error.format_message = lambda: text
+def _asks_for_json(words: Sequence[str]) -> bool:
+    before = words[: words.index("--")] if "--" in words else words
+    return "--json" in before
+
+
+def _finish_usage_error(error: Exception) -> None:
+    """Of an error in the words, which quotes them: make its message printable, or print it as JSON and exit."""
+    if not hasattr(error, "format_message"):
+        return
+    text = shortened(visible(error.format_message(), keep="\n"))
+    if current_mode().as_json:
+        print_error(text)
+        raise typer.Exit(EXIT_BAD_INPUT) from None
+    error.format_message = lambda: text
+
+
+def exit_interrupted() -> None:
+    """End the program after Ctrl-C outside of commands."""
+    print_error(INTERRUPTED, EXIT_INTERRUPTED)
+    sys.exit(EXIT_INTERRUPTED)

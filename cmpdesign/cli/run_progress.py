@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import typer
-
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
+from cmpdesign.cli.progress import progress_bar
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -30,48 +28,24 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
     """
     from cmpdesign.tracking.run import stop_on_signal
 
-    with stop_on_signal(run.stop), _progress_bar(run, doing) as watch:
-        run.go(watch)
+    total = run.limit if run.limit is not None else run.source.total
+    with stop_on_signal(run.stop), progress_bar(doing, total, unit="frames") as advance:
+        run.go(lambda frame: advance(f"{run.statistics.tracked} tracked, {frame.elapsed_ms:.1f} ms"))
 
 
-@contextmanager
-def _progress_bar(run: TrackingRun, doing: str) -> Iterator[Callable[[Any], None]]:
-    """A progress bar on stderr (if a terminal): frames and tracked frames; yields the function to call per frame."""
-    terminal = console(stderr=True)
-    if not terminal.is_terminal:
-        yield lambda frame: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    total = run.limit or run.source.total
-    columns = (
-        TextColumn(doing),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=terminal, transient=True) as progress:
-        task = progress.add_task(doing, total=total, note="")
-        yield lambda frame: progress.update(
-            task, advance=1, note=f"{run.statistics.tracked} tracked, {frame.elapsed_ms:.1f} ms"
-        )
-
-
-def exit_with_status(run: TrackingRun) -> None:
-    """Exit with 1 if the run ended early or tracked nothing, with 130 if it was stopped by hand.
+def exit_status(run: TrackingRun) -> int:
+    """The exit code: 1 if the run ended early or tracked nothing, 130 if it was stopped by hand, else 0.
 
     Raises:
         CmpDesignError: no frame could be read.
     """
     if run.stop.is_requested:
-        raise typer.Exit(0 if run.source.is_live else EXIT_INTERRUPTED)
+        return 0 if run.source.is_live else EXIT_INTERRUPTED
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:
         print_warning(f"{run.ended_early}; these are written")
-    if run.ended_early or not run.statistics.tracked:
-        raise typer.Exit(EXIT_NOT_TRACKED)
+    return EXIT_NOT_TRACKED if run.ended_early or not run.statistics.tracked else 0
 
 
 def recover_and_report(output: Path, rows_per_frame: int) -> None:
@@ -81,23 +55,32 @@ def recover_and_report(output: Path, rows_per_frame: int) -> None:
         CmpDesignError: there is nothing to recover, or no whole frame is left.
         OutputError: the table cannot be written.
     """
+    from cmpdesign.cli.documents.runs import RecoverDocument
     from cmpdesign.tracking.sinks.tables import recover_table
 
     recovered = recover_table(output, rows_per_frame)
     for problem in recovered.problems:
         print_warning(problem)
-    if not recovered.frames:
+    if recovered.frames:
+        say(f"wrote {printable_path(output)}: {recovered.frames} frames recovered")
+    else:
         print_warning(
             f"{printable_path(output)}: the run was ended before its first frame was written; what it left is removed"
         )
-        raise typer.Exit(EXIT_NOT_TRACKED)
-    console().print(f"wrote {printable_path(output)}: {recovered.frames} frames recovered")
+    finish(
+        lambda: RecoverDocument(
+            written=printable_path(output) if recovered.frames else None,
+            frames=recovered.frames,
+            problems=tuple(recovered.problems),
+        ),
+        0 if recovered.frames else EXIT_NOT_TRACKED,
+    )
 
 
 def print_written(paths: Iterable[Path]) -> None:
     """Print one line for every written file."""
     for path in paths:
-        console().print(f"wrote {printable_path(path)}")
+        say(f"wrote {printable_path(path)}")
 
 
 def require_positive(option: str, value: float | None) -> None:

@@ -6,19 +6,29 @@ the window or hide what was printed. ``visible`` replaces them, and every functi
 
 from __future__ import annotations
 
+import json
 import sys
+import time
+import traceback
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import typer
+
+from cmpdesign.cli.mode import current_mode
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from cmpdesign.cli.documents.document import Document
+
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 MOST_LINE_LETTERS = 300  # of an error or a warning
 _HEAD_LETTERS = 200  # of them before the cut; the remedy stands at the end of a line
+_STARTED = time.perf_counter()
 
 
 def shortened(text: str) -> str:
@@ -55,19 +65,75 @@ def error_on_one_line(error: BaseException | str) -> str:
     return shortened(visible(" ".join(str(error).split())))
 
 
-def print_error(error: BaseException | str) -> None:
+def print_error(error: BaseException | str, exit_code: int = EXIT_BAD_INPUT) -> None:
     """Print an error on stderr."""
-    print(f"error: {error_on_one_line(error)}", file=sys.stderr)
+    _print_message("error", error_on_one_line(error), exit_code=exit_code)
 
 
 def print_warning(text: str) -> None:
     """Print a warning on stderr."""
-    print(f"warning: {shortened(visible(text))}", file=sys.stderr)
+    _print_message("warning", shortened(visible(text)))
+
+
+def print_step(text: str) -> None:
+    """Print what was done on stderr, with the time since the start, if the command is verbose."""
+    if current_mode().verbose:
+        _print_message(
+            "step", f"{shortened(visible(text))} ({1e3 * (time.perf_counter() - _STARTED):.0f} ms)"
+        )
+
+
+def print_origin(error: BaseException) -> None:
+    """Print where an error arose on stderr, if the command is verbose."""
+    if current_mode().verbose and not current_mode().as_json:
+        sys.stderr.write(visible("".join(traceback.format_exception(error)), keep="\n"))
+
+
+def _print_message(level: str, line: str, **fields: Any) -> None:
+    """One line on stderr; its JSON is described by ``Message``."""
+    if current_mode().as_json:
+        message = {"format": "cmp-message", "version": 1, "level": level, "text": line, **fields}
+        line = visible(json.dumps(message, ensure_ascii=False))
+    else:
+        line = f"{level}: {line}"
+    print(line, file=sys.stderr)
+
+
+def say(*objects: Any, **options: Any) -> None:
+    """Print texts and tables for people on stdout; nothing with ``--quiet`` or ``--json``.
+
+    Args:
+        objects, options: as of rich's ``Console.print``.
+    """
+    if current_mode().prints_text:
+        console().print(*objects, **options)
+
+
+def say_text(text: str) -> None:
+    """Print lines for people on stdout without wrapping; nothing with ``--quiet`` or ``--json``."""
+    if current_mode().prints_text:
+        print_document(text)
 
 
 def print_document(text: str) -> None:
     """Print lines, such as a document of JSON, on stdout as they are, without wrapping."""
     sys.stdout.write(visible(text, keep="\n"))
+
+
+def finish(make_document: Callable[[], Document], exit_code: int = 0) -> None:
+    """End a command: print its document with ``--json``, and exit with its code.
+
+    Args:
+        make_document: makes the document; it is called with ``--json`` only.
+        exit_code: the command's exit code.
+
+    Raises:
+        typer.Exit: the exit code is not 0.
+    """
+    if current_mode().as_json:
+        print_document(make_document().to_json())
+    if exit_code:
+        raise typer.Exit(exit_code)
 
 
 def printable_path(path: object) -> str:

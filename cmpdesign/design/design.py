@@ -15,7 +15,7 @@ from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.quantities import Angle, Color, Length, LengthOrZero
 from cmpdesign.design.sheet_options import SheetOptions
 from cmpdesign.errors import DesignError, InputError
-from cmpdesign.inputs.documents import parse_toml, read_toml
+from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.names import MOST_NAME_LETTERS, Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.patterns import registered_patterns
@@ -194,7 +194,7 @@ class Design(_StrictModel):
 
 
 def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Design:
-    """Load a design from a template's name or a TOML file, with values overridden.
+    """Load a design from a template's name or a TOML file, with all that the file extends, and values overridden.
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
@@ -202,19 +202,18 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
             text "none" remove the field.
 
     Raises:
-        DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.
+        DesignError: no such template or file, not TOML, a circle of files that extend each other, or a parameter
+            that ``Design`` refuses.
 
     >>> design = load_design("honeycomb", {"pitch_mm": "60mil", "layers": 3})
     >>> design.pitch_mm, design.layers
     (1.524, 3)
     """
+    from cmpdesign.design.extends import read_design_file
     from cmpdesign.design.templates import find_design
 
     path = find_design(name_or_path)
-    try:
-        data = read_toml(path)
-    except InputError as error:
-        raise DesignError(str(error)) from None
+    data = read_design_file(path)
     try:
         _update_overrides(data, overrides or {})
         data.setdefault("name", path.stem[:MOST_NAME_LETTERS])
@@ -229,6 +228,13 @@ def design_schema() -> dict[str, Any]:
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "cmpdesign design"
     schema["properties"]["pattern"]["enum"] = list(registered_patterns())
+    extends = {
+        "type": "string",
+        "minLength": 1,
+        "description": "A template, or a file's path from this file's folder: its fields hold where none stand here.",
+    }
+    schema["properties"] = {"extends": extends, **schema["properties"]}
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["extends"]}]
     return schema
 
 

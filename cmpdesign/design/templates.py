@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from pathlib import Path
+from typing import NamedTuple
 
 from cmpdesign.errors import DesignError
-from cmpdesign.inputs.files import path_exists
+from cmpdesign.inputs.documents import parse_toml
+from cmpdesign.inputs.files import path_exists, read_text
 from cmpdesign.inputs.names import nearest_name
+
+KINDS = ("scenes", "machines", "materials", "silicones", "sensors")
 
 
 def templates_folder() -> Path:
@@ -27,9 +32,56 @@ def templates() -> dict[str, Path]:
     return {path.stem: path for path in sorted(templates_folder().glob("*.toml"))}
 
 
+def template_kinds() -> dict[str, dict[str, Path]]:
+    """Every template: kind -> name -> file. The designs come first; the other kinds are folders of their name."""
+    return {"designs": templates(), **{kind: _in_folder(kind) for kind in KINDS}}
+
+
+def _in_folder(kind: str) -> dict[str, Path]:
+    return {path.stem: path for path in sorted((templates_folder() / kind).glob("*.toml"))}
+
+
+def find_template(name: str) -> tuple[str, Path]:
+    """The kind and the file of a template by its name; "sensors/tac3d" names the kind, too.
+
+    Without a kind, a design comes before a template of another kind.
+
+    Raises:
+        DesignError: no template has the name.
+    """
+    kind, slash, word = name.rpartition("/")
+    every = template_kinds()
+    for each, names in every.items():
+        if word in names and (not slash or kind == each):
+            return each, names[word]
+    known = [*every["designs"], *(f"{each}/{word}" for each, names in every.items() for word in names)]
+    raise DesignError(f"{name}: no such template{nearest_name(name, known)}; cmpdesign templates lists them")
+
+
+class TemplateWords(NamedTuple):
+    """What a template says of itself."""
+
+    description: str
+    source: str
+
+
+def template_words(path: Path) -> TemplateWords:
+    """A template's own description, else its name, else the first sentence of its file; and its source.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    text = read_text(path)
+    document = parse_toml(text, str(path))
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    beginning, stop, _ = " ".join(line.lstrip("# ") for line in comment).partition(". ")
+    words = document.get("description") or document.get("name") or beginning + stop.strip()
+    return TemplateWords(str(words), str(document.get("source", "")))
+
+
 def scene_templates() -> dict[str, Path]:
     """Every scene template by name, in alphabetical order."""
-    return {path.stem: path for path in sorted((templates_folder() / "scenes").glob("*.toml"))}
+    return _in_folder("scenes")
 
 
 def find_design(name_or_path: str | Path) -> Path:

@@ -13,7 +13,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.designs import DesignEntry
 from cmpdesign.evaluate.journal import Journal
 from cmpdesign.evaluate.report.page import Section, report_html
-from cmpdesign.evaluate.runner import RunOptions, Trial, Work, run_trials
+from cmpdesign.evaluate.runner import RunOptions, Trial, TrialsBar, Work, no_bar, run_trials
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
 
@@ -74,7 +74,7 @@ def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experimen
 
 
 def run_experiment(
-    experiment: Experiment, options: RunOptions, folder: Path, *, show: bool = True
+    experiment: Experiment, options: RunOptions, folder: Path, *, bar: TrialsBar = no_bar
 ) -> tuple[dict[str, Any], list[Path]]:
     """Run the open trials, and write ``report.json`` and ``report.html``.
 
@@ -82,7 +82,7 @@ def run_experiment(
         experiment: the experiment.
         options: the user's options.
         folder: folder of the journal and the report.
-        show: show a progress bar.
+        bar: shows the progress of the trials.
 
     Returns:
         The report's document, and the written files.
@@ -97,7 +97,7 @@ def run_experiment(
     trials = experiment.trials(options)
     with Journal(folder, conditions) as journal:
         results = run_trials(
-            experiment.work, trials, journal, workers=options.workers, title=experiment.name, show=show
+            experiment.work, trials, journal, workers=options.workers, title=experiment.name, bar=bar
         )
     document = {
         "format": "cmp-evaluation",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import signal
 import zlib
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,13 +66,28 @@ class RunOptions:
 Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
+# (title, number of trials, number of those in the journal) -> what is called after every trial, with a note.
+TrialsBar = Callable[[str, int, int], AbstractContextManager[Callable[[str], None]]]
+
+
+def no_bar(title: str, total: int, done: int) -> AbstractContextManager[Callable[[str], None]]:
+    """Show nothing."""
+    return nullcontext(lambda note: None)
+
+
 def trial_rng(seed: int, name: str, index: int) -> np.random.Generator:
     """The random stream of one trial, the same in every process and at any time."""
     return np.random.default_rng([seed, zlib.crc32(name.encode("utf-8")), index])
 
 
 def run_trials(
-    work: Work, trials: Sequence[Trial], journal: Journal, *, workers: int, title: str, show: bool = True
+    work: Work,
+    trials: Sequence[Trial],
+    journal: Journal,
+    *,
+    workers: int,
+    title: str,
+    bar: TrialsBar = no_bar,
 ) -> list[Mapping[str, Any]]:
     """The results of all trials, in their order; trials in the journal are not run again.
 
@@ -81,8 +96,8 @@ def run_trials(
         trials: the trials.
         journal: the results of earlier runs; new results are added.
         workers: number of processes; 1: this process.
-        title: label of the progress bar.
-        show: show a progress bar if stderr is a terminal.
+        title: what is run, for the progress bar.
+        bar: shows the progress of the trials.
 
     Raises:
         CmpDesignError: two trials have the same key.
@@ -93,12 +108,12 @@ def run_trials(
     open_trials = [trial for trial in trials if trial.key not in journal.results]
     done = len(trials) - len(open_trials)
     with (
-        _progress_bar(title, len(trials), done, show) as advance,
+        bar(title, len(trials), done) as advance,
         closing(_iterate_results(work, open_trials, workers)) as results,
     ):
         for key, result in results:
             journal.add(key, result)
-            advance()
+            advance("")
     return [journal.results[trial.key] for trial in trials]
 
 
@@ -147,16 +162,3 @@ def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
     cv2.setNumThreads(1)
     with threadpool_limits(1):
         return json.loads(json.dumps(work(values), allow_nan=False))
-
-
-@contextmanager
-def _progress_bar(title: str, total: int, done: int, show: bool) -> Iterator[Callable[[], None]]:
-    """A progress bar if stderr is a terminal; yields the function that advances it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    terminal = Console(stderr=True)
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=terminal, disable=not (show and terminal.is_terminal)) as progress:
-        task = progress.add_task(title, total=total, completed=done)
-        yield lambda: progress.advance(task)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, InputError
 from cmpdesign.files.image_header import size_in_header
-from cmpdesign.inputs.files import MOST_PIXELS, read_file
+from cmpdesign.inputs.files import MOST_PIXELS, open_file, read_file
 
 SMALLEST_PX = 16
+_HEADER_BYTES = 1 << 16
 PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 # Endings of images that are written -> largest number of bits.
@@ -45,6 +46,15 @@ def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool =
             16 bits, or is smaller than 16 x 16 or larger than ``most_pixels`` pixels.
     """
     return _to_bgr(decode_image(path, most_pixels), Path(path), gray)
+
+
+def is_image_file(path: str | Path) -> bool:
+    """True if a file begins as an image does that ``read_image`` knows; False also for what cannot be read."""
+    try:
+        with open_file(path) as file:
+            return size_in_header(file.read(_HEADER_BYTES)) is not None
+    except (InputError, OSError):
+        return False
 
 
 def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from cmpdesign.products.registry import make_products, pads_as_made, product_fol
 
 if TYPE_CHECKING:
     from cmpdesign.products.as_made.reading import PadReading
+    from extractor.presets import Preset
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,9 @@ def build_files(
     folder: str | Path,
     names: Sequence[str],
     camera_px: tuple[int, int] = CAMERA_PX,
+    *,
+    preset: Preset = "balanced",
+    watch: Callable[[str], None] = lambda name: None,
 ) -> Built:
     """Write the files of a design.
 
@@ -78,6 +82,8 @@ def build_files(
         folder: folder for the files; made if missing.
         names: products to make, see ``chosen_products``.
         camera_px: width and height of the camera image that the pattern fills.
+        preset: the extractor's, for the reading of pads.
+        watch: called with the name of every step before it.
 
     Raises:
         CmpDesignError: a product cannot be made; no file has been written.
@@ -91,7 +97,7 @@ def build_files(
 
     folder = Path(folder)
     report = design_report(design, layout, camera_px)
-    made = make_products(names, design, layout, report, camera_px)
+    made = make_products(names, design, layout, report, camera_px, preset=preset, watch=watch)
     pattern = pattern_digest(layout)
     listed = files_with_lists(made.files, product_folders(), folder, pattern)
     stale = find_stale_files(folder, listed, product_folders(), pattern)
@@ -108,12 +114,17 @@ def build_files(
 
 
 def check_products(
-    design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX, *, read: bool = False
+    design: Design,
+    layout: Layout,
+    camera_px: tuple[int, int] = CAMERA_PX,
+    *,
+    read: bool = False,
+    preset: Preset = "balanced",
 ) -> Checked:
     """What cannot be made or read of a design.
 
     Args:
-        design, layout, camera_px: see ``build_files``.
+        design, layout, camera_px, preset: see ``build_files``.
         read: also draw and read the pads that laser, mold and print would make.
     """
     from cmpdesign.products.as_made.reading import clip_findings, read_pads
@@ -122,6 +133,6 @@ def check_products(
     if not read:
         return Checked(tuple(findings), {}, {})
     pads, unread = pads_as_made(design, layout)
-    found = read_pads(pads, camera_px)
+    found = read_pads(pads, camera_px, preset)
     findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
     return Checked(tuple(findings), found.readings, unread)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
     from cmpdesign.products.as_made.made_pad import MadePad
     from cmpdesign.products.as_made.reading import PadReading
+    from extractor.presets import Preset
 
 
 @dataclass(frozen=True)
@@ -136,15 +137,24 @@ def make_products(
     layout: Layout,
     report: DesignReport,
     camera_px: tuple[int, int] = CAMERA_PX,
+    *,
+    preset: Preset = "balanced",
+    watch: Callable[[str], None] = lambda name: None,
 ) -> MadeProducts:
     """Make the named products, and read their pads as a camera of ``camera_px`` (width, height) sees them.
+
+    ``preset`` is the extractor's; ``watch`` is called with the name of every step before it.
 
     ``report.json`` is also made when a named product has figures, and ``preview.png`` when one has pictures.
 
     Raises:
         CmpDesignError: a product cannot be made. No file has been written.
     """
-    made = {name: _load_maker(name)(design, layout) for name in names if name not in (PREVIEW, REPORT)}
+    made: dict[str, ProductFiles] = {}
+    for name in names:
+        if name not in (PREVIEW, REPORT):
+            watch(name)
+            made[name] = _load_maker(name)(design, layout)
     pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}
     if pictures or PREVIEW in names:
         from cmpdesign.products.drawing.preview import preview_png
@@ -162,7 +172,8 @@ def make_products(
     if pads:
         from cmpdesign.products.as_made.reading import read_pads
 
-        read = read_pads(pads.values(), camera_px)
+        watch("reading of pads")
+        read = read_pads(pads.values(), camera_px, preset)
         files |= read.files
         findings += read.findings
         figures[AS_MADE] = read.figures

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -114,7 +114,11 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
 
 
 def read_rest_markers(
-    text: str, source: str, fps: float | None, tracker: Tracker, most_pixels: int = MOST_PIXELS
+    text: str,
+    source: str | Sequence[str],
+    fps: float | None,
+    tracker: Tracker,
+    most_pixels: int = MOST_PIXELS,
 ) -> Markers:
     """Extract the markers at rest.
 
@@ -139,7 +143,9 @@ def _why(markers: Markers) -> str:
     return "no image" if markers.reason is None else markers.reason.text
 
 
-def read_rest_image(text: str, source: str, fps: float | None, most_pixels: int = MOST_PIXELS) -> Any:
+def read_rest_image(
+    text: str, source: str | Sequence[str], fps: float | None, most_pixels: int = MOST_PIXELS
+) -> Any:
     """Read the image at rest; arguments as for ``read_rest_markers``.
 
     Raises:
@@ -156,8 +162,8 @@ def read_rest_image(text: str, source: str, fps: float | None, most_pixels: int 
     return image
 
 
-def _read_frame(number: int, text: str, fps: float | None, most_pixels: int) -> Any:
-    source = open_source(text, fps, most_pixels)
+def _read_frame(number: int, texts: str | Sequence[str], fps: float | None, most_pixels: int) -> Any:
+    source = open_source(texts, fps, most_pixels)
     if source.is_live:
         raise CmpDesignError(
             f"at rest, frame {number}: a {source.name.partition(' ')[0]}'s frames cannot be read ahead; "

@@ -1,28 +1,21 @@
-"""Sources of frames: a video, a folder of images, a camera, a stream. An unreadable frame counts as a frame."""
+"""Sources of frames: pictures, a video, a camera, a stream. An unreadable frame counts as a frame."""
 
 from __future__ import annotations
 
 import os
-import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from cmpdesign.errors import CmpDesignError
-from cmpdesign.files.image_folders import find_images
-from cmpdesign.files.images import ImageFileError, read_image
-from cmpdesign.inputs.files import MOST_PIXELS, is_folder, is_regular_file, path_exists
+from cmpdesign.files.images import ImageFileError, is_image_file, read_image
+from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
+from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, is_stream_address, name_sources
 
 DEFAULT_FPS = 30.0
 MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
 STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits no longer
-_ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
-
-
-class SourceError(CmpDesignError, ValueError):
-    """A source that cannot be opened."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +26,13 @@ class SourceFrame:
         time_s: time stamp.
         image: (H, W, 3) BGR, or None; of several views a list of these.
         problem: reason for a missing image, or "".
+        path: the image's own file; None of a frame of a video, a camera or a stream, and of several views.
     """
 
     time_s: float
     image: Any
     problem: str = ""
+    path: Path | None = None
 
 
 class FrameSource(Protocol):
@@ -60,37 +55,46 @@ class FrameSource(Protocol):
     def frames(self) -> Iterator[SourceFrame]: ...
 
 
-def open_source(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
-    """Open a source.
+def open_source(
+    source: str | Sequence[str], fps: float | None = None, most_pixels: int = MOST_PIXELS
+) -> FrameSource:
+    """Open what one text or several texts name, see ``name_sources``: pictures one after another, or one other source.
 
     Args:
-        text: number of a camera, address of a stream ("rtsp://..."), or path of a folder of images or of a video.
-        fps: frames per second of a folder (default 30), or in place of a video's own rate.
+        source: the texts.
+        fps: frames per second of pictures (default 30), or in place of a video's own rate.
         most_pixels: limit of width x height of an image or of a frame.
+
+    Raises:
+        SourceError: a source cannot be opened, or several are not pictures.
+    """
+    named = name_sources([source] if isinstance(source, str) else source)
+    if not named:
+        raise SourceError("no source is given")
+    if len(named) == 1:
+        return open_named(named[0], fps, most_pixels)
+    first = next(each for each in named if each.kind is not SourceKind.IMAGES)
+    raise SourceError(
+        f"{first.name}: cannot be one of {len(named)} sources; give pictures only, or one video, camera or stream"
+    )
+
+
+def open_named(source: NamedSource, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
+    """Open a source that ``name_sources`` found; see ``open_source``.
 
     Raises:
         SourceError: the source cannot be opened.
     """
-    if _ADDRESS.match(text):
-        return LiveSource(
-            text,
-            f"stream {without_password(text)}",
-            "is the address right, and is it switched on?",
-            most_pixels,
-        )
-    path = Path(text)
-    if text.isdecimal() and not path_exists(path):
-        return LiveSource(
-            int(text), f"camera {text}", "is it connected, and free of other programs?", most_pixels
-        )
-    if is_folder(path):
-        return FolderSource(path, fps or DEFAULT_FPS, most_pixels)
-    return VideoSource(path, fps, most_pixels)
-
-
-def without_password(text: str) -> str:
-    """A source's text as it may be shown: the address of a stream without user and password."""
-    return re.sub(r"^([a-z]+://)[^/@]*@", r"\1", text, flags=re.IGNORECASE)
+    match source.kind:
+        case SourceKind.STREAM:
+            hint = "is the address right, and is it switched on?"
+            return LiveSource(source.address, f"stream {source.name}", hint, most_pixels)
+        case SourceKind.CAMERA:
+            hint = "is it connected, and free of other programs?"
+            return LiveSource(int(source.address), source.name, hint, most_pixels)
+        case SourceKind.FILE if not is_image_file(source.paths[0]):
+            return VideoSource(source.paths[0], fps, most_pixels)
+    return ImagesSource(source.paths, source.name, fps or DEFAULT_FPS, most_pixels)
 
 
 def open_sources(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
@@ -142,28 +146,26 @@ class MultiViewSource:
         self.ended_early = "; ".join(reasons)
 
 
-class FolderSource:
-    """The images of a folder in the natural order of their names."""
+class ImagesSource:
+    """Image files in a given order; time stamps are counted at ``fps``."""
 
     is_live = False
 
-    def __init__(self, path: Path, fps: float, most_pixels: int = MOST_PIXELS) -> None:
-        try:
-            self.paths = find_images(path)
-        except ImageFileError as error:
-            raise SourceError(str(error)) from None
-        self.name, self.ended_early = str(path), ""
-        self.total: int | None = len(self.paths)
+    def __init__(
+        self, paths: Sequence[Path], name: str, fps: float = DEFAULT_FPS, most_pixels: int = MOST_PIXELS
+    ) -> None:
+        self._paths, self._fps, self._most_pixels = tuple(paths), fps, most_pixels
+        self.name, self.ended_early = name, ""
+        self.total: int | None = len(self._paths)
         self.fps: float | None = fps
-        self._fps, self._most_pixels = fps, most_pixels
 
     def frames(self) -> Iterator[SourceFrame]:
-        for index, path in enumerate(self.paths):
+        for index, path in enumerate(self._paths):
             time_s = index / self._fps
             try:
-                yield SourceFrame(time_s, read_image(path, self._most_pixels))
+                yield SourceFrame(time_s, read_image(path, self._most_pixels), path=path)
             except ImageFileError as error:
-                yield SourceFrame(time_s, None, str(error))
+                yield SourceFrame(time_s, None, str(error), path)
 
 
 class VideoSource:
@@ -174,7 +176,8 @@ class VideoSource:
     def __init__(self, path: Path, fps: float | None, most_pixels: int = MOST_PIXELS) -> None:
         if not is_regular_file(path):
             raise SourceError(
-                f"{path}: no such file or folder; expected a video, a folder of images or a camera's number"
+                f"{path}: no such file or folder; expected pictures, a folder of them, a pattern such as 'run/*.png', "
+                "a video or a camera's number"
             )
         self._capture = _open_capture(str(path))
         if not self._capture.isOpened():
@@ -284,7 +287,7 @@ def _open_capture(source: str | int) -> Any:
     # OpenCV's own reader of AVI files prints letters of the file; it is not tried where there is FFmpeg.
     has_ffmpeg = isinstance(source, str) and cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
     try:
-        if isinstance(source, str) and _ADDRESS.match(source):
+        if isinstance(source, str) and is_stream_address(source):
             limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, STREAM_TIMEOUT_MS]
             limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, STREAM_TIMEOUT_MS]
             return cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.camera.page import page_pictures
 
-from . import fields, gallery, measured
+from . import commands, fields, gallery, measured
 from .pictures import contact, drawings, hero, scene_templates, sides, stages, surface
 
 DOCS = Path(__file__).resolve().parent.parent
@@ -26,6 +26,7 @@ def pages() -> dict[Path, str]:
     design_files = DOCS / "reference" / "design-files.md"
     return {
         DOCS / "reference" / "gallery.md": gallery.page(),
+        DOCS / "reference" / "command-line.md": commands.page(),
         design_files: fields.filled(design_files.read_text(encoding="utf-8")),
         **measured.pages(),
     }

@@ -150,10 +150,10 @@ class ShapeTracker:
     Args:
         reconstructor: with the poses of the views.
         warm: start from the frame before where the image proves the prediction.
-        response, channels: see ``Extractor``. The views' poses say which side each of them shows.
+        preset, response, channels: see ``Extractor``. The views' poses say which side each of them shows.
 
     Raises:
-        ValueError: no such response or order of channels.
+        ValueError: no such preset, response or order of channels.
     """
 
     def __init__(
@@ -161,6 +161,7 @@ class ShapeTracker:
         reconstructor: Reconstructor,
         *,
         warm: bool = True,
+        preset: Preset = "balanced",
         response: Response | None = None,
         channels: Channels = "bgr",
     ) -> None:
@@ -168,7 +169,8 @@ class ShapeTracker:
         layout = reconstructor.layout
         sides = [_side_shown(layout, view, "designed") for view in reconstructor.poses.views]
         self._trackers = [
-            Tracker(layout, warm=warm, response=response, side=side, channels=channels) for side in sides
+            Tracker(layout, warm=warm, preset=preset, response=response, side=side, channels=channels)
+            for side in sides
         ]
         self._count = 0
 

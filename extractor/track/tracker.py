@@ -16,6 +16,7 @@ from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
 from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.pipeline import Extractor, NumberedMarkers, Side, Stages, no_markers
+from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
 from extractor.result import Markers, Origin, Reason, Status
@@ -120,11 +121,11 @@ class Tracker:
         mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
             homography fitted at rest.
         warm: start from the frame before where the image proves the prediction; False: always cold. Ids are the same.
-        response, side, channels: see ``Extractor``.
+        preset, response, side, channels: see ``Extractor``.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
-        ValueError: no such response, side or order of channels.
+        ValueError: no such preset, response, side or order of channels.
     """
 
     def __init__(
@@ -134,13 +135,14 @@ class Tracker:
         rest: Markers | None = None,
         mm_per_px: float | None = None,
         warm: bool = True,
+        preset: Preset = "balanced",
         response: Response | None = None,
         side: Side = "designed",
         channels: Channels = "bgr",
     ) -> None:
         self.layout = layout = layout_of(layout)
         self.rest: Rest | None = None
-        self._extractor = Extractor(layout, response=response, side=side, channels=channels)
+        self._extractor = Extractor(layout, preset, response, side, channels)
         self._mm_per_px = mm_per_px
         self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
         self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])

@@ -15,7 +15,6 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("cmpdesign", "extractor")
 PRINTS = {
     "cmpdesign/cli/terminal.py",
-    "cmpdesign/evaluate/runner.py",  # a progress bar whose texts are its own
 }
 PRINTING = {"print", "echo", "secho", "Console", "Text", "Panel", "pprint"}
 CONSOLE = re.compile(r"console\([^()]*\)\.print")  # of the console that terminal.py makes

@@ -36,7 +36,7 @@ ROOMS = {
     ),
     "cmpdesign": (
         "errors units inputs patterns design layout files reading contact scene products tracking evaluate api"
-        " proposal cli demo writers"
+        " proposal cli demo __main__ writers"
     ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign", "cmpdesign.writers"}  # the tops, and what is kept for old programs

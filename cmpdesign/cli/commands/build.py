@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.pixels import parse_pixels
-from cmpdesign.cli.terminal import console, print_warning, printable_path
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.cli.options.designs import (
+    CAMERA_TEXT,
+    CameraOption,
+    DesignArgument,
+    SetOption,
+    parse_camera,
+    parse_overrides,
+)
+from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
 
-DesignArgument = Annotated[str, typer.Argument(metavar="DESIGN", help="A template's name or a TOML file.")]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="NAME=VALUE", help="Override a parameter, as in pitch_mm=60mil; may be repeated."
-    ),
-]
-
-CameraOption = Annotated[
-    str, typer.Option("--camera", metavar="WxH", help="Pixels of the camera whose picture the pattern fills.")
-]
-CAMERA_TEXT = "640x480"
 EXIT_NOT_PASSED = 1
-LARGEST_CAMERA_PX = 99_999
+EXAMPLES = (
+    "cmpdesign build tac3d -o mine --set pitch_mm=60mil",
+    "cmpdesign build mine.toml -o made --only svg,laser",
+)
 
 
 def build(
@@ -41,58 +41,64 @@ def build(
         str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
     ] = USUAL_NAMES,
     camera: CameraOption = CAMERA_TEXT,
+    preset: PresetOption = "balanced",
 ) -> None:
-    """Write a design's files: SVG, layout file, preview and report, or what --only names.
+    """Write a design's files.
 
+    These are the SVG, the layout file, a preview and a report, or what --only names.
     Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
     prints are read as the camera sees them before files are written. Exit code 1 when something will not work.
     """
+    from dataclasses import asdict
+
+    from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.building import build_files
 
-    names = chosen_products(only)
+    names, camera_px = chosen_products(only), parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
-    built = build_files(parameters, build_layout(parameters), output, names, parse_camera(camera))
+    layout = build_layout(parameters)
+    print_step(
+        f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers, digest {layout.digest[:12]}"
+    )
+    with working("building") as tell:
+        built = build_files(parameters, layout, output, names, camera_px, preset=preset, watch=_steps(tell))
     for path in built.written:
-        console().print(f"wrote {printable_path(path)}")
+        say(f"wrote {printable_path(path)}")
     for path in built.removed:
-        console().print(f"removed {printable_path(path)}, of an earlier build")
+        say(f"removed {printable_path(path)}, of an earlier build")
     print_report(built.report)
     for name, reading in built.readings.items():
-        console().print(f"{name} as made: {reading.line()}")
+        say(f"{name} as made: {reading.line()}")
     for path in built.of_other_designs:
         print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
     for finding in built.findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
-    if not built.works:
-        raise typer.Exit(EXIT_NOT_PASSED)
+    finish(
+        lambda: BuildDocument(
+            digest=layout.digest,
+            folder=printable_path(output),
+            written=tuple(map(printable_path, built.written)),
+            removed=tuple(map(printable_path, built.removed)),
+            report={name: value for name, value in asdict(built.report).items() if name != "findings"},
+            as_made=reading_parts(built.readings),
+            findings=finding_parts(built.findings),
+        ),
+        0 if built.works else EXIT_NOT_PASSED,
+    )
 
 
-def parse_camera(text: str) -> tuple[int, int]:
-    """Width and height of ``--camera``, px.
+def _steps(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """What is called with the name of every product before it is made."""
 
-    Raises:
-        CmpDesignError: another text than "640x480".
-    """
-    return parse_pixels("--camera", text, LARGEST_CAMERA_PX)
+    def watch(name: str) -> None:
+        tell(f"building: {name}")
+        print_step(f"{name} begins")
 
-
-def parse_overrides(texts: list[str] | None) -> dict[str, str]:
-    """Parse the values of ``--set`` to name -> text.
-
-    Raises:
-        CmpDesignError: a value has no name or no "=".
-    """
-    overrides: dict[str, str] = {}
-    for text in texts or []:
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip():
-            raise CmpDesignError(f"--set {text}: expected NAME=VALUE, as in pitch_mm=1.5mm")
-        overrides[name.strip()] = value.strip()
-    return overrides
+    return watch
 
 
 def print_report(report: DesignReport) -> None:
@@ -112,4 +118,4 @@ def print_report(report: DesignReport) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

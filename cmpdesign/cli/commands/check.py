@@ -7,19 +7,26 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.commands.build import (
+from cmpdesign.cli.commands.build import EXIT_NOT_PASSED
+from cmpdesign.cli.options.designs import (
     CAMERA_TEXT,
-    EXIT_NOT_PASSED,
     CameraOption,
     DesignArgument,
     SetOption,
     parse_camera,
     parse_overrides,
 )
-from cmpdesign.cli.terminal import console, print_warning
+from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
+
+EXAMPLES = (
+    "cmpdesign check tac3d --set pitch_mm=0.5mm",
+    "cmpdesign check mine.toml --read --camera 1280x960",
+)
 
 
 def check(
@@ -29,29 +36,41 @@ def check(
     read: Annotated[
         bool, typer.Option("--read", help="Draw and read the pads that laser, mold and print would make.")
     ] = False,
+    preset: PresetOption = "balanced",
 ) -> None:
     """List what cannot be made or read. Exit code 1 when something will not work."""
+    from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.building import check_products
 
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
-    checked = check_products(parameters, build_layout(parameters), camera_px, read=read)
+    layout = build_layout(parameters)
+    with working("drawing and reading pads" if read else "checking"):
+        checked = check_products(parameters, layout, camera_px, read=read, preset=preset)
     for name, reading in checked.readings.items():
-        console().print(f"{name} as made: {reading.line()}")
+        say(f"{name} as made: {reading.line()}")
     for name, reason in checked.unread.items():
         print_warning(f"{name} is not read: {reason}")
     _print_findings(checked.findings)
-    if not checked.works:
-        raise typer.Exit(EXIT_NOT_PASSED)
+    finish(
+        lambda: CheckDocument(
+            digest=layout.digest,
+            passed=checked.works,
+            as_made=reading_parts(checked.readings),
+            not_read=dict(checked.unread),
+            findings=finding_parts(checked.findings),
+        ),
+        0 if checked.works else EXIT_NOT_PASSED,
+    )
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
 
     if not findings:
-        console().print("nothing to report: it can be made and read")
+        say("nothing to report: it can be made and read")
         return
     table = Table(box=None, pad_edge=False)
     for heading in ("severity", "what", "value", "limit", "unit", "remedy"):
@@ -59,4 +78,4 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     for finding in findings:
         numbers = (f"{finding.value:.3g}", f"{finding.limit:.3g}")
         table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
-    console().print(table, soft_wrap=False)
+    say(table, soft_wrap=False)

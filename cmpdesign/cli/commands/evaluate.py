@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.command import Command
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, console, print_warning, printable_path
+from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.progress import progress_bar
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
+from cmpdesign.evaluate.defaults import USUAL_TRIALS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from cmpdesign.evaluate.designs import DesignEntry
-
 
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Repeat the article's experiments on a simulated sensor, and compare designs. Writes report.html and "
+    help="Repeat the article's experiments. On a simulated sensor; also compares designs. Writes report.html and "
     "report.json; an interrupted run goes on where it stopped.",
 )
 
@@ -36,10 +38,15 @@ Workers = Annotated[
 SensorOption = Annotated[
     str, typer.Option(metavar="NAME|FILE", help="Simulated sensor: shipped, or a TOML file.")
 ]
-Preset = Annotated[str, typer.Option(metavar="NAME", help=f"The extractor's preset: {', '.join(PRESETS)}.")]
 
 
-@app.command(cls=Command)
+@app.command(
+    cls=Command,
+    epilog=examples(
+        "cmpdesign evaluate precision -o precision --trials 10",
+        "cmpdesign evaluate precision -o quick --trials 1 --preset fast",
+    ),
+)
 def precision(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places for every object and cube.")] = USUAL_TRIALS[
@@ -48,37 +55,51 @@ def precision(
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
-    preset: Preset = "balanced",
+    preset: PresetOption = "balanced",
 ) -> None:
     """Five pressed objects against the truth, and the edge fitting error of a cube."""
-    document = _run_experiment("precision", output, trials, seed, workers, sensor, preset)
-    for mode, one in document["edge_fit_error_mm"].items():
-        console().print(
+    run = _run_experiment("precision", output, trials, seed, workers, sensor, preset)
+    for mode, one in run.document["edge_fit_error_mm"].items():
+        say(
             f"edge fitting error, {mode}: square {_format_number(one['square'])} mm, multicolor "
             f"{_format_number(one['multicolor'])} mm "
             f"({_format_percent(one['change_percent'])}; the article {_format_percent(one['article_change_percent'])})"
         )
+    run.finish()
 
 
-@app.command(cls=Command)
+@app.command(
+    cls=Command,
+    epilog=examples(
+        "cmpdesign evaluate response -o response",
+        "cmpdesign evaluate response -o quick --trials 1 --workers 1",
+    ),
+)
 def response(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places of the cube.")] = USUAL_TRIALS["response"],
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
-    preset: Preset = "balanced",
+    preset: PresetOption = "balanced",
 ) -> None:
     """How much of a shear the markers under a cube show."""
-    document = _run_experiment("response", output, trials, seed, workers, sensor, preset)
-    for case, one in document["response"].items():
-        console().print(
+    run = _run_experiment("response", output, trials, seed, workers, sensor, preset)
+    for case, one in run.document["response"].items():
+        say(
             f"response, {case}: square {_format_number(one['square'])}, multicolor {_format_number(one['multicolor'])} "
             f"({_format_percent(one['change_percent'])}; the article {_format_percent(one['article_change_percent'])})"
         )
+    run.finish()
 
 
-@app.command(cls=Command)
+@app.command(
+    cls=Command,
+    epilog=examples(
+        "cmpdesign evaluate reliability -o reliability --trials 300",
+        "cmpdesign evaluate reliability -o quick --trials 1 --seed 7",
+    ),
+)
 def reliability(
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places and lights for every mode.")] = USUAL_TRIALS[
@@ -87,30 +108,44 @@ def reliability(
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
-    preset: Preset = "balanced",
+    preset: PresetOption = "balanced",
 ) -> None:
     """How often both patterns are read under a ball that presses, then twists or shears."""
-    document = _run_experiment("reliability", output, trials, seed, workers, sensor, preset)
-    for mode, methods in document["modes"].items():
+    run = _run_experiment("reliability", output, trials, seed, workers, sensor, preset)
+    for mode, methods in run.document["modes"].items():
         counts = ", ".join(f"{name} {one['successful']}" for name, one in methods.items())
-        console().print(f"{mode}, of {trials}: {counts}")
+        say(f"{mode}, of {trials}: {counts}")
+    run.finish()
 
 
-@app.command(cls=Command)
+@app.command(
+    cls=Command,
+    epilog=examples(
+        "cmpdesign evaluate angles -o angles",
+        "cmpdesign evaluate angles -o angles --workers 2 --json",
+    ),
+)
 def angles(output: Output, workers: Workers = None) -> None:
     """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
-    document = _run_experiment("angles", output, USUAL_TRIALS["angles"], 0, workers, "tac3d", "balanced")
-    for name, one in document["cells"].items():
+    run = _run_experiment("angles", output, USUAL_TRIALS["angles"], 0, workers, "tac3d", "balanced")
+    for name, one in run.document["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
-            console().print(
+            say(
                 f"{name}, {what}: formula {limit['formula']:.1f}, first lost "
                 f"{_format_number(limit['measured'][largest], 1)} "
                 f"at {largest}"
             )
+    run.finish()
 
 
-@app.command(cls=Command)
+@app.command(
+    cls=Command,
+    epilog=examples(
+        "cmpdesign evaluate designs tac3d digit -o compared",
+        "cmpdesign evaluate designs mine.toml honeycomb -o compared --trials 1",
+    ),
+)
 def designs(
     design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
     output: Output,
@@ -120,19 +155,31 @@ def designs(
     seed: Seed = 0,
     workers: Workers = None,
     sensor: SensorOption = "tac3d",
-    preset: Preset = "balanced",
+    preset: PresetOption = "balanced",
 ) -> None:
     """Score any designs on one sensor: error, share measured, smallest feature, laser time."""
-    document = _run_experiment(
-        "designs", output, trials, seed, workers, sensor, preset, _design_entries(design)
-    )
-    for name, one in document["designs"].items():
+    run = _run_experiment("designs", output, trials, seed, workers, sensor, preset, _design_entries(design))
+    for name, one in run.document["designs"].items():
         error = one["surface_rms_mm"]["mean"]
         shown = "nothing read" if error is None else f"surface {1000 * error:.1f} um RMS"
-        console().print(
+        say(
             f"{printable_path(name)}: {shown}, {100 * one['measured']['mean']:.1f} % measured, "
             f"smallest feature {one['smallest_feature_mm']:.3f} mm, laser {_format_number(one['laser_time_s'], 0)} s"
         )
+    run.finish()
+
+
+class _Run(NamedTuple):
+    """The document of report.json, and the written files."""
+
+    document: Mapping[str, Any]
+    files: Sequence[Path]
+
+    def finish(self) -> None:
+        from cmpdesign.cli.documents.runs import EvaluateDocument
+
+        written = tuple(map(printable_path, self.files))
+        finish(lambda: EvaluateDocument(written=written, report=dict(self.document)))
 
 
 def _design_entries(designs: Sequence[str]) -> list[DesignEntry]:
@@ -160,23 +207,25 @@ def _run_experiment(
     sensor: str,
     preset: str,
     designs: Sequence[DesignEntry] = (),
-) -> Mapping[str, Any]:
-    """Run an experiment and print the written files; the document of the report."""
+) -> _Run:
+    """Run an experiment and print the written files."""
     from cmpdesign.evaluate.experiments import find_experiment, run_experiment
     from cmpdesign.evaluate.runner import RunOptions
     from cmpdesign.evaluate.simulated.sensor import load_sensor
 
-    if preset not in PRESETS:
-        raise CmpDesignError(f"--preset {preset}: unknown; there are {', '.join(PRESETS)}")
     options = RunOptions(trials, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
     try:
-        document, files = run_experiment(find_experiment(name, designs), options, output)
+        document, files = run_experiment(find_experiment(name, designs), options, output, bar=_trials_bar)
     except KeyboardInterrupt:
         print_warning("interrupted; the same command goes on where it stopped")
         raise typer.Exit(EXIT_INTERRUPTED) from None
     for path in files:
-        console().print(f"wrote {printable_path(path)}")
-    return document
+        say(f"wrote {printable_path(path)}")
+    return _Run(document, files)
+
+
+def _trials_bar(title: str, total: int, done: int) -> AbstractContextManager[Callable[[str], None]]:
+    return progress_bar(title, total, done=done, unit="trials")
 
 
 def _format_number(value: float | None, digits: int = 3) -> str:

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.image_options import MaxPixelsOption
-from cmpdesign.cli.response import METAVAR, parse_reading_response
-from cmpdesign.cli.terminal import console, print_document
+from cmpdesign.cli.options.images import MaxPixelsOption
+from cmpdesign.cli.options.response import METAVAR, parse_reading_response
+from cmpdesign.cli.terminal import finish, say
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
     from cmpdesign.products.laser.coupon.photo import CouponReading, MeasuredWidth, PatchKerf
+
+EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf coupon.json photo.jpg --face front --json")
 
 
 class SeenFace(StrEnum):
@@ -40,11 +42,11 @@ def kerf(
             help="How light became values. [default: as the file states, else sRGB, corrected by the edges]",
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead.")] = False,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure the kerf on a coupon, ready for the material's file."""
+    """Measure the kerf on a cut coupon. The lines are ready for the material's file."""
     from cmpdesign.api import workshop
+    from cmpdesign.cli.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon
 
     cut_coupon = load_coupon(coupon)
@@ -55,25 +57,23 @@ def kerf(
         response=parse_reading_response(response),
         max_pixels=max_pixels,
     )
-    if as_json:
-        print_document(json.dumps(_reading_to_json(cut_coupon, reading), indent=2) + "\n")
-        return
     _print_kerf_table(cut_coupon, reading)
-    console().print(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
+    say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:
-        console().print(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
+        say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
+    finish(lambda: KerfDocument.model_validate(_reading_to_json(cut_coupon, reading)))
 
 
 def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
     from rich.table import Table
 
     side = "back" if reading.from_back else "front"
-    console().print(
+    say(
         f"seen from the {side}, {reading.scale_px_mm:.1f} px in a mm, marks fit to {1000 * reading.fit_mm:.1f} um, "
         f"light: {reading.response}"
     )
     assumed = ", which is assumed" if coupon.taper_assumed else ""
-    console().print(
+    say(
         f"seen are the openings of the {reading.face}; the other face by a taper of {coupon.taper_deg:g} degrees"
         f"{assumed}, through {coupon.thickness_mm:g} mm"
     )
@@ -87,8 +87,8 @@ def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
         settings = (f"{patch.power_percent:g} %", f"{patch.speed_mm_s:g} mm/s", str(patch.passes))
         widths = [f"{width.value_mm:.4f}" for width in faces]
         table.add_row(patch.name, *settings, f"{sigma_mm:.4f}", *widths)
-    console().print(table)
-    console().print("kerfs in mm; x of cuts along y, y of cuts along x")
+    say(table)
+    say("kerfs in mm; x of cuts along y, y of cuts along x")
 
 
 def _material_file_lines(reading: CouponReading, patch_kerf: PatchKerf, photo: str) -> str:

@@ -9,23 +9,34 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
-from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
-from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.options.images import (
+    ChannelsOption,
+    FramesOption,
+    MaxPixelsOption,
+    PresetOption,
+    SideOption,
+)
+from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
-    exit_with_status,
+    exit_status,
     print_written,
     recover_and_report,
     require_positive,
     run_with_progress,
 )
-from cmpdesign.cli.terminal import console, print_warning
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.api.sequences import Followed
     from extractor.layout.reference import Reference
+
+EXAMPLES = (
+    "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
+    "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --frames 100",
+)
 
 
 def reconstruct(
@@ -39,7 +50,8 @@ def reconstruct(
         str,
         typer.Argument(
             metavar="SOURCE",
-            help="A video, a folder of images, a camera's number, or rtsp://...; one for each view, with commas.",
+            help='A folder of pictures, a pattern such as "run/*.png", a video, a camera\'s number, or rtsp://...; '
+            "one for each view, with commas.",
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
@@ -65,8 +77,9 @@ def reconstruct(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    frames: FramesOption = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
@@ -77,7 +90,12 @@ def reconstruct(
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
-    """Positions, displacements and normals in mm; exit code 0 done, 1 ended early or nothing found, 2 bad input."""
+    """Reconstruct a surface from several views.
+
+    Positions, displacements and normals in mm. Exit code: 0 done, 1 ended early or nothing found, 2 bad input.
+    """
+    from cmpdesign.cli.documents.runs import ReconstructDocument
+
     if recover:
         from extractor import load_layout
 
@@ -91,10 +109,11 @@ def reconstruct(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    reading = Reading(fps, frames, cold, known, side, channels, max_pixels, frame_id, with_images)
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
     shape = ShapeOptions(from_rest, flatness_mm, model_px, surface)
     job = ReconstructJob(load_layout(layout), rig, rest, source, output, reading, shape)
     run = job.prepare()
+    print_step(f"{run.source.name} is open, the views are placed")
     for warning in run.warnings:
         print_warning(warning)
     try:
@@ -103,8 +122,11 @@ def reconstruct(
         with suppress(OutputError):
             print_written(_print_followed(write_summary(run, job))[1:])
         raise
-    print_written(_print_followed(write_summary(run, job)))
-    exit_with_status(run)
+    followed = write_summary(run, job)
+    print_written(_print_followed(followed))
+    code = exit_status(run)
+    written = tuple(map(printable_path, followed.written))
+    finish(lambda: ReconstructDocument(**followed.summary, written=written), code)
 
 
 def _points_in(layout: Reference) -> int:
@@ -161,4 +183,4 @@ def _print_summary(summary: Mapping[str, Any]) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

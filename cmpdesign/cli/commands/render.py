@@ -11,15 +11,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.pixels import parse_pixels
-from cmpdesign.cli.response import METAVAR, parse_response
-from cmpdesign.cli.terminal import console, printable_path
+from cmpdesign.cli.options.designs import complete_scene
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.options.pixels import parse_pixels
+from cmpdesign.cli.options.response import METAVAR, parse_response
+from cmpdesign.cli.terminal import finish, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
     from cmpdesign.scene import Scene
 
+EXAMPLES = (
+    "cmpdesign render layout.json -o sample.png --pitch 22 --tilt 15 --noise 2",
+    "cmpdesign render layout.json -o pressed.png --scene pressed-ball --truth pressed.npz",
+)
 LARGEST_SIDE_PX = 9999
 # Options with a key in a scene file.
 SCENE_FILE_KEYS = {
@@ -61,7 +66,11 @@ def render(
     ],
     scene: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Scene TOML, or the name of a scene template."),
+        typer.Option(
+            metavar="FILE",
+            help="Scene TOML, or the name of a scene template: cmpdesign templates --kind scenes.",
+            autocompletion=complete_scene,
+        ),
     ] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")
@@ -108,7 +117,7 @@ def render(
     ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
-    """Render the pattern as a camera sees it: seeded, exact to a thousandth of a pixel."""
+    """Render a pattern as a camera sees it. Seeded, exact to a thousandth of a pixel."""
     if scene is not None:
         from cmpdesign.cli.commands.render_scene import render_scene_file
 
@@ -157,6 +166,7 @@ def _option_names_in_errors() -> Iterator[None]:
 
 def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: Path | None) -> None:
     """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
+    from cmpdesign.cli.documents.runs import RenderDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import encode_image
     from cmpdesign.scene import render as render_scene
@@ -165,11 +175,18 @@ def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: 
     rendered = render_scene(scene, size=pixels)
     if truth is not None:
         save_truth(rendered.truth, truth)
-        console().print(f"wrote {printable_path(truth)}")
+        say(f"wrote {printable_path(truth)}")
     write_file(output, encode_image(rendered.image, output))
     visible = int(rendered.truth.visible.sum())
-    console().print(
-        f"wrote {printable_path(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible"
+    say(f"wrote {printable_path(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible")
+    finish(
+        lambda: RenderDocument(
+            written=tuple(printable_path(path) for path in (truth, output) if path is not None),
+            size_px=pixels,
+            frames=1,
+            fps=None,
+            visible=(visible,),
+        )
     )
 
 

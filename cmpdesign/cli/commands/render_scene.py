@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.progress import progress_bar
+from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -50,6 +49,8 @@ def render_scene_file(
 
 
 def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
+    import numpy as np
+
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import encode_image, require_image_kind
     from cmpdesign.scene import render, save_truth
@@ -63,24 +64,40 @@ def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
         print_warning(warning)
     if truth is not None:
         save_truth(rendered.truth, truth)
-        console().print(f"wrote {printable_path(truth)}")
     write_file(output, encode_image(rendered.image, output))
-    console().print(
-        f"wrote {printable_path(output)}: {_format_size(file)}, {_format_visible_count(rendered.truth)}"
+    visible = np.atleast_2d(rendered.truth.visible).sum(axis=1).tolist()
+    _finish(
+        file, output, truth, f"{_format_size(file)}, {_format_visible_count(rendered.truth)}", tuple(visible)
+    )
+
+
+def _finish(
+    file: SceneFile, output: Path, truth: Path | None, words: str, visible: tuple[int, ...] | None
+) -> None:
+    """Print what was written."""
+    from cmpdesign.cli.documents.runs import RenderDocument
+
+    if truth is not None:
+        say(f"wrote {printable_path(truth)}")
+    say(f"wrote {printable_path(output)}: {words}")
+    finish(
+        lambda: RenderDocument(
+            written=tuple(printable_path(path) for path in (truth, output) if path is not None),
+            size_px=file.size_px,
+            frames=1 if file.fps is None else file.frames,
+            fps=file.fps,
+            visible=visible,
+        )
     )
 
 
 def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.scene.files.sequence import write_sequence
 
-    with _progress_bar(file.frames) as advance:
-        warnings = write_sequence(file, output, truth, advance)
-    if truth is not None:
-        console().print(f"wrote {printable_path(truth)}")
+    with progress_bar("rendering", file.frames, unit="frames") as advance:
+        warnings = write_sequence(file, output, truth, lambda: advance(""))
     _print_scene_warnings(warnings, file)
-    console().print(
-        f"wrote {printable_path(output)}: {file.frames} frames of {_format_size(file)} at {file.fps:g} fps"
-    )
+    _finish(file, output, truth, f"{file.frames} frames of {_format_size(file)} at {file.fps:g} fps", None)
 
 
 def _print_scene_warnings(warnings: dict[str, int], file: SceneFile) -> None:
@@ -101,18 +118,3 @@ def _format_visible_count(truth: Truth) -> str:
     if truth.visible.ndim == 1:
         return f"{truth.visible.sum()} markers visible"
     return f"{' + '.join(str(n) for n in truth.visible.sum(axis=1))} markers visible in {len(truth.visible)} views"
-
-
-@contextmanager
-def _progress_bar(total: int) -> Iterator[Callable[[], None]]:
-    """A progress bar on stderr (if a terminal); yields the function to call per frame."""
-    terminal = console(stderr=True)
-    if not terminal.is_terminal:
-        yield lambda: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("rendering"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=terminal, transient=True) as progress:
-        task = progress.add_task("rendering", total=total)
-        yield lambda: progress.update(task, advance=1)

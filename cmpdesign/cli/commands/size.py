@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.terminal import console, print_document, printable_path
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.terminal import finish, printable_path, say, say_text
+
+EXAMPLES = (
+    "cmpdesign size --camera 1280x960 --view 24x18mm",
+    "cmpdesign size --camera 640x480 --view 20x15mm --error 1um -o sized.toml",
+)
 
 
 def size(
@@ -29,9 +33,9 @@ def size(
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="TOML file to write, which build takes."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead.")] = False,
 ) -> None:
     """Which pitch and how many layers for a camera and its field of view, with the error that markers then have."""
+    from cmpdesign.cli.documents.designs import SizeDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.proposal import camera_design
 
@@ -39,16 +43,14 @@ def size(
     proposal = camera_design.size(camera, view, error, blur_px=blur, noise=noise)
     if output is not None:
         write_file(output, proposal.to_toml())
-    if as_json:
-        print_document(json.dumps(proposal.to_json(), indent=2, ensure_ascii=False) + "\n")
-        return
     from rich.table import Table
 
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in proposal.figures().items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)
     if output is not None:
-        console().print(f"wrote {printable_path(output)}")
+        say(f"wrote {printable_path(output)}")
     else:
-        print_document("\n" + proposal.to_toml())
+        say_text("\n" + proposal.to_toml())
+    finish(lambda: SizeDocument.model_validate(proposal.to_json()))

@@ -9,33 +9,40 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption, SideOption
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.recording_options import OUTPUT_HELP, FrameIdOption, WithImagesOption
-from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.options.images import (
+    ChannelsOption,
+    FramesOption,
+    MaxPixelsOption,
+    PresetOption,
+    SideOption,
+    SourcesArgument,
+)
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
-    exit_with_status,
+    exit_status,
     print_written,
     recover_and_report,
     require_positive,
     run_with_progress,
 )
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.api.sequences import Followed
 
+EXAMPLES = (
+    "cmpdesign track layout.json frames -o run.npz",
+    "cmpdesign track layout.json press.mp4 -o run.csv --overlay found.mp4 --frames 100",
+)
+
 
 def track(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="SOURCE", help="A video, a folder of images, a camera's number, or rtsp://..."
-        ),
-    ],
+    source: SourcesArgument,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
     rest: Annotated[
         str | None,
@@ -52,7 +59,7 @@ def track(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="Stop after this many frames.")] = None,
+    frames: FramesOption = None,
     overlay: Annotated[
         Path | None, typer.Option(metavar="VIDEO", help="Video of what was found: .mp4, .avi or .mkv.")
     ] = None,
@@ -60,6 +67,7 @@ def track(
         Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
@@ -70,7 +78,12 @@ def track(
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
 ) -> None:
-    """Follow a pattern; exit code 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
+    """Follow a pattern through a sequence.
+
+    Exit code: 0 done, 1 ended early or nothing tracked, 2 bad input or full disk.
+    """
+    from cmpdesign.cli.documents.runs import TrackDocument
+
     if recover:
         from extractor import load_layout
 
@@ -83,17 +96,22 @@ def track(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    reading = Reading(fps, frames, cold, known, side, channels, max_pixels, frame_id, with_images)
-    job = TrackJob(load_layout(layout), source, output, reading, rest, mm_per_px, overlay, quiver)
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
+    job = TrackJob(load_layout(layout), tuple(source), output, reading, rest, mm_per_px, overlay, quiver)
     run = job.prepare()
+    print_step(f"{run.source.name} is open")
     try:
         run_with_progress(run, "tracking")
     except OutputError:  # the summary covers the frames so far
         with suppress(OutputError):
             print_written(_print_followed(write_summary(run, job), quiver)[1:])
         raise
-    print_written(_print_followed(write_summary(run, job), quiver))
-    exit_with_status(run)
+    followed = write_summary(run, job)
+    print_written(_print_followed(followed, quiver))
+    code = exit_status(run)
+    finish(
+        lambda: TrackDocument(**followed.summary, written=tuple(map(printable_path, followed.written))), code
+    )
 
 
 def _print_followed(followed: Followed, quiver: Path | None) -> tuple[Path, ...]:
@@ -136,4 +154,4 @@ def _print_summary(summary: Mapping[str, Any]) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    console().print(table)
+    say(table)

@@ -5,68 +5,66 @@ An image that shows the code of a print sheet is judged as a print: its layout, 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.image_options import ChannelsOption, MaxPixelsOption
-from cmpdesign.cli.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.options.images import (
+    ChannelsOption,
+    MaxPixelsOption,
+    PresetOption,
+    SourcesArgument,
+)
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.cli.progress import progress_bar
 from cmpdesign.cli.terminal import (
     EXIT_BAD_INPUT,
-    console,
     error_on_one_line,
-    print_document,
+    finish,
     print_error,
+    print_step,
     printable_path,
+    say_text,
 )
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.api.pictures import Verifier
+    from cmpdesign.cli.documents.reading import VerifyDocument
     from cmpdesign.files.images import Image
     from cmpdesign.products.sheet.verdict import SheetVerdict
+    from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
+    from cmpdesign.tracking.source_images import SourceImage
     from extractor.layout.reference import Reference
 
+EXAMPLES = (
+    "cmpdesign verify layout.json sample.png -o checked",
+    'cmpdesign verify layout.json frames "more/*.png" --json',
+)
 EXIT_NOT_VERIFIED = 1
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """The name of an image with its verdict, or with the error of reading the image."""
-
-    name: str
-    verdict: Verdict | SheetVerdict | None
-    error: str | None
-
-    @property
-    def exit_code(self) -> int:
-        """0 verified, 1 not verified, 2 not readable."""
-        if self.verdict is None:
-            return EXIT_BAD_INPUT
-        return 0 if self.verdict.verified else EXIT_NOT_VERIFIED
-
-    def to_json(self) -> dict[str, Any]:
-        if self.verdict is None:
-            return {"image": self.name, "verified": False, "error": self.error}
-        return {"image": self.name, **self.verdict.to_json()}
 
 
 def verify(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
-    images: Annotated[
-        list[Path],
-        typer.Argument(metavar="IMAGE...", help="Color pictures, 8 or 16 bits, or folders of pictures."),
-    ],
+    images: SourcesArgument,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
     debug: Annotated[Path | None, typer.Option(help="Folder for a picture of every stage.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Bundle for a report of a problem, .zip: the pictures as they are, EXIF included, the layout, "
+            "settings, versions and the stages.",
+        ),
+    ] = None,
     min_share: Annotated[
         float, typer.Option(min=0, max=1, help="Share of the visible markers that must be measured.")
     ] = 0.9,
@@ -76,85 +74,160 @@ def verify(
             min=0, help="The pictures are print sheets of this resolution (0: unknown), whatever files say."
         ),
     ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Read this many frames of each video, camera or stream. [default: all of a video, else one]",
+        ),
+    ] = None,
+    preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     channels: ChannelsOption = "bgr",
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from cmpdesign.api.pictures import Verifier
-    from cmpdesign.files.image_folders import without_folders
+    from cmpdesign.inputs.sources import name_sources
+    from cmpdesign.tracking.source_images import count_images, source_images
     from extractor import load_layout
 
+    require_suffix("--report", report, [".zip"])
     reference, known = load_layout(layout), parse_reading_response(response)
-    verifier = _ImageVerifier(
-        Verifier(reference, min_share, known, channels, sheet_dpi, max_pixels), output, debug
-    )
-    images = without_folders(images)
-    names = _unique_names([path.stem for path in images])
-    outcomes = [
-        verifier.verify_image(path, name)
-        for path, name in _with_progress(list(zip(images, names, strict=True)))
-    ]
-    report = _outcomes_to_json(reference, outcomes, min_share)
+    judge = Verifier(reference, min_share, known, channels, sheet_dpi, max_pixels, preset)
+    bundle = None
+    if report is not None:
+        bundle = _new_report(layout, _Settings(preset, response, channels, min_share))
+    verifier = _ImageVerifier(judge, _Folders(output, debug), bundle)
+    sources = name_sources(images)
+    outcomes = []
+    with progress_bar("verifying", count_images(sources, frames), unit="pictures") as advance:
+        for image in source_images(sources, frames, max_pixels):
+            outcomes.append(verifier.verify_image(image))
+            advance("")
+    document = _to_document(reference, outcomes, min_share)
     if output is not None:
         from cmpdesign.files.atomic import write_file
 
-        write_file(output / "verify.json", report)
+        write_file(output / "verify.json", document.to_json())
+    if report is not None and bundle is not None:
+        bundle.write(report)
     # Printed after the progress bar has ended, because the bar redirects standard output.
-    print_document(report if as_json else _format_outcomes(outcomes))
-    raise typer.Exit(max(outcome.exit_code for outcome in outcomes))
+    say_text("".join(outcome.text for outcome in outcomes))
+    if report is not None:
+        say_text(f"wrote {printable_path(report)}\n")
+    finish(lambda: document, max(outcome.exit_code for outcome in outcomes))
+
+
+class _Folders(NamedTuple):
+    """Folders for overlays and for pictures of stages."""
+
+    output: Path | None
+    debug: Path | None
+
+
+class _Settings(NamedTuple):
+    """The options that decide what is read, as a report keeps them."""
+
+    preset: str
+    response: str | None
+    channels: str
+    min_share: float
+
+
+def _new_report(layout: Path, settings: _Settings) -> ProblemReport:
+    from cmpdesign.inputs.files import read_text
+    from cmpdesign.reading.problem_report import ProblemReport
+
+    return ProblemReport(read_text(layout), settings._asdict())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one image.
+
+    Attributes:
+        fields: of the image's part of the document.
+        text: lines for people; empty for an image that was not read.
+        exit_code: 0 verified, 1 not verified, 2 not readable.
+    """
+
+    fields: dict[str, Any]
+    text: str
+    exit_code: int
 
 
 @dataclass(frozen=True, eq=False)
 class _ImageVerifier:
-    """Verifies image files and writes their pictures."""
+    """Verifies images, and writes their pictures and the report of a problem."""
 
-    verifier: Verifier
-    output: Path | None
-    debug: Path | None
+    judge: Verifier
+    folders: _Folders
+    bundle: ProblemReport | None
 
-    def verify_image(self, path: Path, name: str) -> Outcome:
+    def verify_image(self, source: SourceImage) -> Outcome:
         """Verify one image and write its pictures; an unreadable image is reported on stderr."""
-        from cmpdesign.files.images import ImageFileError
+        name = printable_path(source.name)
+        if source.image is None:
+            print_error(source.problem)
+            problem = error_on_one_line(source.problem)
+            self._report_unread(source, problem)
+            return Outcome({"image": name, "verified": False, "error": problem}, "", EXIT_BAD_INPUT)
+        image = self.judge.read(source.image)
+        verdict = self.judge.judge(image, source.path)
+        self._keep(image, source, verdict)
+        print_step(f"{name} judged")
+        return Outcome(
+            {"image": name, **verdict.to_json()},
+            f"{name}: {_format_verdict(verdict)}\n",
+            0 if verdict.verified else EXIT_NOT_VERIFIED,
+        )
+
+    def _report_unread(self, source: SourceImage, problem: str) -> None:
+        """Put the file of an image that cannot be read into the report, if there is a file."""
+        from cmpdesign.errors import InputError
+
+        if self.bundle is not None and source.path is not None:
+            with suppress(InputError):
+                self.bundle.add(*source.picture(), {"verified": False, "error": problem}, {})
+
+    def _keep(self, image: Image, source: SourceImage, verdict: Verdict | SheetVerdict) -> None:
+        """Write the pictures of a pattern, and add the image to the report."""
         from cmpdesign.reading.verify import Verdict
 
-        try:
-            image = self.verifier.read(path)
-        except ImageFileError as error:
-            print_error(error)
-            return Outcome(printable_path(path), None, error_on_one_line(error))
-        verdict = self.verifier.judge(image, path)
+        stages: Mapping[str, Image] = {}
         if isinstance(verdict, Verdict):
-            _write_pictures(image, self.verifier.reference, verdict, name, self.output, self.debug)
-        return Outcome(printable_path(path), verdict, None)
+            reference = self.judge.reference
+            _write_pictures(image, reference, verdict, source.stem, self.folders)
+            if self.bundle is not None:
+                from extractor.draw import draw_stages
+
+                stages = draw_stages(image, reference, verdict.markers)
+        if self.bundle is not None:
+            self.bundle.add(*source.picture(), verdict.to_json(), stages)
 
 
 def _write_pictures(
-    image: Image, reference: Reference, verdict: Verdict, name: str, output: Path | None, debug: Path | None
+    image: Image, reference: Reference, verdict: Verdict, name: str, folders: _Folders
 ) -> None:
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
 
-    if output is not None:
+    if folders.output is not None:
         from extractor.draw import draw_markers
 
-        write_file(output / f"{name}.overlay.png", to_png(draw_markers(image, reference, verdict.markers)))
-    if debug is not None:
+        overlay = to_png(draw_markers(image, reference, verdict.markers))
+        write_file(folders.output / f"{name}.overlay.png", overlay)
+    if folders.debug is not None:
         from extractor.draw import draw_stages
 
         pictures = draw_stages(image, reference, verdict.markers)
         for number, (stage, picture) in enumerate(pictures.items(), start=1):
-            write_file(debug / f"{name}.{number}-{stage}.png", to_png(picture))
-
-
-def _format_outcomes(outcomes: list[Outcome]) -> str:
-    """One line for every image that was read, and one for each hint on a pattern that was found."""
-    return "".join(
-        f"{item.name}: {_format_verdict(item.verdict)}\n" for item in outcomes if item.verdict is not None
-    )
+            write_file(folders.debug / f"{name}.{number}-{stage}.png", to_png(picture))
 
 
 def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
+    """One line, and one for each hint on a pattern that was found."""
     from cmpdesign.reading.verify import Verdict
 
     if not isinstance(verdict, Verdict):
@@ -168,40 +241,15 @@ def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
     return "".join([line, *(f"\n  {hint}" for hint in hints if hint not in head)])
 
 
-def _outcomes_to_json(reference: Reference, outcomes: list[Outcome], min_share: float) -> str:
-    document = {
-        "format": "cmp-verification",
-        "version": 1,
-        "pattern": reference.pattern,
-        "digest": reference.digest,
-        "min_share": min_share,
-        "verified": all(outcome.exit_code == 0 for outcome in outcomes),
-        "images": [outcome.to_json() for outcome in outcomes],
-    }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+def _to_document(reference: Reference, outcomes: list[Outcome], min_share: float) -> VerifyDocument:
+    from cmpdesign.cli.documents.reading import ImagePart, VerifyDocument
 
-
-def _unique_names(stems: list[str]) -> list[str]:
-    """Names for the written files: the stems, numbered where several images have the same stem."""
-    names: list[str] = []
-    for stem in stems:
-        name, number = stem, 1
-        while name in names:
-            number += 1
-            name = f"{stem}-{number}"
-        names.append(name)
-    return names
-
-
-def _with_progress(items: list[tuple[Path, str]]) -> Iterable[tuple[Path, str]]:
-    """The items, with a progress bar if there are several and stderr is a terminal."""
-    terminal = console(stderr=True)
-    if len(items) < 2 or not terminal.is_terminal:
-        return items
-    return _items_with_bar(items)
-
-
-def _items_with_bar(items: list[tuple[Path, str]]) -> Iterator[tuple[Path, str]]:
-    from rich.progress import track
-
-    yield from track(items, description="verifying", console=console(stderr=True), transient=True)
+    return VerifyDocument(
+        format="cmp-verification",
+        version=1,
+        pattern=reference.pattern,
+        digest=reference.digest,
+        min_share=min_share,
+        verified=all(outcome.exit_code == 0 for outcome in outcomes),
+        images=tuple(ImagePart(**outcome.fields) for outcome in outcomes),
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.products.as_made.made_pad import MadePad, make_pad
+
+if TYPE_CHECKING:
+    from extractor.presets import Preset
 
 FOLDER = "as-made"
 # Share of the picture's height or width that the pad fills.
@@ -74,7 +77,7 @@ class PadReading:
         return f"{self.share:.1%} of the markers measured from the {self.side_seen}; {'; '.join(values)}"
 
 
-def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading:
+def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX, preset: Preset = "balanced") -> PadReading:
     """Draw a made pad as a camera sees it that the pad fills, and read the picture with the nominal layout.
 
     The picture has no noise, so the deviations are systematic.
@@ -93,9 +96,8 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX) -> PadReading
     camera = Camera(scale * pitch_mm, camera_turn_deg)
     scene = Scene(pad.layout, camera, optics=Optics(BLUR_PX))
     rendered = render(replace(scene, background=Plain(scene.ink(BLACK))), size=camera_px)
-    markers = Extractor(parse_layout(layout_to_json(replace(nominal, as_made=None))), side="either").extract(
-        rendered.image
-    )
+    reference = parse_layout(layout_to_json(replace(nominal, as_made=None)))
+    markers = Extractor(reference, preset, side="either").extract(rendered.image)
     visible = nominal.present & rendered.truth.visible
     measured = visible & (markers.status == Status.MEASURED)
     deviation = np.hypot(*(markers.xy_px - rendered.truth.marker_xy_px)[measured].T)
@@ -125,7 +127,9 @@ class PadReadings:
     readings: dict[str, PadReading]
 
 
-def read_pads(pads: Iterable[MadePad], camera_px: tuple[int, int] = CAMERA_PX) -> PadReadings:
+def read_pads(
+    pads: Iterable[MadePad], camera_px: tuple[int, int] = CAMERA_PX, preset: Preset = "balanced"
+) -> PadReadings:
     """Read pads; a pad whose cells are no triangles is not read, and its markers stay nominal."""
     from cmpdesign.files.layout_json import layout_to_json
 
@@ -133,7 +137,7 @@ def read_pads(pads: Iterable[MadePad], camera_px: tuple[int, int] = CAMERA_PX) -
     for pad in pads:
         found.figures[pad.product] = pad.figures()
         if pad.nominal.cell_corners.shape[1] == 3:
-            reading = read_pad(pad, camera_px)
+            reading = read_pad(pad, camera_px, preset)
             found.readings[pad.product] = reading
             found.findings.extend(reading_findings(pad, reading))
             found.figures[pad.product] |= {"camera_px": list(camera_px), **reading.figures()}

@@ -65,7 +65,7 @@ def judge_sheet(image: Image, path: Path | None, digest: str, dpi: float | None 
 
     Args:
         image: (H, W, 3) BGR, uint8 or uint16.
-        path: the picture's file, which may state the resolution; None: there is no file.
+        path: the picture's file, which may state the resolution; None without a file of its own.
         digest: digest of the layout.
         dpi: resolution in place of the file's; 0: unknown, the file's resolution is ignored.
     """

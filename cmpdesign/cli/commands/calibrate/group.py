@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from cmpdesign.cli.command import Command
-from cmpdesign.cli.commands.calibrate.pattern import pattern
+from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.commands.calibrate import pattern
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -19,4 +19,4 @@ def group() -> None:
     """Keep the command's name although the group has one command."""
 
 
-app.command("pattern", cls=Command)(pattern)
+app.command("pattern", cls=Command, epilog=examples(*pattern.EXAMPLES))(pattern.pattern)

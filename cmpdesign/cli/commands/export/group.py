@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import typer
 
-from cmpdesign.cli.command import Command
-from cmpdesign.cli.commands.export.lerobot import lerobot
-from cmpdesign.cli.commands.export.zarr import zarr
+from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.commands.export import lerobot, zarr
 
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Export runs as data sets for the training of policies.",
 )
-app.command("lerobot", cls=Command)(lerobot)
-app.command("zarr", cls=Command)(zarr)
+app.command("lerobot", cls=Command, epilog=examples(*lerobot.EXAMPLES))(lerobot.lerobot)
+app.command("zarr", cls=Command, epilog=examples(*zarr.EXAMPLES))(zarr.zarr)

@@ -9,10 +9,16 @@ from typing import Annotated
 import typer
 
 from cmpdesign.cli.commands.export.options import ImagesOption, RunsArgument
-from cmpdesign.cli.image_options import MaxPixelsOption
+from cmpdesign.cli.options.images import MaxPixelsOption
+from cmpdesign.cli.progress import working
 from cmpdesign.cli.run_progress import require_positive
-from cmpdesign.cli.terminal import console, print_warning, printable_path
+from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
 from cmpdesign.inputs.files import MOST_PIXELS
+
+EXAMPLES = (
+    "cmpdesign export lerobot run1.npz run2.npz -o dataset",
+    'cmpdesign export lerobot run1.npz -o dataset --task "press" --images frames',
+)
 
 
 def lerobot(
@@ -29,6 +35,7 @@ def lerobot(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Write a data set that LeRobot loads: displacement, position and status of every marker, on wish images."""
+    from cmpdesign.cli.documents.runs import ExportDocument
     from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
 
@@ -36,10 +43,16 @@ def lerobot(
     require_one_kind(runs)
     rate = frames_per_second(runs) if fps is None else tidy_fps(fps)
     about = DataSet(rate, task, robot, tuple(images or ()), max_pixels)
-    frames = write_lerobot(runs, output, about)
+    with working("exporting"):
+        frames = write_lerobot(runs, output, about)
     _warn_of_uneven_times(runs, rate)
-    console().print(
+    say(
         f"wrote {printable_path(output)}: {len(runs)} episodes, {frames} frames at {rate:g} frames per second"
+    )
+    finish(
+        lambda: ExportDocument(
+            kind="lerobot", written=printable_path(output), episodes=len(runs), frames=frames, fps=rate
+        )
     )
 
 

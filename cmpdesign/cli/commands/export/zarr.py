@@ -8,10 +8,16 @@ from typing import Annotated
 import typer
 
 from cmpdesign.cli.commands.export.options import ImagesOption, RunsArgument
-from cmpdesign.cli.image_options import MaxPixelsOption
-from cmpdesign.cli.paths import require_suffix
-from cmpdesign.cli.terminal import console, printable_path
+from cmpdesign.cli.options.images import MaxPixelsOption
+from cmpdesign.cli.options.paths import require_suffix
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, printable_path, say
 from cmpdesign.inputs.files import MOST_PIXELS
+
+EXAMPLES = (
+    "cmpdesign export zarr run1.npz run2.npz -o buffer.zarr",
+    "cmpdesign export zarr run1.npz -o buffer.zarr --images frames",
+)
 
 
 def zarr(
@@ -23,8 +29,15 @@ def zarr(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Write a replay buffer: data/tactile_* with the frames of all runs, meta/episode_ends."""
+    from cmpdesign.cli.documents.runs import ExportDocument
     from cmpdesign.tracking.export.zarr_buffer import write_zarr
 
     require_suffix("--output", output, [".zarr"])
-    frames = write_zarr(runs, output, tuple(images or ()), max_pixels)
-    console().print(f"wrote {printable_path(output)}: {len(runs)} episodes, {frames} frames")
+    with working("exporting"):
+        frames = write_zarr(runs, output, tuple(images or ()), max_pixels)
+    say(f"wrote {printable_path(output)}: {len(runs)} episodes, {frames} frames")
+    finish(
+        lambda: ExportDocument(
+            kind="zarr", written=printable_path(output), episodes=len(runs), frames=frames, fps=None
+        )
+    )

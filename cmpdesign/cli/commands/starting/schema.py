@@ -1,11 +1,34 @@
-"""``cmpdesign schema``: prints the JSON Schema of a design."""
+"""``cmpdesign schema``: prints the JSON Schema of a design, or of what a command prints with ``--json``."""
 
 from __future__ import annotations
 
+from typing import Annotated
 
-def schema() -> None:
-    """Print the JSON Schema of a design's TOML file, for editors."""
-    from cmpdesign.cli.terminal import print_document
-    from cmpdesign.design.design import design_schema_text
+import typer
 
-    print_document(design_schema_text())
+from cmpdesign.cli.terminal import print_document
+
+EXAMPLES = ("cmpdesign schema", "cmpdesign schema evaluate designs")
+
+
+def schema(
+    command: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[COMMAND...]",
+            help="A command, as in verify, or message for the lines on stderr. [default: a design's TOML file]",
+        ),
+    ] = None,
+) -> None:
+    """Print a JSON Schema.
+
+    That of a design's TOML file, for editors, or that of what COMMAND prints with --json.
+    """
+    if not command:
+        from cmpdesign.design.design import design_schema_text
+
+        print_document(design_schema_text())
+        return
+    from cmpdesign.cli.documents.registry import document_schema_text
+
+    print_document(document_schema_text(" ".join(command)))

@@ -27,3 +27,18 @@ SideOption = Annotated[
     Literal["designed", "front", "back", "either"],
     typer.Option("--side", help="Side of the pattern that the camera sees; designed: as the layout says."),
 ]
+
+PresetOption = Annotated[
+    Literal["fast", "balanced", "accurate"],
+    typer.Option("--preset", help="Less time or less error; the same ids."),
+]
+
+FramesOption = Annotated[int | None, typer.Option("--frames", min=1, help="Stop after this many frames.")]
+
+SourcesArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SOURCE",
+        help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
+    ),
+]

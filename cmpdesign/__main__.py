@@ -1,0 +1,7 @@
+"""``python -m cmpdesign``: the program ``cmpdesign``."""
+
+from __future__ import annotations
+
+from cmpdesign.cli import main
+
+main()

@@ -1,0 +1,41 @@
+"""The base of all documents, and the message that stands for an error or a warning."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Part(BaseModel):
+    """An object within a document. Unknown fields and values that are not finite are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _require_format(schema: dict[str, Any]) -> None:
+    schema["required"] = ["format", "version", *schema.get("required", [])]
+
+
+class Document(Part):
+    """What a command prints with ``--json``.
+
+    A document has the fields ``format`` and ``version``. A version is raised when a field goes, or changes its meaning
+    or type; fields may be added without that.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_require_format)
+
+    def to_json(self) -> str:
+        """The text of the document."""
+        return self.model_dump_json(indent=2) + "\n"
+
+
+class Message(Document):
+    """One line on stderr with ``--json``."""
+
+    format: Literal["cmp-message"] = "cmp-message"
+    version: Literal[1] = 1
+    level: Literal["error", "warning", "step"] = Field(description="step: what was done, with --verbose.")
+    text: str
+    exit_code: int | None = Field(None, description="Of an error: 2 bad input, 130 stopped by Ctrl-C.")

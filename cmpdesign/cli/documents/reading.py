@@ -1,0 +1,123 @@
+"""Documents of the commands that read pictures one by one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from cmpdesign.cli.documents.document import Document, Part
+
+
+class QualityPart(Part):
+    """Properties of a picture; null where unknown."""
+
+    blur_px: float | None = Field(description="Sigma of the Gaussian that optics and pixel make together.")
+    noise: float | None = Field(description="Standard deviation in 255ths.")
+    contrast: float | None = Field(description="Between the weakest inks, in 255ths.")
+    clipping: float | None = Field(description="Share of the cells that are overexposed.")
+    evenness: float | None = Field(description="Of the light, 0 to 1.")
+    edge_px: float | None = Field(description="Length of a gridline.")
+    weakest_inks: tuple[str, ...]
+    hints: tuple[str, ...] = Field(description="What limits the result, and what to do.")
+
+
+class SheetPart(Part):
+    """What a picture of a print sheet shows."""
+
+    name: str
+    digest: str
+    scale_x: float | None = Field(description="Printed over designed; null without a known resolution.")
+    scale_y: float | None
+    ratio: float = Field(description="scale_x / scale_y.")
+    skew_deg: float
+    perspective_mm: float
+    dpi: tuple[float, ...] | None
+    note: str | None
+
+
+class ImagePart(Part):
+    """The verdict on one picture. The fields that are not set do not apply: of unread pictures or of sheets."""
+
+    image: str = Field(description="Its path, or the name of a source and the number of a frame.")
+    verified: bool
+    error: str | None = Field(None, description="Why the picture could not be read.")
+    reason: str | None = Field(None, description="Why it is not verified.")
+    present: int | None = Field(None, description="Markers that are visible in the layout.")
+    measured: int | None = None
+    repaired: int | None = None
+    fitted: int | None = None
+    lost: int | None = None
+    share: float | None = Field(None, description="measured / present.")
+    mirrored: bool | None = Field(None, description="The picture shows the pattern's back.")
+    contradictions: tuple[int, ...] | None = Field(
+        None, description="Cells whose color contradicts the layout."
+    )
+    quality: QualityPart | None = None
+    timings_ms: dict[str, float] | None = Field(None, description="By stage.")
+    sheet: SheetPart | None = Field(None, description="Of a picture of a print sheet.")
+
+
+class VerifyDocument(Document):
+    """The verdicts of ``verify``; also the file verify.json."""
+
+    format: Literal["cmp-verification"] = "cmp-verification"
+    version: Literal[1] = 1
+    pattern: str
+    digest: str = Field(description="Of the layout.")
+    min_share: float
+    verified: bool = Field(description="All pictures are.")
+    images: tuple[ImagePart, ...]
+
+    def to_json(self) -> str:
+        """The text of the document, without the fields that do not apply."""
+        return self.model_dump_json(indent=2, exclude_unset=True) + "\n"
+
+
+class PatchPart(Part):
+    """The kerfs of one patch of a coupon; x of cuts along y, y of cuts along x."""
+
+    name: str
+    power_percent: float
+    speed_mm_s: float
+    passes: int
+    kerf_x_mm: float = Field(description="At the front, as in a material's file.")
+    kerf_x_back_mm: float
+    kerf_x_sigma_mm: float
+    kerf_y_mm: float
+    kerf_y_back_mm: float
+    kerf_y_sigma_mm: float
+
+
+class KerfDocument(Document):
+    """What ``kerf`` measured."""
+
+    format: Literal["cmp-kerf"] = "cmp-kerf"
+    version: Literal[2] = 2
+    from_back: bool = Field(description="The picture shows the sheet's back.")
+    face: Literal["front", "back"] = Field(description="The face whose openings are seen.")
+    taper_deg: float
+    taper_assumed: bool
+    thickness_mm: float
+    response: str
+    scale_px_mm: float = Field(description="px in a mm.")
+    fit_mm: float = Field(description="How well the coupon's marks fit.")
+    patches: tuple[PatchPart, ...]
+
+
+class CalibratePatternDocument(Document):
+    """What ``calibrate pattern`` learnt."""
+
+    format: Literal["cmp-calibration-pattern"] = "cmp-calibration-pattern"
+    version: Literal[1] = 1
+    written: str
+    pictures: int
+    side: Literal["front", "back"]
+    present: int = Field(description="Markers that are visible in the layout.")
+    measured: int
+    residual_z: float = Field(description="Residuals in stated deviations; 1 is right.")
+    worst_picture: int = Field(description="Number of the picture with the largest residuals, from 0.")
+    worst_picture_z: float
+    worst_picture_rms_px: float
+    scatter_mm: float = Field(description="Of the markers around their nominal places, per axis.")
+    deviation_mm: float = Field(description="Standard deviation of a measured place, per axis.")

@@ -1,0 +1,165 @@
+"""What a text names that images come from: pictures, folders, patterns of names, videos, cameras, streams.
+
+``verify``, ``track``, ``reconstruct`` and ``calibrate`` take the same texts.
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.files import is_folder, path_exists
+
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
+_ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
+
+
+class SourceError(CmpDesignError, ValueError):
+    """A source that names nothing, or cannot be opened."""
+
+
+class SourceKind(Enum):
+    """What images come from."""
+
+    IMAGES = "images"  # files, in order
+    FILE = "file"  # a video, or an image of another ending
+    CAMERA = "camera"
+    STREAM = "stream"
+
+
+@dataclass(frozen=True)
+class NamedSource:
+    """What one text, or several texts of pictures one after another, name.
+
+    Attributes:
+        kind: what the images come from.
+        name: the texts, for messages; without the password of an address.
+        paths: the files of ``IMAGES`` and of ``FILE``, in natural order within a folder or pattern.
+        address: number of a camera, or address of a stream.
+    """
+
+    kind: SourceKind
+    name: str
+    paths: tuple[Path, ...] = ()
+    address: str = ""
+
+
+def name_sources(texts: Iterable[str]) -> list[NamedSource]:
+    """What the texts name, in their order; pictures that follow each other are one source.
+
+    Args:
+        texts: each a picture, a folder of pictures, a pattern such as "run*/*.png" ("**" for any folders), a video,
+            the number of a camera, or the address of a stream. A path that exists is no pattern and no number.
+
+    Raises:
+        SourceError: a folder cannot be read or holds no image, or no file matches a pattern.
+    """
+    found: list[NamedSource] = []
+    for text in texts:
+        for source in _named_by(text):
+            if source.kind is SourceKind.IMAGES and found and found[-1].kind is SourceKind.IMAGES:
+                name = f"{found[-1].name}, {source.name}" if source.name != found[-1].name else source.name
+                source = NamedSource(SourceKind.IMAGES, name, found[-1].paths + source.paths)
+                found.pop()
+            found.append(source)
+    return found
+
+
+def picture_paths(texts: Iterable[str]) -> list[Path]:
+    """The files of pictures that the texts name, see ``name_sources``.
+
+    Raises:
+        SourceError: a text names a camera or a stream.
+    """
+    found = name_sources(texts)
+    for source in found:
+        if source.address:
+            raise SourceError(
+                f"{source.name}: expected pictures, folders of pictures or patterns of their names"
+            )
+    return [path for source in found for path in source.paths]
+
+
+def without_password(text: str) -> str:
+    """A source's text as it may be shown: the address of a stream without user and password."""
+    return re.sub(r"^([a-z]+://)[^/@]*@", r"\1", text, flags=re.IGNORECASE)
+
+
+def is_stream_address(text: str) -> bool:
+    """True for a text such as "rtsp://host/path"."""
+    return _ADDRESS.match(text) is not None
+
+
+def find_images(folder: Path) -> list[Path]:
+    """The image files of a folder: frame2 before frame10.
+
+    Raises:
+        SourceError: the folder cannot be read, or holds no image.
+    """
+    try:
+        paths = sorted(
+            (path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES),
+            key=_natural_sort_key,
+        )
+    except OSError as error:
+        raise SourceError(f"{folder}: cannot be read ({error.strerror or error})") from None
+    if not paths:
+        raise SourceError(
+            f"{folder}: holds no image; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
+        )
+    return paths
+
+
+def _named_by(text: str) -> Sequence[NamedSource]:
+    if is_stream_address(text):
+        return [NamedSource(SourceKind.STREAM, without_password(text), address=text)]
+    if path_exists(text):
+        return [_named_path(Path(text), text)]
+    if text.isdecimal():
+        return [NamedSource(SourceKind.CAMERA, f"camera {text}", address=text)]
+    if glob.has_magic(text):
+        return _matching(text)
+    return [_named_path(Path(text), text)]
+
+
+def _named_path(path: Path, name: str) -> NamedSource:
+    """A file is not opened here: whether it is there and can be read is found out when it is its turn."""
+    if is_folder(path):
+        return NamedSource(SourceKind.IMAGES, name, tuple(find_images(path)))
+    kind = SourceKind.IMAGES if path.suffix.lower() in IMAGE_SUFFIXES else SourceKind.FILE
+    return NamedSource(kind, name, (path,))
+
+
+def _matching(pattern: str) -> list[NamedSource]:
+    """The files and folders that match a pattern, each as if it were named alone."""
+    try:
+        # Path.glob takes no pattern that begins at the root.
+        names = glob.glob(pattern, recursive=True)  # noqa: PTH207
+    except (OSError, ValueError, re.error) as error:
+        raise SourceError(f"{pattern}: is no pattern of file names ({error})") from None
+    found = sorted(map(Path, names), key=_natural_sort_key)
+    # "**" also matches the folders above the files, which are not named alone then.
+    files = [path for path in found if not is_folder(path)]
+    if not found:
+        raise SourceError(f"{pattern}: no file matches this pattern")
+    return [_named_path(path, pattern) for path in (files or found)]
+
+
+def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
+    """The key of the natural order: frame2 before frame10; the files of a folder stand together."""
+    key: list[tuple[int, int | str]] = []
+    digits = ""
+    for letter in f"{path.parent}\0{path.name}\0":
+        if letter in "0123456789":
+            digits += letter
+            continue
+        if digits:
+            key.append((0, int(digits)))
+            digits = ""
+        key.append((1, letter))
+    return key
