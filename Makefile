@@ -8,7 +8,8 @@ BIN := .venv/bin
 READY := .venv/.ready
 CORE := .venv/.core
 SOURCES := $(wildcard cmake/CMakeLists.txt extractor/native/* extractor/native/*/* extractor/native/*/*/* cmpdesign/native/*)
-BUILD_NEEDS := scikit-build-core nanobind cmake ninja
+# setuptools and wheel: packages without a wheel of their own are built here, too
+BUILD_NEEDS := scikit-build-core nanobind cmake ninja setuptools wheel
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCK),--constraint $(LOCK))
 ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
   ZIG := ziglang

@@ -13,7 +13,7 @@ from pathlib import Path
 
 LOCK_PATH = Path(__file__).parents[1] / "requirements.lock"
 HEADER = "# Versions that the tests ran with. Written by: make lock\n"
-OWN = {"cmpdesign", "pip", "setuptools", "wheel"}
+OWN = {"cmpdesign", "pip"}
 
 
 def lock_text() -> str:
