@@ -17,7 +17,7 @@ class Schedule(NamedTuple):
         reduction_blur_px: blur (sigma, px) down to which the image may be reduced; blurred images need no fine pixels.
         sharp_blur_share: blur as a share of the edges, below which a second round of profiles takes the place of
             synthesis.
-        steps: number of steps by synthesis, each over all markers.
+        steps: number of steps by synthesis at most, each over all markers.
     """
 
     max_profile_rows: tuple[int, int]

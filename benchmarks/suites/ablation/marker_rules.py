@@ -55,6 +55,25 @@ PLACES = (
     ),
 )
 
+REFINEMENT = (
+    Rule(
+        "last step",
+        "the last of a preset's steps by synthesis, where markers still move",
+        "accuracy",
+        "extractor/refine/refiner.py",
+        "self._synthesis_solver.steps(view, start, schedule.steps, usual_px)",
+        "self._synthesis_solver.steps(view, start, schedule.steps - 1, usual_px)",
+    ),
+    Rule(
+        "small move",
+        "no step follows one that hardly moved the markers",
+        "accuracy",
+        "extractor/refine/synthesis_steps.py",
+        "small_move: float = 0.25",
+        "small_move: float = 0.0",
+    ),
+)
+
 COMPLETE = (
     Rule(
         "ring outliers",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from benchmarks.suites.ablation.cell_rules import CELLS, IMAGE, PIPELINE
-from benchmarks.suites.ablation.marker_rules import COMPLETE, PLACES
+from benchmarks.suites.ablation.marker_rules import COMPLETE, PLACES, REFINEMENT
 from benchmarks.suites.ablation.numbering_rules import GAPS, NUMBERING
 
-RULES = (*PIPELINE, *IMAGE, *CELLS, *NUMBERING, *GAPS, *PLACES, *COMPLETE)
+RULES = (*PIPELINE, *IMAGE, *CELLS, *NUMBERING, *GAPS, *PLACES, *REFINEMENT, *COMPLETE)
 BY_NAME = {rule.name: rule for rule in RULES}

@@ -15,7 +15,7 @@ void add_refine(nb::module_ module) {
                       {"view", "lines", "across", "state", "topology", "stations", "judged", "limits"});
   bind<&draw_pattern>(module, "draw_pattern",
                       {"view", "topology", "picture", "state", "levels", "box", "limits"});
-  bind<&update_and_solve>(module, "update_and_solve", {"drawing", "state", "topology", "is_last", "limits"});
+  bind<&update_and_solve>(module, "update_and_solve", {"drawing", "state", "topology", "judged", "limits"});
   bind<&at_full_scale>(module, "at_full_scale", {"xy", "cov", "places", "scale", "limits"});
 }
 

@@ -5,7 +5,7 @@
 namespace cmp::refine {
 
 SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, bool is_last,
+                                  const layout::Topology& topology, bool judged,
                                   const SynthesisLimits& limits) {
   const auto lines = drawing.lines, contrasts = drawing.contrasts;
   const auto edges = topology.edges, edge_cells = topology.edge_cells;
@@ -29,7 +29,7 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,
                               edges, topology.spokes, sigma, noise * noise};
   WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
-                                         {state.xy, state.hidden}, true, is_last, limits.step);
+                                         {state.xy, state.hidden}, true, judged, limits.step);
   return {std::move(weighed.weight),
           std::move(solved.variance_ratio),
           std::move(bent.variance),

@@ -29,10 +29,9 @@ struct SynthesisLimits {
 using SynthesisReading = std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 1>, double,
                                     Array<double, 1>, double, double, SolutionArrays>;
 
-// The measurements along the gridlines of a drawing, and the solution; the last step measures disagreement,
-// too.
+// The measurements along the gridlines of a drawing, and the solution; where judged, their disagreement, too.
 SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, bool is_last,
+                                  const layout::Topology& topology, bool judged,
                                   const SynthesisLimits& limits);
 
 }  // namespace cmp::refine

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import solve as native
+from extractor.refine.solve.fisher_information import Information
 
 # Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
 WIDE_BLUR_REMAINDER = 20.0
@@ -28,6 +29,20 @@ class ConvergenceLimits(NamedTuple):
 
 
 LIMITS = ConvergenceLimits()
+
+
+def typical_move(shift: NDArray[np.float64], information: Information) -> float:
+    """The typical move of markers in a step, in standard deviations of one axis; NaN where no marker is known.
+
+    Args:
+        shift: (M, 2) px, NaN where unknown.
+        information: about the markers.
+    """
+    x, y = shift.T
+    xx, xy, yy = information.diagonal.T
+    square = xx * x * x + 2 * xy * x * y + yy * y * y
+    known = square[square > 0]
+    return float(np.sqrt(0.5 * LIMITS.mean_over_median * np.median(known))) if known.size else np.nan
 
 
 def convergence_covariance(

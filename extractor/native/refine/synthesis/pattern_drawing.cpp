@@ -33,6 +33,7 @@ void fill_colors(const ColorPlane& plane, Index count, CellPixels& pixels) {
   const auto r2 = static_cast<float>(slope(2, 0)), d2 = static_cast<float>(slope(2, 1));
   const auto x0 = static_cast<float>(plane.x), y0 = static_cast<float>(plane.y);
   const Index padded = padded_count(count);
+#pragma omp simd
   for (Index k = 0; k < padded; ++k) {
     const float x = pixels.x[k] - x0, y = pixels.y[k] - y0, share = pixels.share[k];
     pixels.color[3 * k] = share * (l0 + r0 * x + d0 * y);

@@ -12,10 +12,11 @@ constexpr float FULL_DENSITY =
 }  // namespace
 
 void fill_projections(const SideLight& light, const SideLight& bleed, Index count, GridlinePixels& pixels) {
-  const auto [contrast0, contrast1, contrast2] = light.contrast;
-  const auto [step0, step1, step2] = bleed.step;
-  const auto [beyond0, beyond1, beyond2] = bleed.beyond;
+  const float contrast0 = light.contrast[0], contrast1 = light.contrast[1], contrast2 = light.contrast[2];
+  const float step0 = bleed.step[0], step1 = bleed.step[1], step2 = bleed.step[2];
+  const float beyond0 = bleed.beyond[0], beyond1 = bleed.beyond[1], beyond2 = bleed.beyond[2];
   Residuals& own = pixels.residuals;
+#pragma omp simd
   for (Index k = 0; k < count; ++k) {
     const float h = pixels.weights.before_share[k];
     const float r0 = own.residual(0, k), r1 = own.residual(1, k), r2 = own.residual(2, k);
