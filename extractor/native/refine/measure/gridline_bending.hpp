@@ -13,24 +13,19 @@ namespace cmp::refine {
 // Limits of bending; explained in extractor/refine/measure/gridline_bending.py.
 struct BendingLimits {
   double min_bend_share, max_bend_share, bend_to_end_shift, max_bend_deviation, third_difference_noise;
-  double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend;
+  double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend,
+      bend_by_scatter;
   double min_determinant_share, min_information_share, band;
 
   template <class F>
   static BendingLimits read(const F& f) {
-    return {f["min_bend_share"],
-            f["max_bend_share"],
-            f["bend_to_end_shift"],
-            f["max_bend_deviation"],
-            f["third_difference_noise"],
-            f["mean_over_median"],
-            f["misfit_tolerance"],
-            f["max_misfit_tolerance"],
-            f["min_significance"],
-            f["max_bend"],
-            f["min_determinant_share"],
-            f["min_information_share"],
-            f["band"]};
+    return {f["min_bend_share"],         f["max_bend_share"],
+            f["bend_to_end_shift"],      f["max_bend_deviation"],
+            f["third_difference_noise"], f["mean_over_median"],
+            f["misfit_tolerance"],       f["max_misfit_tolerance"],
+            f["min_significance"],       f["max_bend"],
+            f["bend_by_scatter"],        f["min_determinant_share"],
+            f["min_information_share"],  f["band"]};
   }
 };
 
@@ -53,6 +48,7 @@ struct BendingPrior {
   View<const double, 2> bend;       // (E, 2) px, b and s as drawn
   View<const double, 1> roughness;  // (M,) px^2, of the markers
   View<const double, 1> weight;     // (E,) 0 to 1, of the gridlines
+  double scatter_variance;          // px^2, as in MarkerScatter
 };
 
 struct ThirdDifference {
@@ -69,6 +65,9 @@ Array<double, 1> measure_roughness(View<const double, 2> xy, View<const double, 
                                    View<const double, 2> diagonal, const MarkerRows& rows,
                                    View<const std::int32_t, 2> spokes, View<const std::int32_t, 2> near,
                                    const BendingLimits& limits);
+
+// px^2, the median variance of markers, one axis, by these blocks (M, 3) of the information.
+double median_marker_variance(View<const double, 2> diagonal);
 
 // The third difference of the four markers along edge e, less the layout's own (`third`).
 inline ThirdDifference third_difference(View<const double, 2> xy, View<const double, 3> maps,

@@ -1,0 +1,77 @@
+#include "refine/measure/marker_scatter.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "numeric/median.hpp"
+#include "refine/measure/gridline_bending.hpp"
+
+namespace cmp::refine {
+
+namespace {
+
+// the squares of the coefficients of a difference: of 1, 3, 3, 1 and of 1, 4, 6, 4, 1
+constexpr double THIRD_DIFFERENCE_SQUARES = 20.0, FOURTH_DIFFERENCE_SQUARES = 70.0;
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+
+// (E,) the third differences along the gridlines, px, NaN where one of the four markers is not known.
+Array<ThirdDifference, 1> third_differences(View<const double, 2> xy, View<const double, 3> maps,
+                                            const layout::Topology& topology) {
+  const auto next = topology.next_markers;
+  Array<ThirdDifference, 1> out({next.size()}, ThirdDifference{NONE, NONE});
+  for (Index e = 0; e < next.size(); ++e) {
+    if (next(e, 0) < 0 || next(e, 1) < 0) continue;
+    out[e] = third_difference(xy, maps, topology.edges, next, topology.third_differences, e);
+  }
+  return out;
+}
+
+// px^2, the median square of the known differences.
+double median_square(View<const ThirdDifference, 1> differences) {
+  Array<double, 1> squares({differences.size()});
+  Index count = 0;
+  for (const auto [x, y] : differences) {
+    squares[count] = x * x + y * y;
+    count += std::isfinite(squares[count]);
+  }
+  return numeric::median_of_many(squares.slice(0, count));
+}
+
+// The fourth differences, px: each between the third differences of an edge and of the one that follows it.
+Array<ThirdDifference, 1> fourth_differences(View<const ThirdDifference, 1> third,
+                                             const layout::Topology& topology) {
+  const auto edges = topology.edges, spokes = topology.spokes, next = topology.next_edges;
+  Array<ThirdDifference, 1> out({spokes.size() * spokes.size(1)}, ThirdDifference{NONE, NONE});
+  Index count = 0;
+  for (Index m = 0; m < spokes.size(); ++m) {
+    for (Index k = 0; k < spokes.size(1); ++k) {
+      const std::int32_t e = spokes(m, k), f = next(m, k);
+      if (e < 0 || f <= e) continue;  // a pair is seen from both of its ends
+      const bool is_forward = edges(e, 0) == m;
+      const std::int32_t between = edges(e, is_forward ? 1 : 0);
+      const double sign = is_forward == (edges(f, 0) == between) ? 1.0 : -1.0;
+      out[count++] = {third[f].x - sign * third[e].x, third[f].y - sign * third[e].y};
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
+                               View<const double, 2> diagonal, const layout::Topology& topology,
+                               bool by_synthesis, const ScatterLimits& limits) {
+  const Array<ThirdDifference, 1> third = third_differences(xy, maps, topology);
+  // variances of one axis
+  const double per_square = 1.0 / (2.0 * limits.median_over_mean);
+  const double of_third = per_square * median_square(third);
+  const double of_fourth = per_square * median_square(fourth_differences(third, topology));
+  const double independent = (of_fourth - limits.smooth_ratio * of_third) /
+                             (FOURTH_DIFFERENCE_SQUARES - limits.smooth_ratio * THIRD_DIFFERENCE_SQUARES);
+  const double allowance = by_synthesis ? limits.noise_allowance : limits.start_allowance;
+  const double variance = independent - allowance * median_marker_variance(diagonal);
+  if (!(variance > 0.0)) return {0.0, 0.0};
+  return {variance, std::min(FOURTH_DIFFERENCE_SQUARES * variance / of_fourth, 1.0)};
+}
+
+}  // namespace cmp::refine
