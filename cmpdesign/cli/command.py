@@ -112,7 +112,10 @@ def _finish_usage_error(error: Exception) -> None:
     """Of an error in the words, which quotes them: make its message printable, or print it as JSON and exit."""
     if not hasattr(error, "format_message"):
         return
-    text = shortened(visible(error.format_message(), keep="\n"))
+    message = error.format_message().replace(
+        ": Value error, ", ": ", 1
+    )  # the words of pydantic, which typer uses
+    text = shortened(visible(message, keep="\n"))
     if current_mode().as_json:
         print_error(text)
         raise typer.Exit(EXIT_BAD_INPUT) from None
