@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.layouts import layout_from
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
 
 if TYPE_CHECKING:
@@ -33,7 +34,8 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
     Raises:
         ModuleNotFoundError: matplotlib is not installed.
     """
-    from matplotlib.collections import PolyCollection
+    with extra("evaluate"):
+        from matplotlib.collections import PolyCollection
 
     axes, pattern = _axes(ax), layout_from(layout)
     outline = PolyCollection([pattern.outline_mm], facecolors=[pattern.palette[COLORS[BLACK]]])
@@ -143,6 +145,7 @@ def plot_history(run: Run, markers: list[int] | None = None, ax: Any = None) -> 
 
 
 def _axes(ax: Any) -> Any:
-    from matplotlib import pyplot
+    with extra("evaluate"):
+        from matplotlib import pyplot
 
     return pyplot.subplots()[1] if ax is None else ax

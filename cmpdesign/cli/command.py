@@ -10,7 +10,6 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from cmpdesign.cli.missing_library import missing_library_text
 from cmpdesign.cli.mode import Mode, current_mode, use_mode
 from cmpdesign.cli.options.output import NAMES, output_parameters
 from cmpdesign.cli.terminal import (
@@ -23,6 +22,7 @@ from cmpdesign.cli.terminal import (
 )
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.texts import visible
+from cmpdesign.libraries import missing_library_text
 
 INTERRUPTED = "interrupted; every file that was written is complete"
 _OUTPUT_PARAMETERS = output_parameters()

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.journal import Journal
+from cmpdesign.libraries import extra
 
 
 @dataclass(frozen=True)
@@ -153,12 +154,8 @@ def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
     """
     import cv2
 
-    try:
+    with extra("evaluate"):
         from threadpoolctl import threadpool_limits
-    except ModuleNotFoundError as error:
-        raise CmpDesignError(
-            "evaluation needs threadpoolctl, which is not installed; install cmpdesign[evaluate]"
-        ) from error
     cv2.setNumThreads(1)
     with threadpool_limits(1):
         return json.loads(json.dumps(work(values), allow_nan=False))
