@@ -32,7 +32,7 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
         The axes.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     with extra("evaluate"):
         from matplotlib.collections import PolyCollection
@@ -63,7 +63,7 @@ def plot_markers(image: NDArray[Any], markers: Markers, ax: Any = None) -> Any:
         The axes, in px, y down.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     import numpy as np
 
@@ -94,7 +94,7 @@ def plot_displacement(run: Run, frame: int = -1, ax: Any = None, *, magnified: f
 
     Raises:
         CmpDesignError: no such frame.
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     if not -len(run) <= frame < len(run):
         raise CmpDesignError(f"frame is {frame}; the run has the frames 0 to {len(run) - 1}")
@@ -127,7 +127,7 @@ def plot_history(run: Run, markers: list[int] | None = None, ax: Any = None) -> 
         The axes: mm over s.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     import numpy as np
 
