@@ -13,6 +13,7 @@ import numpy as np
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.journal import Journal
+from cmpdesign.libraries import extra
 from cmpdesign.workers import worker_pool
 
 
@@ -141,12 +142,8 @@ def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
     """
     import cv2
 
-    try:
+    with extra("evaluate"):
         from threadpoolctl import threadpool_limits
-    except ModuleNotFoundError as error:
-        raise CmpDesignError(
-            "evaluation needs threadpoolctl, which is not installed; install cmpdesign[evaluate]"
-        ) from error
     cv2.setNumThreads(1)
     with threadpool_limits(1):
         return json.loads(json.dumps(work(values), allow_nan=False))

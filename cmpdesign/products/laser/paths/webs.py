@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import Cavities, burnt_shapes
 
@@ -75,7 +76,8 @@ def _cavity_lines(group: Cavities) -> NDArray[np.object_]:
 
 def _neighbour_pairs(groups: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
     """(P, 2) int64 indices of cavities, counted through all groups, whose centres lie within reach."""
-    from scipy.spatial import cKDTree
+    with extra("laser"):
+        from scipy.spatial import cKDTree
 
     centres = [group.nominal_mm.mean(axis=1) for group in groups]
     size = max(
