@@ -31,7 +31,7 @@ def pattern(
     images: Annotated[
         list[str],
         typer.Argument(
-            metavar="IMAGE...",
+            metavar="IMAGE",
             help='10 or more color pictures of one pad at rest, folders, or patterns such as "rest/*.png".',
         ),
     ],
