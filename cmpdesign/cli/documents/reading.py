@@ -27,10 +27,13 @@ class SheetPart(Part):
 
     name: str
     digest: str
+    length_x_px: float = Field(description="Length of the bar in x.")
+    length_y_px: float
     scale_x: float | None = Field(description="Printed over designed; null without a known resolution.")
     scale_y: float | None
     ratio: float = Field(description="scale_x / scale_y.")
     skew_deg: float
+    rotation_deg: float = Field(description="Angle of the bar in x, clockwise in the picture.")
     perspective_mm: float
     dpi: tuple[float, ...] | None
     note: str | None
