@@ -7,7 +7,8 @@ from pathlib import Path
 from benchmarks.camera.page import page_pictures
 
 from . import commands, fields, gallery, measured
-from .pictures import contact, drawings, hero, scene_templates, sides, stages, surface, tutorials
+from .pictures import contact, drawings, hero, scene_templates, sides, stages, surface
+from .pictures.tutorials import photos
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
@@ -26,7 +27,7 @@ def pictures() -> dict[str, bytes]:
         measured,
         scene_templates,
         surface,
-        tutorials,
+        photos,
     ):
         found |= part.figures()
     return found | page_pictures()

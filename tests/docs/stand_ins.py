@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 
 from cmpdesign.products.laser.coupon.design import load_coupon
-from docs.figures.pictures.tutorial_files import coupon_scan
+from docs.figures.pictures.tutorials.page_files import coupon_scan
 
 
 def make_stand_in(words: list[str]) -> None:

@@ -50,6 +50,7 @@ FENCE = re.compile(r"^```(\w+)(?: ([\w.]+))?\n(.*?)^```$", re.MULTILINE | re.DOT
 DECIMAL = re.compile(r"-?\d+\.\d+")
 FREE_MS = re.compile(r"\d+(\.\d+)? ms")
 COLUMNS = "120"
+SLOW_PAGES = {"cast-pad", "compare-designs"}
 DEMO_FIGURES = ("visible", "measured", "wrong ids", "RMS error per axis")
 
 
@@ -157,7 +158,11 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
     )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW_PAGES else ()) for page in PAGES],
+    ids=lambda page: page.stem,
+)
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", COLUMNS)

@@ -14,7 +14,8 @@ from cmpdesign.scene import Camera, Optics, Scene
 from extractor import Extractor, parse_layout
 from extractor.draw import draw_markers
 
-from .tutorial_files import (
+from .casting import casting
+from .page_files import (
     coupon_scan,
     cropped,
     mosaic,
@@ -32,8 +33,12 @@ TWO_PX, THREE_PX = (236, 177), (168, 126)
 
 
 def figures() -> dict[str, bytes]:
-    """File name -> JPEG or PNG."""
-    return {**_first_pattern("first-pattern"), **_laser_pad("laser-pad")}
+    """File name -> JPEG, PNG or SVG."""
+    return {
+        **_first_pattern("first-pattern"),
+        **_laser_pad("laser-pad"),
+        **_cast_pad("cast-pad"),
+    }
 
 
 def _first_pattern(page: str) -> dict[str, bytes]:
@@ -75,4 +80,13 @@ def _laser_pad(page: str) -> dict[str, bytes]:
     return {
         "tutorial-coupon.jpg": to_jpeg(resized(scan, (331, 293))),
         "tutorial-laser-failures.jpg": to_jpeg(mosaic([pads], THREE_PX)),
+    }
+
+
+def _cast_pad(page: str) -> dict[str, bytes]:
+    layout = page_layout(page, "cast.toml")
+    pads = [page_picture(page, f"{name}.toml", layout) for name in ("rest", "bubbles", "cloudy")]
+    return {
+        "tutorial-casting.svg": casting().text_of().encode(),
+        "tutorial-cast-failures.jpg": to_jpeg(mosaic([pads], THREE_PX)),
     }

@@ -18,7 +18,7 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.products.laser.coupon.design import Coupon
 from cmpdesign.scene import Scene, load_scene, render
 
-PAGES = Path(__file__).resolve().parents[2] / "tutorials"
+PAGES = Path(__file__).resolve().parents[3] / "tutorials"
 Picture = NDArray[np.uint8]
 KERF_MM = (0.21, 0.19)  # of the coupon's scan, in x and y, at the narrower face of the openings
 GAP_PX = 8
