@@ -8,6 +8,7 @@ from benchmarks.camera.page import page_pictures
 
 from . import commands, fields, gallery, measured
 from .pictures import contact, drawings, hero, scene_templates, sides, stages, surface
+from .pictures.tutorials import photos
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
@@ -16,7 +17,18 @@ IMAGES = DOCS / "images"
 def pictures() -> dict[str, bytes]:
     """Name in docs/images -> PNG, SVG or JPEG."""
     found: dict[str, bytes] = {}
-    for part in (hero, drawings, sides, stages, gallery, contact, measured, scene_templates, surface):
+    for part in (
+        hero,
+        drawings,
+        sides,
+        stages,
+        gallery,
+        contact,
+        measured,
+        scene_templates,
+        surface,
+        photos,
+    ):
         found |= part.figures()
     return found | page_pictures()
 
