@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from cmpdesign.design.design import Design
 from cmpdesign.files.images import to_png
 from cmpdesign.layout.layout import Layout
+from cmpdesign.libraries import extra, require_libraries
 from cmpdesign.products.mesh.glb import meshes_to_glb
 from cmpdesign.products.mesh.stl import mesh_to_stl
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf
@@ -45,8 +45,7 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
         DesignError: the mold cannot be made.
         MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
-    for library in ("trimesh", "lib3mf"):  # a missing one is an error before the work
-        import_module(library)
+    require_libraries("cad", "OCP", "trimesh", "lib3mf", "scipy")
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
@@ -116,7 +115,8 @@ def _add_checked_figures(
     Raises:
         MoldError: see ``make_meshes``.
     """
-    import trimesh
+    with extra("cad"):
+        import trimesh
 
     body = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
     error = abs(float(mesh.volume_mm3()) / volume_mm3 - 1)

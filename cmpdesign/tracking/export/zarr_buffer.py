@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.atomic import Stage
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.export.run_images import require_sources, run_images
 from cmpdesign.tracking.export.runs import read_run, require_one_kind
 
@@ -28,12 +29,10 @@ def require_zarr() -> Any:
     """The module zarr.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("export"):
         import zarr
-    except ImportError:
-        raise CmpDesignError("a replay buffer needs zarr: pip install 'cmpdesign[export]'") from None
     return zarr
 
 

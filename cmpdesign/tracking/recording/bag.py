@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.errors import InputError
 from cmpdesign.files.atomic import Stage
 from cmpdesign.files.image_header import size_in_header
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.columns import FRAME_STATUS, Columns
 from cmpdesign.tracking.recording.images import kept_image
 from cmpdesign.tracking.recording.messages import (
@@ -39,15 +40,11 @@ def require_rosbags() -> Any:
     """The module rosbags.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("recording", "write .npz or .csv"):
         import rosbags.rosbag2
         import rosbags.typesys
-    except ImportError:
-        raise CmpDesignError(
-            "MCAP and rosbag2 need rosbags: pip install 'cmpdesign[recording]', or write .npz or .csv"
-        ) from None
     return rosbags
 
 
