@@ -14,6 +14,7 @@ from cmpdesign.scene import Camera, Optics, Scene
 from extractor import Extractor, parse_layout
 from extractor.draw import draw_markers
 
+from . import displacement
 from .casting import casting
 from .page_files import (
     coupon_scan,
@@ -38,6 +39,7 @@ def figures() -> dict[str, bytes]:
         **_first_pattern("first-pattern"),
         **_laser_pad("laser-pad"),
         **_cast_pad("cast-pad"),
+        **displacement.figures("sensor"),
     }
 
 
