@@ -34,7 +34,8 @@ def test_the_site_has_every_page_behind_its_door(tmp_path: Path) -> None:
         )
     for path in outside_files([ROOT / "docs" / page for page in pages]):
         copy = tmp_path / "site" / "project" / path.relative_to(ROOT)
-        assert (copy.with_suffix(".html") if path.suffix == ".md" else copy).is_file()
+        page = copy.with_name("index.html") if path.name == "README.md" else copy.with_suffix(".html")
+        assert (page if path.suffix == ".md" else copy).is_file()
 
 
 @pytest.mark.slow
