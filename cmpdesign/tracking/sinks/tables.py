@@ -123,7 +123,7 @@ def _require_kind(path: Path) -> None:
     if path.suffix == ".parquet":
         require_pyarrow()
     if is_recording(path):
-        from cmpdesign.tracking.recording.bag import require_rosbags
+        from cmpdesign.tracking.recording.topics import require_rosbags
 
         require_rosbags()
 
