@@ -52,8 +52,8 @@ class Recording:
 
 
 def is_recording(path: Path) -> bool:
-    """True for the name of a recording: it ends in .mcap, or has no ending, for a rosbag2 folder."""
-    return path.suffix in (".mcap", "")
+    """True for the name of a recording: it ends in .mcap or .rrd, or has no ending, for a rosbag2 folder."""
+    return path.suffix in (".mcap", ".rrd", "")
 
 
 class RecordedTable:
