@@ -8,25 +8,35 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 from cmpdesign.api.layouts import reference_from
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
+from cmpdesign.tracking.live.options import Live, LiveKind
+from cmpdesign.tracking.recording.options import (
+    DEFAULT_FRAME_ID,
+    RecordedTable,
+    Recording,
+    is_recording,
+)
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.tracking.columns import FrameTable
     from cmpdesign.tracking.export.runs import Run
+    from cmpdesign.tracking.live.view import LiveView
     from cmpdesign.tracking.run import TrackingRun
+    from cmpdesign.tracking.sinks.tables import FrameSink
     from cmpdesign.tracking.sources import FrameSource
     from extractor import LayoutLike, Reference
     from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.pipeline import Side
     from extractor.presets import Preset
+    from extractor.space.camera import View
 
 Watch = Callable[[Any], None]
 AnySource = str | Path | int | Sequence[str | Path]
@@ -42,7 +52,10 @@ class ReadingOptions(TypedDict, total=False):
         preset, response, side, channels: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
         frame_id: coordinate frame and first part of the topics of a recording; "tactile".
-        with_images: also record the frames' images; False.
+        with_images: also record, or show live, the frames' images; False.
+        live: also show the frames while the run goes on, by "foxglove" or "rerun"; None.
+        live_port: port of the live server on this machine, 0: any; None: the viewer's own.
+        live_wait_s: how long the first frame waits for a viewer of Foxglove, s; 0.
     """
 
     fps: float | None
@@ -55,6 +68,9 @@ class ReadingOptions(TypedDict, total=False):
     max_pixels: int
     frame_id: str
     with_images: bool
+    live: LiveKind | None
+    live_port: int | None
+    live_wait_s: float
 
 
 @dataclass(frozen=True)
@@ -62,7 +78,8 @@ class Reading:
     """``ReadingOptions`` with their defaults.
 
     Raises:
-        CmpDesignError: a rate or a number of frames that is not above 0, or a frame id that no topic can have.
+        CmpDesignError: a rate or a number of frames that is not above 0, a frame id that no topic can have, or a live
+            server that cannot be.
     """
 
     fps: float | None = None
@@ -75,15 +92,27 @@ class Reading:
     max_pixels: int = MOST_PIXELS
     frame_id: str = DEFAULT_FRAME_ID
     with_images: bool = False
+    live: LiveKind | None = None
+    live_port: int | None = None
+    live_wait_s: float = 0.0
 
     def __post_init__(self) -> None:
         _require_positive("fps", self.fps)
         _require_positive("frames", self.frames)
-        _ = self.recording
+        _ = self.recording, self.viewer
 
     @property
     def recording(self) -> Recording:
         return Recording(self.frame_id, self.with_images)
+
+    @property
+    def viewer(self) -> Live | None:
+        """The live server's options."""
+        if self.live is None:
+            if self.live_port is not None or self.live_wait_s:
+                raise CmpDesignError("--live-port and --live-wait are options of --live; give it, too")
+            return None
+        return Live(self.live, self.live_port, self.live_wait_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +299,6 @@ class TrackJob:
         """The run; all checks of the input are made here, before a file is written."""
         from cmpdesign.tracking.overlay import OverlayWriter
         from cmpdesign.tracking.run import TrackingRun, read_rest_markers
-        from cmpdesign.tracking.sinks.tables import open_sink
         from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
         from cmpdesign.tracking.summary import TrackStatistics
         from cmpdesign.tracking.table import TrackTable
@@ -297,8 +325,9 @@ class TrackJob:
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
-        sink = open_sink(self.output, TrackTable(tracker), how.recording)
-        return TrackingRun(frames, tracker, sink, TrackStatistics(self.layout), video, how.frames)
+        outputs = _open_outputs(self.output, TrackTable(tracker), how)
+        statistics = TrackStatistics(self.layout)
+        return TrackingRun(frames, tracker, outputs.sink, statistics, video, how.frames, live=outputs.live)
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
         """The JSON object of the summary."""
@@ -340,7 +369,6 @@ class ReconstructJob:
         from cmpdesign.tracking.run import TrackingRun
         from cmpdesign.tracking.shape_summary import ShapeStatistics
         from cmpdesign.tracking.shape_table import ShapeTable
-        from cmpdesign.tracking.sinks.tables import open_sink
         from cmpdesign.tracking.sources import open_sources
         from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_rig
 
@@ -359,9 +387,8 @@ class ReconstructJob:
             model_px=shape.model_px,
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-        sink = open_sink(
-            self.output, ShapeTable(reconstructor, continuation), replace(how.recording, views=rig.views)
-        )
+        source = open_sources(self.source, how.fps, how.max_pixels)
+        outputs = _open_outputs(self.output, ShapeTable(reconstructor, continuation), how, rig.views)
         tracker = ShapeTracker(
             reconstructor,
             warm=not how.cold,
@@ -369,10 +396,15 @@ class ReconstructJob:
             response=how.response,
             channels=how.channels,
         )
-        source = open_sources(self.source, how.fps, how.max_pixels)
         statistics = ShapeStatistics(reconstructor, depth_mm, shape.surface)
         return TrackingRun(
-            source, tracker, sink, statistics, limit=how.frames, warnings=reconstructor.warnings
+            source,
+            tracker,
+            outputs.sink,
+            statistics,
+            limit=how.frames,
+            warnings=reconstructor.warnings,
+            live=outputs.live,
         )
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
@@ -406,6 +438,30 @@ class ReconstructJob:
         return images if len(images) > 1 else images[0]
 
 
+class _Outputs(NamedTuple):
+    sink: FrameSink
+    live: LiveView | None
+
+
+def _open_outputs(path: Path, table: FrameTable, how: Reading, views: tuple[View, ...] = ()) -> _Outputs:
+    """Open the live server, if one is wanted, and then the file, so that no file is left where there is no server."""
+    from cmpdesign.tracking.sinks.tables import open_sink
+
+    recording, live = replace(how.recording, views=views), None
+    if how.viewer is not None:
+        from cmpdesign.tracking.live.view import open_view
+
+        live = open_view(how.viewer, RecordedTable(table, recording), how.frame_id, how.with_images)
+        if not is_recording(path):  # images are shown, and a table has none
+            recording = replace(recording, with_images=False)
+    try:
+        return _Outputs(open_sink(path, table, recording), live)
+    except BaseException:
+        if live is not None:
+            live.close()
+        raise
+
+
 Job = TrackJob | ReconstructJob
 
 
@@ -436,6 +492,8 @@ def write_summary(run: TrackingRun, job: Job) -> Followed:
     if not run.statistics.frames:
         return Followed(job.output, (job.output,), {}, run.ended_early, run.warnings)
     summary = job.summary(run)
+    if run.live is not None:
+        summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
     place = job.output.with_name(job.output.name + ".summary.json")
     contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}

@@ -54,7 +54,8 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
     _require_kind(path)
     if recording.with_images and not is_recording(path):
         raise CmpDesignError(
-            f"--with-images: {path} is a table and holds no images; give one that ends in .mcap or .rrd, or without ending"
+            f"--with-images: {path} is a table and holds no images; "
+            "give a name that ends in .mcap or .rrd, or without ending"
         )
     part = part_path(path)
     if is_folder(path):

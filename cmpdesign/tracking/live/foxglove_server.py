@@ -1,0 +1,132 @@
+"""Foxglove's server: the messages of a recording, on the same topics, over a websocket."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.tracking.live.options import HOST
+from cmpdesign.tracking.recording.frames import RecordedFrame
+from cmpdesign.tracking.recording.messages import DIAGNOSTICS, POINTS
+from cmpdesign.tracking.recording.topics import DIAGNOSTICS_TOPIC, TopicMessages
+
+# Messages that wait for one viewer; then the oldest is left out. With images, 4 a frame, some 32 MB.
+BACKLOG_MESSAGES = 256
+CLOSE_S = 0.5  # time for viewers to take what waits for them
+POLL_S = 0.01
+_LOGGER = "foxglove"
+_FULL = "full"  # in the log line of the library of an outbox that is full
+
+
+def require_foxglove() -> Any:
+    """The module foxglove.
+
+    Raises:
+        CmpDesignError: it is not installed.
+    """
+    try:
+        import foxglove
+    except ImportError:
+        raise CmpDesignError("Foxglove needs foxglove-sdk: pip install 'cmpdesign[live]'") from None
+    return foxglove
+
+
+class FoxgloveServer:
+    """Serves frames; the topics of markers and diagnostics exist before the first frame.
+
+    Args:
+        frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
+        port: a free port on this machine.
+
+    Raises:
+        CmpDesignError: a library is not installed, or the port cannot be opened.
+    """
+
+    def __init__(self, frame_id: str, port: int) -> None:
+        self._foxglove, self._messages = require_foxglove(), TopicMessages(frame_id)
+        self._watch = _watch_log(self._foxglove)
+        self._context = self._foxglove.Context()
+        try:
+            self._server = self._foxglove.start_server(
+                name=f"cmpdesign: {frame_id}",
+                host=HOST,
+                port=port,
+                context=self._context,
+                message_backlog_size=BACKLOG_MESSAGES,
+            )
+        except RuntimeError as error:
+            raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
+        self.address = f"ws://{HOST}:{self._server.port}"
+        self._channels: dict[str, Any] = {}
+        for topic, kind in ((self._messages.points_topic, POINTS), (DIAGNOSTICS_TOPIC, DIAGNOSTICS)):
+            self._channel(topic, kind)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a viewer has subscribed to the markers."""
+        end = time.monotonic() + seconds
+        points = self._channels[self._messages.points_topic]
+        while not points.base.has_sinks() and time.monotonic() < end:
+            time.sleep(POLL_S)
+        return bool(points.base.has_sinks())
+
+    def send(self, frames: Sequence[RecordedFrame]) -> None:
+        for frame in frames:
+            for one in self._messages.of(frame):
+                self._channel(one.topic, one.kind).log(bytes(one.data), log_time=one.ns)
+
+    def is_behind(self) -> bool:
+        return self._watch.is_behind
+
+    def close(self) -> None:
+        if any(channel.base.has_sinks() for channel in self._channels.values()):
+            time.sleep(CLOSE_S)
+        self._server.stop()
+        for channel in self._channels.values():
+            channel.close()
+        logging.getLogger(_LOGGER).removeHandler(self._watch)
+
+    def _channel(self, topic: str, kind: str) -> Any:
+        if topic not in self._channels:
+            text, _ = self._messages.store.generate_msgdef(kind, ros_version=2)
+            schema = self._foxglove.Schema(name=kind, encoding="ros2msg", data=text.encode())
+            self._channels[topic] = self._foxglove.Channel(
+                topic, message_encoding="cdr", schema=schema, context=self._context
+            )
+        return self._channels[topic]
+
+
+class _Watch(logging.Handler):
+    """Hears of viewers whose outbox is full: the library says so in its log alone, and not how often."""
+
+    is_behind = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if "outbox" in record.getMessage() and _FULL in record.getMessage():
+            self.is_behind = True
+
+
+def _watch_log(foxglove: Any) -> _Watch:
+    """Hear the library's log, and keep it off the terminal."""
+    watch, logger = _Watch(), logging.getLogger(_LOGGER)
+    logger.addHandler(watch)
+    logger.propagate = False
+    logger.setLevel(logging.INFO)
+    with _unchanged_root():
+        foxglove.set_log_level("INFO")
+    return watch
+
+
+@contextmanager
+def _unchanged_root() -> Iterator[None]:
+    """The program's own log stays as it is: ``set_log_level`` gives it a handler."""
+    root = logging.getLogger()
+    handlers, level = root.handlers[:], root.level
+    try:
+        yield
+    finally:
+        root.handlers[:] = handlers
+        root.setLevel(level)
