@@ -8,35 +8,26 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from cmpdesign.api.layouts import reference_from
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.live.options import Live, LiveKind
-from cmpdesign.tracking.recording.options import (
-    DEFAULT_FRAME_ID,
-    RecordedTable,
-    Recording,
-    is_recording,
-)
+from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.layout.layout import Layout as AnyLayout
-    from cmpdesign.tracking.columns import FrameTable
     from cmpdesign.tracking.export.runs import Run
-    from cmpdesign.tracking.live.view import LiveView
     from cmpdesign.tracking.run import TrackingRun
-    from cmpdesign.tracking.sinks.tables import FrameSink
     from cmpdesign.tracking.sources import FrameSource
     from extractor import LayoutLike, Reference
     from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.pipeline import Side
     from extractor.presets import Preset
-    from extractor.space.camera import View
 
 Watch = Callable[[Any], None]
 AnySource = str | Path | int | Sequence[str | Path]
@@ -297,6 +288,7 @@ class TrackJob:
 
     def prepare(self) -> TrackingRun:
         """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
         from cmpdesign.tracking.overlay import OverlayWriter
         from cmpdesign.tracking.run import TrackingRun, read_rest_markers
         from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
@@ -325,7 +317,7 @@ class TrackJob:
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
-        outputs = _open_outputs(self.output, TrackTable(tracker), how)
+        outputs = open_outputs(self.output, TrackTable(tracker), how.recording, how.viewer)
         statistics = TrackStatistics(self.layout)
         return TrackingRun(frames, tracker, outputs.sink, statistics, video, how.frames, live=outputs.live)
 
@@ -365,6 +357,7 @@ class ReconstructJob:
 
     def prepare(self) -> TrackingRun:
         """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
         from cmpdesign.tracking.marker_depth import read_elastomer, read_marker_depth_mm
         from cmpdesign.tracking.run import TrackingRun
         from cmpdesign.tracking.shape_summary import ShapeStatistics
@@ -388,7 +381,8 @@ class ReconstructJob:
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
         source = open_sources(self.source, how.fps, how.max_pixels)
-        outputs = _open_outputs(self.output, ShapeTable(reconstructor, continuation), how, rig.views)
+        recording = replace(how.recording, views=rig.views)
+        outputs = open_outputs(self.output, ShapeTable(reconstructor, continuation), recording, how.viewer)
         tracker = ShapeTracker(
             reconstructor,
             warm=not how.cold,
@@ -436,30 +430,6 @@ class ReconstructJob:
             for rest, name in zip(rests, sources, strict=True)
         ]
         return images if len(images) > 1 else images[0]
-
-
-class _Outputs(NamedTuple):
-    sink: FrameSink
-    live: LiveView | None
-
-
-def _open_outputs(path: Path, table: FrameTable, how: Reading, views: tuple[View, ...] = ()) -> _Outputs:
-    """Open the live server, if one is wanted, and then the file, so that no file is left where there is no server."""
-    from cmpdesign.tracking.sinks.tables import open_sink
-
-    recording, live = replace(how.recording, views=views), None
-    if how.viewer is not None:
-        from cmpdesign.tracking.live.view import open_view
-
-        live = open_view(how.viewer, RecordedTable(table, recording), how.frame_id, how.with_images)
-        if not is_recording(path):  # images are shown, and a table has none
-            recording = replace(recording, with_images=False)
-    try:
-        return _Outputs(open_sink(path, table, recording), live)
-    except BaseException:
-        if live is not None:
-            live.close()
-        raise
 
 
 Job = TrackJob | ReconstructJob
