@@ -45,8 +45,7 @@ class ReadingOptions(TypedDict, total=False):
         frame_id: coordinate frame and first part of the topics of a recording; "tactile".
         with_images: also record, or show live, the frames' images; False.
         live: also show the frames while the run goes on, by "foxglove" or "rerun"; None.
-        live_port: port of the live server on this machine, 0: any; None: the viewer's own.
-        live_wait_s: how long the first frame waits for a viewer of Foxglove, s; 0.
+        live_port, live_wait_s: see ``Live``; None and 0.
     """
 
     fps: float | None
@@ -362,7 +361,7 @@ class ReconstructJob:
         from cmpdesign.tracking.run import TrackingRun
         from cmpdesign.tracking.shape_summary import ShapeStatistics
         from cmpdesign.tracking.shape_table import ShapeTable
-        from cmpdesign.tracking.sources import open_sources
+        from cmpdesign.tracking.sources import open_sources, split_list
         from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_rig
 
         how, shape = self.reading, self.shape
@@ -381,7 +380,8 @@ class ReconstructJob:
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
         source = open_sources(self.source, how.fps, how.max_pixels)
-        recording = replace(how.recording, views=rig.views)
+        is_one_a_view = len(split_list(self.source)) > 1
+        recording = replace(how.recording, views=rig.views, is_image_one_a_view=is_one_a_view)
         outputs = open_outputs(self.output, ShapeTable(reconstructor, continuation), recording, how.viewer)
         tracker = ShapeTracker(
             reconstructor,

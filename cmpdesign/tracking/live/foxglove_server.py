@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.tracking.live.options import HOST
-from cmpdesign.tracking.recording.frames import RecordedFrame
-from cmpdesign.tracking.recording.messages import DIAGNOSTICS, POINTS
-from cmpdesign.tracking.recording.topics import DIAGNOSTICS_TOPIC, TopicMessages
+from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
+from cmpdesign.tracking.recording.topics import TopicMessages
 
 # Messages that wait for one viewer; then the oldest is left out. With images, 4 a frame, some 32 MB.
 BACKLOG_MESSAGES = 256
 CLOSE_S = 0.5  # time for viewers to take what waits for them
+SUBSCRIBE_S = 0.05  # from a viewer's first subscription to its others
 POLL_S = 0.01
 _LOGGER = "foxglove"
 _FULL = "full"  # in the log line of the library of an outbox that is full
@@ -36,20 +36,25 @@ def require_foxglove() -> Any:
 
 
 class FoxgloveServer:
-    """Serves frames; the topics of markers and diagnostics exist before the first frame.
+    """Serves frames.
 
     Args:
         frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
         port: a free port on this machine.
+        places: of the images that are shown. All topics exist before a client can connect: to a client that is there
+            already, the library may offer a topic before it takes subscriptions to it.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.
     """
 
-    def __init__(self, frame_id: str, port: int) -> None:
+    def __init__(self, frame_id: str, port: int, places: Iterable[ImagePlace] = ()) -> None:
         self._foxglove, self._messages = require_foxglove(), TopicMessages(frame_id)
-        self._watch = _watch_log(self._foxglove)
         self._context = self._foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        for topic, kind in self._messages.kinds(places).items():
+            self._channel(topic, kind)
+        self._watch = _watch_log(self._foxglove)
         try:
             self._server = self._foxglove.start_server(
                 name=f"cmpdesign: {frame_id}",
@@ -61,17 +66,18 @@ class FoxgloveServer:
         except RuntimeError as error:
             raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
         self.address = f"ws://{HOST}:{self._server.port}"
-        self._channels: dict[str, Any] = {}
-        for topic, kind in ((self._messages.points_topic, POINTS), (DIAGNOSTICS_TOPIC, DIAGNOSTICS)):
-            self._channel(topic, kind)
 
     def wait(self, seconds: float) -> bool:
-        """Wait until a viewer has subscribed to the markers."""
+        """Wait until a viewer has subscribed to a topic."""
         end = time.monotonic() + seconds
-        points = self._channels[self._messages.points_topic]
-        while not points.base.has_sinks() and time.monotonic() < end:
+        while not self._is_watched() and time.monotonic() < end:
             time.sleep(POLL_S)
-        return bool(points.base.has_sinks())
+        if self._is_watched():
+            time.sleep(SUBSCRIBE_S)
+        return self._is_watched()
+
+    def _is_watched(self) -> bool:
+        return any(channel.base.has_sinks() for channel in self._channels.values())
 
     def send(self, frames: Sequence[RecordedFrame]) -> None:
         for frame in frames:
@@ -82,7 +88,7 @@ class FoxgloveServer:
         return self._watch.is_behind
 
     def close(self) -> None:
-        if any(channel.base.has_sinks() for channel in self._channels.values()):
+        if self._is_watched():
             time.sleep(CLOSE_S)
         self._server.stop()
         for channel in self._channels.values():

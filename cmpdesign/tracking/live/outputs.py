@@ -9,7 +9,7 @@ from typing import NamedTuple
 from cmpdesign.tracking.columns import FrameTable
 from cmpdesign.tracking.live.options import Live
 from cmpdesign.tracking.live.view import LiveView, open_view
-from cmpdesign.tracking.recording.options import RecordedTable, Recording, is_recording
+from cmpdesign.tracking.recording.options import Recording, is_recording
 from cmpdesign.tracking.sinks.tables import FrameSink, open_sink
 
 
@@ -34,7 +34,7 @@ def open_outputs(path: Path, table: FrameTable, recording: Recording, live: Live
     """
     if live is None:
         return Outputs(open_sink(path, table, recording), None)
-    view = open_view(live, RecordedTable(table, recording), recording.frame_id, recording.with_images)
+    view = open_view(live, table, recording)
     kept = recording if is_recording(path) else replace(recording, with_images=False)
     try:
         return Outputs(open_sink(path, table, kept), view)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from threading import Condition, Thread
 from typing import Any, NamedTuple
 
+from cmpdesign.tracking.columns import FrameTable
 from cmpdesign.tracking.live.options import Live, Server
-from cmpdesign.tracking.recording.frames import FrameReader
+from cmpdesign.tracking.recording.frames import FrameReader, image_places
 from cmpdesign.tracking.recording.images import png_of
-from cmpdesign.tracking.recording.options import RecordedTable
+from cmpdesign.tracking.recording.options import RecordedTable, Recording
 
 QUEUE_FRAMES = 32  # that wait for the thread; then the oldest is left out
 AT_ONCE = 4  # frames that the thread takes together
@@ -125,22 +126,29 @@ class LiveView:
         self._sent += len(some)
 
 
-def open_view(live: Live, table: RecordedTable, frame_id: str, with_images: bool) -> LiveView:
+def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
     """Start a server and the thread that feeds it.
+
+    Args:
+        live: the server's options.
+        table: the frames' columns.
+        recording: what is shown; its images as they would be recorded.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.
     """
+    shown = RecordedTable(table, recording)
     server: Server
     if live.kind == "foxglove":
         from cmpdesign.tracking.live.foxglove_server import FoxgloveServer, require_foxglove
 
         require_foxglove()
-        server = FoxgloveServer(frame_id, live.free_port())
+        places = image_places(shown.about(), recording.is_image_one_a_view) if recording.with_images else ()
+        server = FoxgloveServer(recording.frame_id, live.free_port(), places)
     else:
         from cmpdesign.tracking.live.rerun_server import RerunServer
         from cmpdesign.tracking.recording.rerun_log import require_rerun
 
         require_rerun()
-        server = RerunServer(frame_id, live.free_port())
-    return LiveView(server, table, with_images, live.wait_s)
+        server = RerunServer(recording.frame_id, live.free_port())
+    return LiveView(server, shown, recording.with_images, live.wait_s)

@@ -31,6 +31,13 @@ class CameraView(NamedTuple):
     lens: Lens
 
 
+class ImagePlace(NamedTuple):
+    """The first part of an image's topics, without "/" before it, and the views that it shows."""
+
+    base: str
+    views: tuple[CameraView, ...]
+
+
 @dataclass(frozen=True)
 class FrameImage:
     """An image of a frame.
@@ -112,13 +119,28 @@ class FrameReader:
         return self._last_ns
 
 
+def image_places(about: Columns, is_one_a_view: bool) -> list[ImagePlace]:
+    """Where the images of all frames stand.
+
+    Args:
+        about: the shared columns of a ``RecordedTable``.
+        is_one_a_view: the source has an image for each view; otherwise one image shows all views.
+    """
+    return [_place(view, about) for view in (range(len(about["view_names"])) if is_one_a_view else [None])]
+
+
+def _place(view: int | None, about: Columns) -> ImagePlace:
+    frame_id = str(about["frame_id"])
+    base = frame_id if view is None else f"{frame_id}/{_topic_name(str(about['view_names'][view]))}"
+    return ImagePlace(base, tuple(_views_in(view, base, about)))
+
+
 def _frame_images(number: int, about: Columns, images_of: ImagesOf) -> Iterator[FrameImage]:
-    frame_id, views = str(about["frame_id"]), [str(name) for name in about["view_names"]]
-    for view in (None, *range(len(views))):
+    for view in (None, *range(len(about["view_names"]))):
         png = images_of(number, view)
         if png is not None:
-            base = frame_id if view is None else f"{frame_id}/{_topic_name(views[view])}"
-            yield FrameImage(base, png, _size_px(png), tuple(_views_in(view, base, about)))
+            place = _place(view, about)
+            yield FrameImage(place.base, png, _size_px(png), place.views)
 
 
 def _views_in(view: int | None, base: str, about: Columns) -> Iterator[CameraView]:

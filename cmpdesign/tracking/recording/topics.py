@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.tracking.recording.frames import RecordedFrame
+from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
 from cmpdesign.tracking.recording.messages import CAMERA, DIAGNOSTICS, IMAGE, POINTS, Messages, Stamp
 
 DIAGNOSTICS_TOPIC = "/diagnostics"
@@ -46,6 +46,16 @@ def require_rosbags() -> Any:
     return rosbags
 
 
+def image_topic(base: str) -> str:
+    """The topic of an image; see ``FrameImage``."""
+    return f"/{base}/image_raw/compressed"
+
+
+def camera_topic(base: str) -> str:
+    """The topic of what is known of a camera; see ``CameraView``."""
+    return f"/{base}/camera_info"
+
+
 class TopicMessages:
     """Makes the messages of frames.
 
@@ -66,6 +76,14 @@ class TopicMessages:
         """The topic of the markers."""
         return f"/{self._frame_id}/markers"
 
+    def kinds(self, places: Iterable[ImagePlace] = ()) -> dict[str, str]:
+        """The types of all topics: of the markers, the diagnostics, and of images at the places."""
+        kinds = {self.points_topic: POINTS, DIAGNOSTICS_TOPIC: DIAGNOSTICS}
+        for place in places:
+            kinds[image_topic(place.base)] = IMAGE
+            kinds |= {camera_topic(view.base): CAMERA for view in place.views}
+        return kinds
+
     def of(self, frame: RecordedFrame) -> Iterator[TopicMessage]:
         """The messages of a frame: markers, diagnostics, images, and beside each image its cameras."""
         make, stamp = self._messages, Stamp(frame.ns, self._frame_id)
@@ -75,10 +93,10 @@ class TopicMessages:
         for image in frame.images:
             stamp = Stamp(frame.ns, image.frame_id)
             picture = make.image(stamp, image.png)
-            yield self._message(f"/{image.base}/image_raw/compressed", IMAGE, picture, frame.ns)
+            yield self._message(image_topic(image.base), IMAGE, picture, frame.ns)
             for view in image.views:
                 camera = make.camera(stamp, image.size_px, view.lens)
-                yield self._message(f"/{view.base}/camera_info", CAMERA, camera, frame.ns)
+                yield self._message(camera_topic(view.base), CAMERA, camera, frame.ns)
 
     def _message(self, topic: str, kind: str, message: Any, ns: int) -> TopicMessage:
         return TopicMessage(topic, kind, ns, self.store.serialize_cdr(message, kind))
