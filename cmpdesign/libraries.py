@@ -27,7 +27,7 @@ EXTRAS = {
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
     "live": "frames sent to Foxglove while they are read",
-    "rerun": "recordings for Rerun",
+    "rerun": "recordings and a live view for Rerun",
     "dask": "experiments on several machines",
 }
 # Distributions of another name than their module.
