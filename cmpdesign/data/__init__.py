@@ -1,0 +1,25 @@
+"""Data sets larger than a machine: many shards of rendered frames, or of frames read from videos.
+
+In: a plan (TOML), or videos and a layout; processes of this machine, or the workers of a dask cluster. Out: a folder of
+shards: images as WebDataset tar, truth, markers and parameters as Parquet; ``load`` reads it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cmpdesign.data.load import DataSet as DataSet
+    from cmpdesign.data.load import Frame as Frame
+    from cmpdesign.data.load import load as load
+
+__all__ = ["DataSet", "Frame", "load"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the reader at its first use: it needs pyarrow."""
+    if name not in __all__:
+        raise AttributeError(f"module 'cmpdesign.data' has no attribute {name!r}")
+    from cmpdesign.data import load as reader
+
+    return getattr(reader, name)
