@@ -6,12 +6,13 @@ shards: images as WebDataset tar, truth, markers and parameters as Parquet; ``lo
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmpdesign.data.load import DataSet as DataSet
-    from cmpdesign.data.load import Frame as Frame
-    from cmpdesign.data.load import load as load
+    from cmpdesign.data.reader import DataSet as DataSet
+    from cmpdesign.data.reader import Frame as Frame
+    from cmpdesign.data.reader import load as load
 
 __all__ = ["DataSet", "Frame", "load"]
 
@@ -20,6 +21,4 @@ def __getattr__(name: str) -> Any:
     """Load the reader at its first use: it needs pyarrow."""
     if name not in __all__:
         raise AttributeError(f"module 'cmpdesign.data' has no attribute {name!r}")
-    from cmpdesign.data import load as reader
-
-    return getattr(reader, name)
+    return getattr(import_module("cmpdesign.data.reader"), name)

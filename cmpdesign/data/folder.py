@@ -34,6 +34,7 @@ FORMAT_RECORD, FORMAT_MANIFEST = "cmp-dataset-shard", "cmp-dataset"
 PLAN, MANIFEST, UNFINISHED = "plan.json", "manifest.json", "unfinished"
 # Keys on which no frame depends.
 OUTSIDE_DIGEST = ("digest", "frames", "name", "description")
+BLOCK_BYTES = 1 << 20
 MOST_DIGITS = 6  # of a shard's number
 Record = Mapping[str, Any]
 
@@ -205,8 +206,11 @@ def file_digest(path: Path) -> str:
     Raises:
         InputError: the file cannot be opened.
     """
+    digest = hashlib.sha256()
     with open_file(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        while block := file.read(BLOCK_BYTES):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def clear_unfinished(folder: Path, numbers: Iterable[int]) -> None:
@@ -239,6 +243,28 @@ class Progress:
     bytes: int
 
 
+def _find_records(folder: Path, plan: Mapping[str, Any]) -> Iterator[Record]:
+    for number in range(number_of_shards(plan)):
+        record = find_record(folder, plan["digest"], number)
+        if record is not None:
+            yield record
+
+
+def finished_records(folder: Path) -> list[Record]:
+    """The records of the finished shards of a data set, from its manifest where this is complete.
+
+    Raises:
+        CmpDesignError: the folder holds no plan.
+    """
+    plan = read_plan(folder)
+    if path_exists(folder / MANIFEST):
+        manifest = read_json(folder / MANIFEST)
+        is_of_plan = isinstance(manifest, dict) and manifest.get("plan") == plan["digest"]
+        if is_of_plan and len(manifest.get("shards", ())) == number_of_shards(plan):
+            return list(manifest["shards"])
+    return list(_find_records(folder, plan))
+
+
 def write_manifest(folder: Path) -> Progress:
     """Write manifest.json with the records of all finished shards, in their order.
 
@@ -248,8 +274,7 @@ def write_manifest(folder: Path) -> Progress:
     """
     plan = read_plan(folder)
     count = number_of_shards(plan)
-    found = [find_record(folder, plan["digest"], number) for number in range(count)]
-    records = [record for record in found if record is not None]
+    records = list(_find_records(folder, plan))
     shards = [
         {key: value for key, value in record.items() if key not in ("format", "version", "digest")}
         for record in records

@@ -8,7 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from cmpdesign.data.extraction import EXTRACTED, range_rows
+from cmpdesign.data.files.tables import PREFIX, Row, frame_columns, frame_key, frame_row, write_table
+from cmpdesign.data.files.webdataset import TarWriter
 from cmpdesign.data.folder import (
     FORMAT_EXTRACTION,
     Record,
@@ -17,9 +18,8 @@ from cmpdesign.data.folder import (
     read_plan,
     unfinished_shard,
 )
-from cmpdesign.data.frames import FrameMaker
-from cmpdesign.data.tables import PREFIX, Row, frame_columns, frame_key, frame_row, write_table
-from cmpdesign.data.webdataset import TarWriter
+from cmpdesign.data.frames.frame import FrameMaker
+from cmpdesign.data.videos.extraction import EXTRACTED, range_rows
 
 IMAGES, TABLES = "images.tar", "tables.parquet"
 

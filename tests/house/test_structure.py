@@ -35,7 +35,7 @@ ROOMS = {
         " pipeline made track space draw"
     ),
     "cmpdesign": (
-        "errors units inputs patterns design layout files reading contact scene products tracking evaluate api"
+        "errors units inputs patterns design layout files reading contact scene products tracking evaluate data api"
         " proposal cli demo __main__ writers"
     ),
 }

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact import Contact
-from cmpdesign.data.distributions import value_at, varying_leaves
-from cmpdesign.data.frames import FrameRecord, document_text
+from cmpdesign.data.frames.distributions import value_at, varying_leaves
+from cmpdesign.data.frames.frame import FrameRecord, document_text
 from extractor import Markers
 
 PREFIX = "scene."  # of the columns with drawn values
@@ -174,7 +174,9 @@ def arrow_schema(columns: Mapping[str, str], about: Mapping[str, str]) -> Any:
     return pyarrow.schema(fields, metadata=dict(about))
 
 
-def write_table(path: Path, rows: Sequence[Row], columns: Mapping[str, str], about: Mapping[str, str]) -> None:
+def write_table(
+    path: Path, rows: Sequence[Row], columns: Mapping[str, str], about: Mapping[str, str]
+) -> None:
     """Write a Parquet file.
 
     Raises:
@@ -184,8 +186,6 @@ def write_table(path: Path, rows: Sequence[Row], columns: Mapping[str, str], abo
     import pyarrow.parquet
 
     schema = arrow_schema(columns, about)
-    arrays = [
-        pyarrow.array([row[field.name] for row in rows], type=field.type) for field in schema
-    ]
+    arrays = [pyarrow.array([row[field.name] for row in rows], type=field.type) for field in schema]
     table = pyarrow.Table.from_arrays(arrays, schema=schema)
     pyarrow.parquet.write_table(table, path, compression=COMPRESSION)

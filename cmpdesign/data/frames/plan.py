@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cmpdesign import __version__
-from cmpdesign.data.distributions import ABSENT, Source, check_distributions, distribution_kind, draw
 from cmpdesign.data.folder import FORMAT_FRAMES, Prepared, plan_digest
+from cmpdesign.data.frames.distributions import ABSENT, Source, check_distributions, distribution_kind, draw
 from cmpdesign.design.design import load_design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.layout_json import layout_to_json, pattern_digest
@@ -48,7 +48,9 @@ class _Table(BaseModel):
 class ImageTable(_Table):
     """[image]: how a frame's picture is encoded."""
 
-    kind: Literal["jpeg", "png"] = Field("jpeg", description="JPEG keeps the full resolution of color (4:4:4).")
+    kind: Literal["jpeg", "png"] = Field(
+        "jpeg", description="JPEG keeps the full resolution of color (4:4:4)."
+    )
     quality: int = Field(95, ge=1, le=100, description="Of JPEG.")
 
 
@@ -69,8 +71,8 @@ class PlanTable(_Table):
     seed: int = Field(0, ge=0)
     designs: list[str] = Field(min_length=1, max_length=1000)
     weights: list[float] | None = None
-    image: ImageTable = ImageTable()
-    markers: MarkersTable = MarkersTable()
+    image: ImageTable = Field(default_factory=lambda: ImageTable.model_validate({}))
+    markers: MarkersTable = Field(default_factory=lambda: MarkersTable.model_validate({}))
     scene: dict[str, Any]
 
     @model_validator(mode="after")
@@ -235,4 +237,3 @@ def _try_scenes(scene: Mapping[str, Any], layouts: list[Layout], path: Path) -> 
             scene_from_document(drawn, path, layouts[number % len(layouts)])
         except SceneError as error:
             raise PlanError(f"{error} (in a scene that the plan can draw)") from None
-

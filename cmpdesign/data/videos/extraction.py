@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from cmpdesign import __version__
+from cmpdesign.data.files.tables import Row, lost_values, marker_values
 from cmpdesign.data.folder import FORMAT_EXTRACTION, Prepared, file_digest, plan_digest
-from cmpdesign.data.tables import Row, lost_values, marker_values
-from cmpdesign.data.video_index import Piece, VideoFrame, piece_frames, video_pieces
+from cmpdesign.data.videos.pieces import Piece, VideoFrame, piece_frames, video_pieces
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.files.layout_json import layout_to_json
@@ -106,9 +106,7 @@ def _cut_pictures(count: int, frames_a_shard: int) -> list[Piece]:
     return [Piece(start, min(frames_a_shard, count - start)) for start in starts]
 
 
-def prepare_extraction(
-    layout: Reference, sources: Sequence[Mapping[str, Any]], options: Reading
-) -> Prepared:
+def prepare_extraction(layout: Reference, sources: Sequence[Mapping[str, Any]], options: Reading) -> Prepared:
     """The plan of an extraction from indexed sources."""
     plan = {
         "format": FORMAT_EXTRACTION,
@@ -131,7 +129,7 @@ def range_rows(folder: Path, plan: Mapping[str, Any], number: int) -> list[Row]:
     """
     source, piece = _piece(plan, number)
     extractor = _extractor(folder / LAYOUT, Reading(**plan["reading"]))
-    rows = []
+    rows: list[Row] = []
     for frame in _frames(source, piece):
         if frame.image is None:
             values = lost_values(len(extractor.layout.layer), UNREADABLE)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact import Contact
-from cmpdesign.data.distributions import draw
-from cmpdesign.data.plan import PlanError, design_choice
+from cmpdesign.data.frames.distributions import draw
+from cmpdesign.data.frames.plan import PlanError, design_choice
 from cmpdesign.files.images import decode_bytes, to_jpeg, to_png
 from cmpdesign.layout.layout import Layout
 from cmpdesign.reading.read_layout import layout_from_reference

@@ -1,7 +1,7 @@
 """Work on a dask cluster, however it was started: by hand, over SSH, by SLURM, on Kubernetes.
 
-The scheduler gives the work of a lost worker to another one. What the work returns is small: shards are files in a folder
-that all workers see.
+The scheduler gives the work of a lost worker to another one. What the work returns is small: shards are files in a
+folder that all workers see.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import logging
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from cmpdesign.data.processes import installed_versions, limit_threads, require_versions
+from cmpdesign.data.schedule.processes import installed_versions, limit_threads, require_versions
 from cmpdesign.errors import CmpDesignError
 
 CONNECT_S = 10
@@ -35,8 +36,7 @@ def cluster_results(
         CmpDesignError: the scheduler cannot be reached or went away, a worker has other versions or was lost too
             often; or of the work.
     """
-    import distributed
-
+    distributed: Any = import_module("distributed")
     done = 0
     try:
         with _quiet(), _client(address) as client:
@@ -80,8 +80,7 @@ def _client(address: str) -> Any:
     Raises:
         CmpDesignError: the scheduler cannot be reached.
     """
-    import distributed
-
+    distributed: Any = import_module("distributed")
     is_file = address.endswith(".json")
     if is_file and not Path(address).is_file():
         raise CmpDesignError(f"{address}: no such scheduler file; start the scheduler first")
@@ -96,9 +95,9 @@ def _client(address: str) -> Any:
 
 def _thread_plugin() -> Any:
     """A plugin that limits the threads of all workers, also of those that join later."""
-    import distributed
+    distributed: Any = import_module("distributed")
 
-    class Threads(distributed.WorkerPlugin):
+    class Threads(distributed.WorkerPlugin):  # type: ignore[misc]
         def setup(self, worker: Any) -> None:
             limit_threads()
 
@@ -108,10 +107,12 @@ def _thread_plugin() -> Any:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Without the log of distributed, whose events are told in one line at the end."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)

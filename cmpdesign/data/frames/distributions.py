@@ -148,7 +148,9 @@ def _check_kind(kind: str, table: Mapping[str, Any], path: str) -> None:
         case "repeat":
             counts = _whole_numbers(given)
             good = counts is not None and all(0 <= count <= MOST_REPEATS for count in counts)
-            limit = f"a whole number from 0 to {MOST_REPEATS}, or {{whole = [...]}} or {{choice = [...]}} of them"
+            limit = (
+                f"a whole number from 0 to {MOST_REPEATS}, or {{whole = [...]}} or {{choice = [...]}} of them"
+            )
             _require(good, path, kind, given, limit)
         case _:
             _check_pair(kind, given, path)

@@ -10,8 +10,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cmpdesign.data.cluster import cluster_results
-from cmpdesign.data.processes import start_local_worker
+from cmpdesign.data.schedule.cluster import cluster_results
+from cmpdesign.data.schedule.processes import start_local_worker
 from cmpdesign.errors import CmpDesignError
 
 MOST_LOSSES = 3  # of workers, one after another without a result in between
