@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -120,9 +121,10 @@ def _carry_out(
     done = len(wanted) - len(missing)
     watch(done, len(wanted))
     try:
-        for _ in results(partial(make_shard, str(folder)), missing, scheduler):
-            done += 1
-            watch(done, len(wanted))
+        with closing(results(partial(make_shard, str(folder)), missing, scheduler)) as made:
+            for _ in made:
+                done += 1
+                watch(done, len(wanted))
     finally:
         clear_unfinished(folder, missing)
     return write_manifest(folder)

@@ -6,7 +6,8 @@ Results come in the order of completion; none depends on it, nor on the number o
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,7 +61,7 @@ def _usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Iterator[Any]:
+def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator[Any, None, None]:
     """The result of every item, as they come.
 
     Args:
@@ -81,9 +82,10 @@ def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[
     open_items, losses = list(range(len(items))), 0
     while open_items:
         before = len(open_items)
-        for place, result in _pool_results(work, items, tuple(open_items), min(workers, before)):
-            open_items.remove(place)
-            yield result
+        with closing(_pool_results(work, items, tuple(open_items), min(workers, before))) as found:
+            for place, result in found:
+                open_items.remove(place)
+                yield result
         losses = losses + 1 if len(open_items) == before else 1
         if open_items and losses > MOST_LOSSES:
             raise CmpDesignError(
@@ -111,6 +113,9 @@ def _pool_results(
             return
         except BaseException:  # parts in work would take minutes, and are made anew
             pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(active_children()) - others:
+            mine = set(active_children()) - others
+            for process in mine:
                 process.kill()
+            for process in mine:  # until then, they hold the locks of their files
+                process.join()
             raise

@@ -55,7 +55,7 @@ def number_of(image: np.ndarray) -> int:
 def test_every_frame_is_in_one_part_under_its_number(name: str, tmp_path: Path) -> None:
     path = write_numbered(tmp_path / name)
     pieces = video_pieces(path, 4)
-    assert len(pieces) > 2 and all(piece.frames >= 4 for piece in pieces[:-1])
+    assert len(pieces) >= 2 and all(piece.frames >= 4 for piece in pieces[:-1])
     found = [frame for piece in reversed(pieces) for frame in piece_frames(path, piece)]
     assert sorted(frame.number for frame in found) == list(range(FRAMES))
     assert all(number_of(frame.image) == frame.number for frame in found)
