@@ -28,7 +28,8 @@ EXTRAS = {
     "export": "data sets for LeRobot and Diffusion Policy",
     "live": "frames sent to Foxglove while they are read",
     "rerun": "recordings and a live view for Rerun",
-    "dask": "experiments on several machines",
+    "data": "data sets for training",
+    "dask": "data sets made by several machines",
 }
 # Distributions of another name than their module.
 _DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk", "cv2": "opencv-contrib-python-headless", "PIL": "pillow"}

@@ -10,6 +10,7 @@ from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
 from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
 from cmpdesign.cli.commands.calibrate import group as calibrate
+from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.starting import init, schema, templates
 from cmpdesign.cli.terminal import print_document
@@ -35,6 +36,8 @@ for module, function in (
     (verify, verify.verify),
     (track, track.track),
     (reconstruct, reconstruct.reconstruct),
+    (dataset, dataset.dataset),
+    (extract, extract.extract),
     (kerf, kerf.kerf),
     (schema, schema.schema),
 ):

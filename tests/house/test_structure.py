@@ -36,7 +36,7 @@ ROOMS = {
     ),
     "cmpdesign": (
         "errors libraries units workers inputs patterns design layout files reading contact scene products tracking"
-        " evaluate api proposal cli demo __main__ writers"
+        " evaluate data api proposal cli demo __main__ writers"
     ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign", "cmpdesign.writers"}  # the tops, and what is kept for old programs
