@@ -38,12 +38,13 @@ def lerobot(
     from cmpdesign.cli.documents.runs import ExportDocument
     from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
+    from cmpdesign.watch import watched
 
     require_positive("--fps", fps)
     require_one_kind(runs)
     rate = frames_per_second(runs) if fps is None else tidy_fps(fps)
     about = DataSet(rate, task, robot, tuple(images or ()), max_pixels)
-    with working("exporting"):
+    with working("exporting") as steps, watched(steps.tell):
         frames = write_lerobot(runs, output, about)
     _warn_of_uneven_times(runs, rate)
     say(
