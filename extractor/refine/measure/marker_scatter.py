@@ -56,14 +56,15 @@ class ScatterLimits(NamedTuple):
         smooth_ratio: variance of fourth differences over that of third ones on smooth maps. On bulges and twists of the
             suite "plain" it is 0.14 to 0.41, at the last step (`python -m benchmarks.calibration --suite plain`).
         noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
-            the variance of the fourth differences asks for 1.0 to 1.5.
+            fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
+            40 to 60.
         start_allowance: the same before the first step by synthesis, where markers are as profiles left them: dirt of
             the suite "damage" asks for up to 61 there.
         median_over_mean: a median of squared lengths in two axes over their mean, of normal differences: ln 2.
     """
 
     smooth_ratio: float = 0.3
-    noise_allowance: float = 2.0
+    noise_allowance: float = 8.0
     start_allowance: float = 100.0
     median_over_mean: float = float(np.log(2.0))
 

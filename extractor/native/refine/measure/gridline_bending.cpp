@@ -72,6 +72,19 @@ void fill_lane(Index m, Index lane, View<const double, 2> squares, View<const st
   }
 }
 
+// The variance by noise, px^2, of a third difference between markers with these blocks (M, 3) of the
+// information.
+double third_difference_noise(View<const double, 2> diagonal, const BendingLimits& limits) {
+  Array<double, 1> trace({diagonal.size()});
+  Index count = 0;
+  for (Index m = 0; m < diagonal.size(); ++m) {
+    trace[count] = diagonal(m, 0) + diagonal(m, 2);
+    count += !std::isnan(trace[count]);
+  }
+  // the median, as markers with little weight where gridlines bend must not be taken for noise
+  return limits.third_difference_noise * 2.0 / numeric::median_of_many(trace.slice(0, count));
+}
+
 // The numbers of gridlines at a marker and at its neighbours, all and those above the noise.
 struct NearbyCounts {
   double known, above;
@@ -90,22 +103,11 @@ NearbyCounts count_nearby(Index m, const MarkerDifferences& own, View<const std:
 
 }  // namespace
 
-double median_marker_variance(View<const double, 2> diagonal) {
-  Array<double, 1> trace({diagonal.size()});
-  Index count = 0;
-  for (Index m = 0; m < diagonal.size(); ++m) {
-    trace[count] = diagonal(m, 0) + diagonal(m, 2);
-    count += !std::isnan(trace[count]);
-  }
-  // the median, as markers with little weight where gridlines bend must not be taken for noise
-  return 2.0 / numeric::median_of_many(trace.slice(0, count));
-}
-
 Array<double, 1> measure_roughness(View<const double, 2> xy, View<const double, 3> maps,
                                    View<const double, 2> diagonal, const MarkerRows& rows,
                                    View<const std::int32_t, 2> spokes, View<const std::int32_t, 2> near,
                                    const BendingLimits& limits) {
-  const double noise = limits.third_difference_noise * median_marker_variance(diagonal);
+  const double noise = third_difference_noise(diagonal, limits);
   const auto own = differences_at_markers(squared_third_differences(xy, maps, rows), spokes, noise, limits);
   Array<double, 1> out({spokes.size()}, 0.0);
   LaneColumn column;

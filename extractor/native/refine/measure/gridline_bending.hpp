@@ -13,8 +13,8 @@ namespace cmp::refine {
 // Limits of bending; explained in extractor/refine/measure/gridline_bending.py.
 struct BendingLimits {
   double min_bend_share, max_bend_share, bend_to_end_shift, max_bend_deviation, third_difference_noise;
-  double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend,
-      bend_by_scatter;
+  double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend;
+  double bend_by_scatter;
   double min_determinant_share, min_information_share, band;
 
   template <class F>
@@ -65,9 +65,6 @@ Array<double, 1> measure_roughness(View<const double, 2> xy, View<const double, 
                                    View<const double, 2> diagonal, const MarkerRows& rows,
                                    View<const std::int32_t, 2> spokes, View<const std::int32_t, 2> near,
                                    const BendingLimits& limits);
-
-// px^2, the median variance of markers, one axis, by these blocks (M, 3) of the information.
-double median_marker_variance(View<const double, 2> diagonal);
 
 // The third difference of the four markers along edge e, less the layout's own (`third`).
 inline ThirdDifference third_difference(View<const double, 2> xy, View<const double, 3> maps,

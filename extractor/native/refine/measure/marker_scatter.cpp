@@ -37,6 +37,19 @@ double median_square(View<const ThirdDifference, 1> differences) {
   return numeric::median_of_many(squares.slice(0, count));
 }
 
+// px^2, one axis: the median of the markers' variances by these blocks (M, 3) of the information.
+double median_noise(View<const double, 2> diagonal) {
+  Array<double, 1> variances({diagonal.size()});
+  Index count = 0;
+  for (Index m = 0; m < diagonal.size(); ++m) {
+    const double xx = diagonal(m, 0), xy = diagonal(m, 1), yy = diagonal(m, 2);
+    // steep views tell one axis better than the other: half the trace of the inverse
+    variances[count] = 0.5 * (xx + yy) / (xx * yy - xy * xy);
+    count += std::isfinite(variances[count]);
+  }
+  return numeric::median_of_many(variances.slice(0, count));
+}
+
 // The fourth differences, px: each between the third differences of an edge and of the one that follows it.
 Array<ThirdDifference, 1> fourth_differences(View<const ThirdDifference, 1> third,
                                              const layout::Topology& topology) {
@@ -69,7 +82,7 @@ ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> m
   const double independent = (of_fourth - limits.smooth_ratio * of_third) /
                              (FOURTH_DIFFERENCE_SQUARES - limits.smooth_ratio * THIRD_DIFFERENCE_SQUARES);
   const double allowance = by_synthesis ? limits.noise_allowance : limits.start_allowance;
-  const double variance = independent - allowance * median_marker_variance(diagonal);
+  const double variance = independent - allowance * median_noise(diagonal);
   if (!(variance > 0.0)) return {0.0, 0.0};
   return {variance, std::min(FOURTH_DIFFERENCE_SQUARES * variance / of_fourth, 1.0)};
 }
