@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "numeric/median.hpp"
 #include "refine/measure/gridline_bending.hpp"
@@ -26,15 +27,24 @@ Array<ThirdDifference, 1> third_differences(View<const double, 2> xy, View<const
   return out;
 }
 
-// px^2, the median square of the known differences.
-double median_square(View<const ThirdDifference, 1> differences) {
+// px^2, one axis: the variance of differences, by the median of their squares and by a lower quantile.
+struct Variances {
+  double median, low;
+};
+
+// Squared lengths of normal differences in two axes are exponential, with twice the variance as their mean.
+Variances variances_of(View<const ThirdDifference, 1> differences, double quantile) {
   Array<double, 1> squares({differences.size()});
   Index count = 0;
   for (const auto [x, y] : differences) {
     squares[count] = x * x + y * y;
     count += std::isfinite(squares[count]);
   }
-  return numeric::median_of_many(squares.slice(0, count));
+  if (count == 0) return {NONE, NONE};
+  const auto known = squares.slice(0, count);
+  const double median = numeric::median_of_many(known);
+  const double low = numeric::select(known, static_cast<Index>(quantile * static_cast<double>(count)));
+  return {0.5 * median / std::numbers::ln2, -0.5 * low / std::log1p(-quantile)};
 }
 
 // px^2, one axis: the median of the markers' variances by these blocks (M, 3) of the information.
@@ -75,16 +85,14 @@ ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> m
                                View<const double, 2> diagonal, const layout::Topology& topology,
                                bool by_synthesis, const ScatterLimits& limits) {
   const Array<ThirdDifference, 1> third = third_differences(xy, maps, topology);
-  // variances of one axis
-  const double per_square = 1.0 / (2.0 * limits.median_over_mean);
-  const double of_third = per_square * median_square(third);
-  const double of_fourth = per_square * median_square(fourth_differences(third, topology));
-  const double independent = (of_fourth - limits.smooth_ratio * of_third) /
+  const Variances of_third = variances_of(third, limits.quantile);
+  const Variances of_fourth = variances_of(fourth_differences(third, topology), limits.quantile);
+  const double independent = (of_fourth.low - limits.smooth_ratio * of_third.low) /
                              (FOURTH_DIFFERENCE_SQUARES - limits.smooth_ratio * THIRD_DIFFERENCE_SQUARES);
   const double allowance = by_synthesis ? limits.noise_allowance : limits.start_allowance;
   const double variance = independent - allowance * median_noise(diagonal);
   if (!(variance > 0.0)) return {0.0, 0.0};
-  return {variance, std::min(FOURTH_DIFFERENCE_SQUARES * variance / of_fourth, 1.0)};
+  return {variance, std::min(FOURTH_DIFFERENCE_SQUARES * variance / of_fourth.median, 1.0)};
 }
 
 }  // namespace cmp::refine

@@ -21,11 +21,11 @@ struct MarkerScatter {
 
 // Limits of scatter; explained in extractor/refine/measure/marker_scatter.py.
 struct ScatterLimits {
-  double smooth_ratio, noise_allowance, start_allowance, median_over_mean;
+  double smooth_ratio, noise_allowance, start_allowance, quantile;
 
   template <class F>
   static ScatterLimits read(const F& f) {
-    return {f["smooth_ratio"], f["noise_allowance"], f["start_allowance"], f["median_over_mean"]};
+    return {f["smooth_ratio"], f["noise_allowance"], f["start_allowance"], f["quantile"]};
   }
 };
 
