@@ -3,8 +3,8 @@
 Castings scatter. Where a marker lies off by itself, the sides of its cells stay straight, and the tangents of a map
 through such markers are wrong by as much as the markers scatter. The differences of markers along their gridlines tell
 scatter from bending. Independent scatter of variance v per axis gives third differences (1, 3, 3, 1) a variance of
-20 v, and fourth ones (1, 4, 6, 4, 1) of 70 v; the fourth differences of a smooth map are smaller against its third ones.
-With r the largest ratio of both variances on maps that bend,
+20 v, and fourth ones (1, 4, 6, 4, 1) of 70 v. Where a map bends, its fourth differences are smaller against its third
+ones. With r the largest ratio of both variances there,
 
     v = (fourth - r third) / (70 - 20 r) - noise,
 
@@ -53,10 +53,10 @@ class ScatterLimits(NamedTuple):
     """Limits of the scatter.
 
     Attributes:
-        smooth_ratio: variance of fourth differences over that of third ones, at most, where there is no scatter. On bulges
+        smooth_ratio: variance of fourth differences over that of third ones, at most, where nothing scatters. On bulges
             and twists of the suite "plain" it is 0.14 to 0.41 (`python -m benchmarks.calibration --suite plain`). With
             0.3, dents and balls on patterns of 4 and 6 layers (`tests/extractor/refine/test_bending.py`) were taken for
-            scatter, with 1.5 hardly any, and their errors do not rise.
+            scatter; with 1.5 hardly any are, and their errors do not rise.
         noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
             fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
             40 to 60.
