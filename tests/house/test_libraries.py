@@ -22,11 +22,21 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["p
 NOT_OF_USERS = ("all", "bench", "dev")
 # Modules of another name than their distribution.
 MODULES = {"cadquery-ocp-novtk": "OCP", "foxglove-sdk": "foxglove", "rerun-sdk": "rerun"}
-BROUGHT = {
-    name: {MODULES.get(wanted, wanted) for line in lines for wanted in re.findall(r"^[A-Za-z0-9._-]+", line)}
-    for name, lines in EXTRAS.items()
-    if name not in NOT_OF_USERS
-}
+
+
+def modules_of(extra_name: str) -> frozenset[str]:
+    """The modules that an extra brings, those of the extras that it takes included."""
+    found: set[str] = set()
+    for line in EXTRAS[extra_name]:
+        name, _, extras = re.split(r"[<>=; ]", line)[0].rstrip("]").partition("[")
+        if name == "cmpdesign":
+            found |= frozenset().union(*map(modules_of, extras.split(",")))
+        else:
+            found.add(MODULES.get(name, name))
+    return frozenset(found)
+
+
+BROUGHT = {name: modules_of(name) for name in EXTRAS if name not in NOT_OF_USERS}
 LIBRARIES = frozenset().union(*BROUGHT.values())
 
 
