@@ -25,6 +25,8 @@ ROOMS = (
 # What tests open beside themselves; of cmpdesign only the schema, so that the installed package is imported.
 BESIDE = ("pyproject.toml", "README.md", "cmpdesign/design.schema.json")
 NEED_EXTRAS = ("tests/cmpdesign/files/test_earlier_files.py",)  # builds every product
+# An installed package has no file at the place that the templates' first lines name, which is for editors.
+OF_THE_SOURCES = ("tests/cmpdesign/design/test_templates.py::test_a_template_follows_the_schema_it_names",)
 # Signals, links, pipes and locks as POSIX has them.
 NEED_POSIX = ("tests/cmpdesign/files", "tests/cmpdesign/inputs")
 
@@ -43,6 +45,7 @@ def main(options: list[str]) -> int:
             (folder / file).parent.mkdir(exist_ok=True)
             shutil.copy(ROOT / file, folder / file)
         ignored = [f"--ignore={file}" for file in (*NEED_EXTRAS, *unready)]
+        ignored += [f"--deselect={test}" for test in OF_THE_SOURCES]
         command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *ignored, *rooms, *options]
         return subprocess.run(command, cwd=folder, check=False).returncode
 

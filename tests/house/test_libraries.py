@@ -24,19 +24,18 @@ NOT_OF_USERS = ("all", "bench", "dev")
 MODULES = {"cadquery-ocp-novtk": "OCP", "foxglove-sdk": "foxglove", "rerun-sdk": "rerun"}
 
 
-def modules_of(extra_name: str) -> frozenset[str]:
-    """The modules that an extra brings, those of the extras that it takes included."""
+def brought_modules(name: str) -> frozenset[str]:
+    """The modules that an extra brings, with those of the extras that it names."""
     found: set[str] = set()
-    for line in EXTRAS[extra_name]:
-        name, _, extras = re.split(r"[<>=; ]", line)[0].rstrip("]").partition("[")
-        if name == "cmpdesign":
-            found |= frozenset().union(*map(modules_of, extras.split(",")))
+    for line in EXTRAS[name]:
+        if own := re.fullmatch(r"cmpdesign\[(.*)\]", line):
+            found |= frozenset().union(*map(brought_modules, own[1].split(",")))
         else:
-            found.add(MODULES.get(name, name))
+            found |= {MODULES.get(wanted, wanted) for wanted in re.findall(r"^[A-Za-z0-9._-]+", line)}
     return frozenset(found)
 
 
-BROUGHT = {name: modules_of(name) for name in EXTRAS if name not in NOT_OF_USERS}
+BROUGHT = {name: brought_modules(name) for name in EXTRAS if name not in NOT_OF_USERS}
 LIBRARIES = frozenset().union(*BROUGHT.values())
 
 
