@@ -22,6 +22,7 @@ from cmpdesign.data.schedule.schedulers import Scheduler, results
 from cmpdesign.data.shard import make_shard
 from cmpdesign.data.videos.extraction import Reading, index_source, name_tasks, prepare_extraction
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from extractor import Reference
 
 # Called with (shards that are done, shards that are wanted) at the start and after every shard.
@@ -107,7 +108,8 @@ def extract_markers(
 def _carry_out(
     prepared: Prepared, folder: Path, shards: ShardRange, scheduler: Scheduler, watch: Watch
 ) -> Progress:
-    import pyarrow.parquet  # noqa: F401  # tell here, not in a worker, that it is missing
+    with extra("data"):
+        import pyarrow.parquet  # noqa: F401  # tell here, not in a worker, that it is missing
 
     end = prepared.shards if shards.end is None else shards.end
     if end > prepared.shards:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 
 # Packages whose results are in a shard's bytes.
 PACKAGES = ("numpy", "scipy", "opencv-contrib-python-headless", "pyarrow")
@@ -37,7 +38,9 @@ def _end_with_parent() -> None:
 def limit_threads() -> None:
     """Let OpenCV and the libraries of linear algebra use one thread: processes share the cores."""
     import cv2
-    from threadpoolctl import threadpool_limits
+
+    with extra("data"):
+        from threadpoolctl import threadpool_limits
 
     cv2.setNumThreads(1)
     threadpool_limits(1)

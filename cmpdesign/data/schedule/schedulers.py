@@ -14,6 +14,7 @@ from typing import Any
 from cmpdesign.data.schedule.cluster import cluster_results
 from cmpdesign.data.schedule.processes import start_local_worker
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.workers import possible_workers
 
 MOST_LOSSES = 3  # of workers, one after another without a result in between
 DASK = "dask="
@@ -103,7 +104,8 @@ def _pool_results(
     from multiprocessing import active_children, get_context
 
     others = set(active_children())
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=start_local_worker) as pool:
+    size = possible_workers(workers)
+    with ProcessPoolExecutor(size, get_context("spawn"), initializer=start_local_worker) as pool:
         try:
             futures = {pool.submit(work, items[place]): place for place in places}
             for done in as_completed(futures):

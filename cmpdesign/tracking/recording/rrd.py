@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.files.atomic import staged_file
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.columns import Columns
 from cmpdesign.tracking.recording.frames import FrameReader, RecordedFrame
 from cmpdesign.tracking.recording.images import kept_image
@@ -73,7 +74,8 @@ def _open_stream(path: Path, first: Iterable[RecordedFrame], frame_id: str) -> A
 
 def _require_whole(path: Path) -> None:
     """Check that the file has its end: Rerun reports no failure of its last write."""
-    from rerun.chunk import RrdReader
+    with extra("rerun"):
+        from rerun.chunk import RrdReader
 
     try:
         RrdReader(path).store()
