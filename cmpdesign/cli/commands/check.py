@@ -18,7 +18,7 @@ from cmpdesign.cli.options.designs import (
 )
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish, print_warning, say
+from cmpdesign.cli.terminal import finish, print_step, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
@@ -48,6 +48,7 @@ def check(
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
+    print_step(f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers")
     with working("drawing and reading pads" if read else "checking") as steps, watched(steps.tell):
         checked = check_products(parameters, layout, camera_px, read=read, preset=preset)
     for name, reading in checked.readings.items():

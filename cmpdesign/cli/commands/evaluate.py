@@ -12,7 +12,7 @@ import typer
 from cmpdesign.cli.command import Command, Group, examples
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import progress_bar
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.defaults import USUAL_TRIALS
 
@@ -230,6 +230,7 @@ def _run_experiment(
 
 
 def _trials_bar(title: str, total: int, done: int) -> AbstractContextManager[Callable[[str], None]]:
+    print_step(f"{title}: {total} trials, {done} of them done by an earlier run")
     return progress_bar(title, total, done=done, unit="trials")
 
 

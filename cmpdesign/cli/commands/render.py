@@ -15,7 +15,7 @@ from cmpdesign.cli.options.designs import complete_scene
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.options.pixels import parse_pixels
 from cmpdesign.cli.options.response import METAVAR, parse_response
-from cmpdesign.cli.terminal import finish, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -174,6 +174,7 @@ def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: 
     from cmpdesign.scene import save_truth
 
     rendered = render_scene(scene, size=pixels)
+    print_step("the image is rendered")
     if truth is not None:
         save_truth(rendered.truth, truth)
         say(f"wrote {printable_path(truth)}")

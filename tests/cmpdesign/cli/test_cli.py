@@ -127,6 +127,7 @@ def test_version_and_help() -> None:
     for command in ("templates", "build", "check", "render", "verify", "schema"):
         assert command in run("--help").stdout
         assert run(command, "--help").exit_code == 0
+    assert run("evaluate").stderr.strip() == run("evaluate", "--help").stdout.strip()
     shown = re.sub(r"\s+", " ", run("render", "--help").stdout)
     assert f"scene template: {', '.join(scene_templates())}." in shown
 
@@ -143,6 +144,7 @@ def test_version_and_help() -> None:
         (("build", "honeycomb", "--set", "layers"), "expected NAME=VALUE"),
         (("build", "honeycomb", "--only", "pdf"), "--only pdf: unknown; there are svg"),
         (("build", "honeycomb", "--only", ","), "names no file"),
+        (("init", "."), "is a folder; give a design's name"),
         (("check", "honeycomb", "--camera", "640"), "expected WIDTHxHEIGHT"),
         (("render", "none.json", "-o", "image.png"), "none.json: cannot be read: No such file"),
         (("verify", "none.json", "image.png"), "none.json: cannot be read: No such file"),

@@ -41,6 +41,8 @@ def init(
     from cmpdesign.files.atomic import write_file
     from cmpdesign.inputs.files import path_exists
 
+    if not name.name:
+        raise CmpDesignError(f"{name}: is a folder; give a design's name")
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     if path_exists(path) and not force:
         raise CmpDesignError(f"{path}: is there already; choose another name, or replace it with --force")
