@@ -38,7 +38,7 @@ def check(
     ] = False,
     preset: PresetOption = "balanced",
 ) -> None:
-    """List what cannot be made or read. Exit code 1 when something will not work."""
+    """List the features of a design that cannot be made or read. Exit code 1: a finding is an error."""
     from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
@@ -72,7 +72,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
 
     if not findings:
-        say("nothing to report: it can be made and read")
+        say("no findings: the design can be made and read")
         return
     table = Table(box=None, pad_edge=False)
     for heading in ("severity", "what", "value", "limit", "unit", "remedy"):

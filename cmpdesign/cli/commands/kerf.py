@@ -39,12 +39,12 @@ def kerf(
         str | None,
         typer.Option(
             metavar=METAVAR,
-            help="How light became values. [default: as the file states, else sRGB, corrected by the edges]",
+            help="Response of the camera. [default: as the file states, else sRGB, corrected by the edges]",
         ),
     ] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure the kerf on a cut coupon. The lines are ready for the material's file."""
+    """Measure the kerf on a cut coupon, and print the lines for the material's file."""
     from cmpdesign.api import workshop
     from cmpdesign.cli.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon

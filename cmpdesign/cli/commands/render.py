@@ -95,7 +95,9 @@ def render(
     ] = None,
     press: Annotated[
         float,
-        typer.Option(callback=require_finite, help="How far a press at the centre moves the markers, mm."),
+        typer.Option(
+            callback=require_finite, help="Largest displacement of the markers by a press at the centre, mm."
+        ),
     ] = 0.0,
     press_radius: Annotated[
         float | None,
@@ -113,7 +115,7 @@ def render(
         str,
         typer.Option(
             metavar=METAVAR,
-            help="How light becomes values; with an exponent light is value ** exponent.",
+            help="Response of the camera; with an exponent light is value ** exponent.",
         ),
     ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,

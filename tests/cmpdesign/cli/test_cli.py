@@ -102,7 +102,7 @@ def test_a_clip_that_leaves_too_few_cells_is_an_error(tmp_path: Path) -> None:
 
 
 def test_check() -> None:
-    assert "nothing to report" in run("check", "tac3d").stdout
+    assert "no findings" in run("check", "tac3d").stdout
     result = run("check", "honeycomb", "--set", "pitch_mm=0.1")
     assert result.exit_code == 1
     assert "smallest cell" in result.stdout and "mm" in result.stdout
