@@ -188,7 +188,9 @@ def test_every_path_on_the_pages_exists() -> None:
     assert len(paths) > 25
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        paths += re.findall(r"`((?:extractor|cmpdesign|benchmarks|tests|templates|examples)/[\w/]+\.\w+)`", text)
+        paths += re.findall(
+            r"`((?:extractor|cmpdesign|benchmarks|tests|templates|examples)/[\w/]+\.\w+)`", text
+        )
     gone = [path for path in paths if not (ROOT / path).exists() and not (ROOT / "tests" / path).exists()]
     assert gone == []
 
