@@ -67,6 +67,7 @@ lint: $(READY) $(CORE)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(SOURCES))
 	@$(BIN)/mypy
+	@$(BIN)/mypy examples
 
 bench: $(READY) $(CORE)
 	@set -e; for name in extraction accuracy comparison; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done

@@ -27,8 +27,9 @@ EXTRAS = {
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
     "live": "frames sent to Foxglove while they are read",
-    "rerun": "recordings for Rerun",
-    "dask": "experiments on several machines",
+    "rerun": "recordings and a live view for Rerun",
+    "data": "data sets for training",
+    "dask": "data sets made by several machines",
 }
 # Distributions of another name than their module.
 _DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk", "cv2": "opencv-contrib-python-headless", "PIL": "pillow"}

@@ -17,7 +17,7 @@ def main(camera: str = "1280x960", view: str = "24x18mm") -> None:
     for name, text in finest.figures().items():
         print(f"{name:18s}{text}")
     print("\nallowed error    layers  pitch mm  told apart mm")
-    for factor in (0.8, 0.6, 0.5):
+    for factor in (0.8, 0.6):
         coarser = cmpdesign.size(camera, view, factor * finest.error_um / 1000)
         design = coarser.design
         print(

@@ -68,11 +68,15 @@ class Command(TyperCommand):
         return super().invoke(ctx)
 
 
-class OneLineErrors(TyperGroup):
-    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
+class Group(TyperGroup):
+    """A group of commands, whose help text ends with examples."""
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(self.epilog, formatter)
+
+
+class OneLineErrors(Group):
+    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         use_mode(Mode(as_json=_asks_for_json(args)))  # for errors in the words, before options are known

@@ -8,6 +8,7 @@ from benchmarks.camera.page import page_pictures
 
 from . import api, commands, fields, gallery, measured, reasons
 from .pictures import contact, drawings, failures, hero, lengths, scene_templates, sides, stages, surface
+from .pictures.tutorials import photos
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
@@ -23,6 +24,7 @@ PARTS = (
     measured,
     scene_templates,
     surface,
+    photos,
 )
 
 

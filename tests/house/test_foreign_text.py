@@ -35,6 +35,7 @@ READS = {
     "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read
     "cmpdesign/files/atomic.py": {"os.open", "open 'rb+'"},  # to flush to disk what it wrote
     "cmpdesign/tracking/sources.py": {"cv2.VideoCapture"},
+    "cmpdesign/data/videos/pieces.py": {"open 'r'"},  # of a video, by PyAV
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
     "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame
     "cmpdesign/evaluate/journal.py": {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,10 +78,11 @@ class PartMesh(NamedTuple):
     tolerance: float
 
 
-def mesh_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> list[PartMesh]:
-    """The triangle meshes of the parts of these names."""
+def mesh_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> Iterator[PartMesh]:
+    """The triangle meshes of the parts of these names, one after the other."""
     parts = {part.name: part for part in make_parts(make_stack(design, layout))}
-    return [make_part_mesh(parts[name]) for name in names]
+    for name in names:
+        yield make_part_mesh(parts[name])
 
 
 def make_part_mesh(part: Part) -> PartMesh:

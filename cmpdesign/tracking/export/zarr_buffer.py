@@ -19,6 +19,7 @@ from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.libraries import extra
 from cmpdesign.tracking.export.run_images import require_sources, run_images
 from cmpdesign.tracking.export.runs import read_run, require_one_kind
+from cmpdesign.watch import told
 
 PREFIX = "tactile_"
 IMAGE_KEY = "tactile_image"
@@ -64,7 +65,7 @@ def write_zarr(
         with Stage(path.parent) as stage:
             staged = stage.folder / "buffer"
             buffer = _Buffer(staged)
-            for place, run_path in enumerate(runs):
+            for place, run_path in enumerate(told(runs, len(runs), "runs")):
                 buffer.add_run(run_path, images[place] if images else None, most_pixels)
             frames = buffer.finish({"format": kind.format, "digest": kind.digest})
             stage.commit(staged, path)

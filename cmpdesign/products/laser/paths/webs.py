@@ -13,6 +13,8 @@ from cmpdesign.products.laser.paths.cavities import Cavities, burnt_shapes
 
 # Decimals in mm to which pairs of cavities are compared: copies are measured once.
 SAME_DECIMALS = 6
+# Distance of the points of an outline at which depths are measured.
+DEPTH_STEP_MM = 0.02
 
 
 def smallest_web_mm(
@@ -57,12 +59,13 @@ def smallest_web_mm(
 def burn_depth_mm(outlines: Points, filled: Points) -> float:
     """Largest depth of burnt outlines in filled outlines: the distance of a burnt point from the filled one's rim.
 
-    The points of an outline are compared, not intersections of shapes: an intersection's other corners lie on the rim.
+    Points of the outlines are compared, ``DEPTH_STEP_MM`` apart or less.
     """
     import shapely
 
-    points = shapely.points(outlines.reshape(-1, 2))
-    cured = burnt_shapes(filled)
+    burnt, cured = burnt_shapes(outlines), burnt_shapes(filled)
+    meeting = np.unique(shapely.STRtree(cured).query(burnt, predicate="intersects")[0])
+    points = shapely.points(shapely.get_coordinates(shapely.segmentize(burnt[meeting], DEPTH_STEP_MM)))
     inside, around = shapely.STRtree(cured).query(points, predicate="within")
     return float(shapely.distance(points[inside], shapely.boundary(cured)[around]).max(initial=0.0))
 
