@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -129,11 +130,17 @@ def try_python(python: str) -> bool:
     """Whether the wheel of a Python installs into an empty environment and runs the pages."""
     with tempfile.TemporaryDirectory(prefix="release-") as name:
         folder = Path(name)
+        begin = time.monotonic()
         wheel = built_wheel(python, folder)
-        print(f"{python}: {wheel.name}, {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
+        built = time.monotonic()
+        print(
+            f"{python}: {wheel.name}, {wheel.stat().st_size / 1e6:.1f} MB, in {built - begin:.0f} s",
+            flush=True,
+        )
         installed = environment(python, folder / "installed")
         needs = [f"cmpdesign[all,bench] @ {wheel.as_uri()}", *TEST_NEEDS]
         subprocess.run([installed, "-m", "pip", "install", "--quiet", *needs], check=True)
+        print(f"{python}: installed in {time.monotonic() - built:.0f} s", flush=True)
         (folder / "pages").mkdir()
         return run_pages(installed, folder / "pages") == 0
 
