@@ -35,6 +35,12 @@ class SourceFrame:
     problem: str = ""
     path: Path | None = None
 
+    def __repr__(self) -> str:
+        seen = self.problem or (
+            "x".join(map(str, self.image.shape)) if hasattr(self.image, "shape") else "views"
+        )
+        return f"<SourceFrame at {self.time_s:.6g} s: {seen}>"
+
 
 class FrameSource(Protocol):
     """A sequence of frames that is read once.

@@ -312,7 +312,7 @@ def test_parquet_without_pyarrow_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
-    assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []
+    assert "of the extra [parquet]" in line and list(tmp_path.iterdir()) == []
 
 
 def test_tables_of_one_name_have_their_own_summaries(made: Path, tmp_path: Path) -> None:
