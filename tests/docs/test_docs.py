@@ -175,7 +175,7 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW_PAGES else ()) for page in PAGES],
-    ids=lambda page: page.stem,
+    ids=lambda page: page.stem if page.parent.name != "tutorials" or page.stem != "README" else "tutorials",
 )
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
