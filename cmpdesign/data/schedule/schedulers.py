@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cmpdesign.data.schedule.cluster import cluster_results
-from cmpdesign.data.schedule.processes import start_local_worker
+from cmpdesign.data.schedule.processes import one_thread, start_local_worker
 from cmpdesign.errors import CmpDesignError
 
 MOST_LOSSES = 3  # of workers, one after another without a result in between
@@ -74,7 +74,16 @@ def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator
     """
     if scheduler.address:
         return cluster_results(work, items, scheduler.address)
+    if min(scheduler.workers, len(items)) < 2:
+        return _own_results(work, items)
     return _local_results(work, items, scheduler.workers)
+
+
+def _own_results(work: Work, items: Sequence[Any]) -> Generator[Any, None, None]:
+    """The work of one worker is done by this process."""
+    with one_thread():
+        for item in items:
+            yield work(item)
 
 
 def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[Any, None, None]:

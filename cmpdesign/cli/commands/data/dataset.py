@@ -12,8 +12,8 @@ from cmpdesign.cli.commands.data.progress import print_made, shards_bar
 from cmpdesign.cli.options.scheduling import SchedulerOption, WorkersOption
 
 EXAMPLES = (
-    "cmpdesign dataset plan.toml -o pressed --workers 2",
-    "cmpdesign dataset plan.toml -o pressed --shards 1 --json",
+    "cmpdesign dataset plan.toml -o pressed",
+    "cmpdesign dataset plan.toml -o pressed --shards 1 --workers 1 --json",
 )
 
 

@@ -14,8 +14,8 @@ from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_
 from cmpdesign.cli.options.scheduling import SchedulerOption, WorkersOption
 
 EXAMPLES = (
-    "cmpdesign extract layout.json press.mp4 frames -o markers --workers 1",
-    "cmpdesign extract layout.json press.mp4 -o markers --frames-a-shard 100 --workers 1 --json",
+    "cmpdesign extract layout.json press.mp4 -o markers",
+    "cmpdesign extract layout.json press.mp4 frames -o markers --frames-a-shard 100 --workers 1 --json",
 )
 
 
